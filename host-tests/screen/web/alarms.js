@@ -115,7 +115,7 @@ const alarms = {
     this.audio = this.audio ? null : new AudioContext();
     const button = byId("sound");
     button.setAttribute("aria-pressed", String(this.audio !== null));
-    button.textContent = this.audio ? "Sound on" : "Sound off";
+    button.textContent = this.audio ? "Sound: on" : "Sound: off";
   },
 };
 

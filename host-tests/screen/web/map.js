@@ -35,6 +35,10 @@ class ChainMap {
     this.pen = canvas.getContext("2d");
     this.snapshot = null;
     this.ways = new Map();
+    /** Picture of the ways as drawn so far, and the parts of ways that are not yet in it; `drawnFor` is the area that it shows. */
+    this.trail = document.createElement("canvas").getContext("2d");
+    this.newParts = [];
+    this.drawnFor = "";
     /** Displayed area: centre in metres, and pixels per metre. While `fitted`, it contains everything. */
     this.view = { x: 500, y: 0, scale: 1 };
     this.fitted = true;
@@ -66,6 +70,7 @@ class ChainMap {
       const last = way.at(-1);
       if (last && Math.hypot(position.x_m - last[0], position.y_m - last[1]) < WAY_STEP) continue;
       way.push([position.x_m, position.y_m]);
+      if (last) this.newParts.push([last, way.at(-1)]);
       // A long way keeps every other of its older points.
       if (way.length > WAY_POINTS) this.ways.set(number, way.filter((_, at) => at % 2 === 0 || at > WAY_POINTS / 2));
     }
@@ -74,6 +79,7 @@ class ChainMap {
 
   forget() {
     this.ways.clear();
+    this.drawnFor = "";
     this.fit();
   }
 
@@ -170,9 +176,12 @@ class ChainMap {
     if (known.length === 0) return;
     if (this.bounds) known.push(...this.bounds);
     const [xs, ys] = [0, 1].map((axis) => known.map((at) => at[axis]));
-    this.bounds = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
+    const [least, most] = [[Math.min(...xs), Math.min(...ys)], [Math.max(...xs), Math.max(...ys)]];
+    // Bounds in steps, so that the area does not change with every metre that a relay moves outward.
+    const step = round125(Math.max(most[0] - least[0], most[1] - least[1], 10) / 20);
+    this.bounds = [least.map((at) => Math.floor(at / step) * step), most.map((at) => Math.ceil(at / step) * step)];
     const [[x0, y0], [x1, y1]] = this.bounds;
-    const scale = Math.min((this.width - 70) / Math.max(x1 - x0, 50), (this.height - 90) / Math.max(y1 - y0, 20));
+    const scale = Math.min((this.width - 90) / Math.max(x1 - x0, 50), (this.height - 130) / Math.max(y1 - y0, 20));
     this.view = { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: Math.max(scale, 1e-4) };
   }
 
@@ -198,8 +207,7 @@ class ChainMap {
   }
 
   /** Draws a line through points in metres. */
-  trace(points, colour, width, dashes = [], closed = false) {
-    const { pen } = this;
+  trace(points, colour, width, dashes = [], closed = false, pen = this.pen) {
     pen.beginPath();
     points.forEach(([x, y], at) => (at ? pen.lineTo(...this.pixels(x, y)) : pen.moveTo(...this.pixels(x, y))));
     if (closed) pen.closePath();
@@ -262,7 +270,7 @@ class ChainMap {
   north() {
     const azimuth = this.snapshot.frame?.azimuth_deg;
     const { pen } = this;
-    const [x, y] = [this.width - 26, 38];
+    const [x, y] = [this.width - 26, this.height - 34];
     if (typeof azimuth !== "number") return;
     const angle = (-azimuth * Math.PI) / 180;
     const [dx, dy] = [Math.cos(angle), Math.sin(angle)];
@@ -301,10 +309,22 @@ class ChainMap {
     }
   }
 
+  /** Draws the ways. Their picture is kept, and only new parts are added to it, while the map shows the same area. */
   drawWays() {
-    this.pen.globalAlpha = 0.55;
-    for (const way of this.ways.values()) if (way.length > 1) this.trace(way, "relay", 1);
-    this.pen.globalAlpha = 1;
+    const { canvas, pen, trail, view } = this;
+    const area = [canvas.width, canvas.height, view.x, view.y, view.scale, this.colours.relay].join();
+    if (area !== this.drawnFor) {
+      this.drawnFor = area;
+      Object.assign(trail.canvas, { width: canvas.width, height: canvas.height });
+      trail.setTransform(pen.getTransform());
+      trail.lineJoin = "round";
+      this.newParts = [...this.ways.values()].filter((way) => way.length > 1);
+    }
+    for (const part of this.newParts) this.trace(part, "relay", 1, [], false, trail);
+    this.newParts = [];
+    pen.globalAlpha = 0.55;
+    pen.drawImage(trail.canvas, 0, 0, this.width, this.height);
+    pen.globalAlpha = 1;
   }
 
   interferers() {
@@ -368,7 +388,11 @@ class ChainMap {
     if (!agreed) return;
     const { pen } = this;
     const [x, y] = this.pixels(agreed.x_m, agreed.y_m);
-    if (position) this.trace([[position.x_m, position.y_m], [agreed.x_m, agreed.y_m]], "relay", 1, [2, 3]);
+    if (position) {
+      const [nowX, nowY] = this.pixels(position.x_m, position.y_m);
+      if (Math.hypot(nowX - x, nowY - y) < 6) return;
+      this.trace([[position.x_m, position.y_m], [agreed.x_m, agreed.y_m]], "relay", 1, [2, 3]);
+    }
     pen.strokeStyle = this.colours.relay;
     pen.lineWidth = 1.5;
     pen.beginPath();
@@ -408,9 +432,9 @@ class ChainMap {
     const { pen } = this;
     const bad = condition === "lost" || condition === "fault";
     const colour = bad ? "poor" : "relay";
-    if (crowded) {
-      this.write(bad ? `${number} ${condition}` : String(number), x, y - 14, colour, bad);
-    } else {
+    const old = typeof age === "number" && age >= SHOWN_AGE ? `${age.toFixed(0)} s ago` : "";
+    const words = [bad ? condition : "", bad || !crowded ? old : ""].filter(Boolean).join(", ");
+    if (!crowded) {
       pen.font = "600 11px system-ui, sans-serif";
       pen.textAlign = "center";
       pen.textBaseline = "middle";
@@ -418,8 +442,10 @@ class ChainMap {
       pen.fillText(String(number), x, y + 0.5);
       pen.font = "12px system-ui, sans-serif";
     }
-    const old = typeof age === "number" && age >= SHOWN_AGE;
-    const words = [bad && !crowded ? condition : "", old ? `${age.toFixed(0)} s ago` : ""].filter(Boolean).join(", ");
-    if (words && !(crowded && !bad)) this.write(words, x, y - (crowded ? 30 : 20), colour, bad);
+    const text = crowded ? `${number} ${words}`.trim() : words;
+    if (!text) return;
+    // The text of a fault is moved up until it is free.
+    const free = [0, 15, 30, 45].slice(0, bad ? 4 : 1).some((up) => this.write(text, x, y - (crowded ? 14 : 20) - up, colour));
+    if (bad && !free) this.write(text, x, y - 14, colour, true);
   }
 }

@@ -14,7 +14,7 @@ const LINES = 1000;
 const OLD = 5;
 
 const map = new ChainMap(byId("canvas"));
-const received = { snapshots: 0, last: null, at: 0, source: null };
+const received = { snapshots: 0, first: 0, last: null, at: 0, source: null };
 
 const number = (value, digits) => (typeof value === "number" ? value.toFixed(digits) : "–");
 
@@ -46,6 +46,9 @@ function table({ relays, hops }) {
   const into = new Map(hops.map((hop) => [hop.to, hop]));
   const rows = [...relays].sort((one, other) => one.number - other.number).map((relay) => row(relay, into.get(String(relay.number))));
   if (into.has("Rx")) rows.push({ ...row({ number: "Rx", lost_neighbours: [] }, into.get("Rx")), kind: "" });
+  // The column of the way back is there if it is known of any hop.
+  const hasBack = hops.some((hop) => typeof (hop.sir_back_db ?? hop.measured_back_db) === "number");
+  byId("table").classList.toggle("one-way", !hasBack);
   const body = byId("rows");
   while (body.childElementCount > rows.length) body.lastChild.remove();
   while (body.childElementCount < rows.length) {
@@ -95,6 +98,7 @@ function show(snapshot) {
   map.take(snapshot);
   table(snapshot);
   alarms.take(snapshot.alarms);
+  received.first ||= performance.now();
   connection();
 }
 

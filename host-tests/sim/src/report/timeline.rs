@@ -129,20 +129,24 @@ struct Group {
 
 /// Returns the line of the log about one event at one node. The line names the node.
 pub fn line(moment: &Moment) -> String {
+    let relay = moment.relay;
+    if let (TimelineEvent::Converged, Some(sir)) = (moment.what, moment.target) {
+        return format!("relay {relay}: position agreed, SIR {sir:.3}");
+    }
     let sample = MomentReport::of(moment);
     let line = Group {
         first_s: sample.at_s,
         last_s: sample.at_s,
-        relays: vec![moment.relay],
+        relays: vec![relay],
         sample,
     }
     .line();
-    // The lines about agreements give the number of relays only.
+    // The other lines about agreements do not name the relay.
     match moment.what {
         TimelineEvent::ViewAccepted { .. }
         | TimelineEvent::Converged
         | TimelineEvent::Infeasible
-        | TimelineEvent::Adopted(_) => format!("relay {}: {line}", moment.relay),
+        | TimelineEvent::Adopted(_) => format!("relay {relay}: {line}"),
         _ => line,
     }
 }
