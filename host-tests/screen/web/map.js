@@ -20,6 +20,9 @@ const WAY_POINTS = 400;
 /** Least distance of two relays on the screen for a number inside each symbol, px. */
 const CROWDED = 24;
 
+/** Largest number of relays whose numbers may be stacked above each other. */
+const FEW = 20;
+
 /** Age from which the map shows it beside a relay, s. */
 const SHOWN_AGE = 2;
 
@@ -348,7 +351,9 @@ class ChainMap {
       }
       pen.stroke();
       const watts = typeof power === "number" ? `, ${Number(power.toPrecision(3))} W` : "";
-      this.write(`interferer${estimated ? " (estimate)" : ""}${watts}`, x, y + 18, "interferer");
+      const words = ["interferer", estimated ? " (estimate)" : "", watts];
+      // The text is shortened until there is room for it.
+      [3, 2, 1].some((count) => this.write(words.slice(0, count).join(""), x, y + 18, "interferer"));
     }
   }
 
@@ -444,8 +449,9 @@ class ChainMap {
     }
     const text = crowded ? `${number} ${words}`.trim() : words;
     if (!text) return;
-    // The text of a fault is moved up until it is free.
-    const free = [0, 15, 30, 45].slice(0, bad ? 4 : 1).some((up) => this.write(text, x, y - (crowded ? 14 : 20) - up, colour));
+    // The text is moved up until there is room for it: that of a fault more than others, and none among many relays.
+    const steps = bad ? 4 : this.snapshot.relays.length > FEW ? 1 : 3;
+    const free = [0, 15, 30, 45].slice(0, steps).some((up) => this.write(text, x, y - (crowded ? 14 : 20) - up, colour));
     if (bad && !free) this.write(text, x, y - 14, colour, true);
   }
 }

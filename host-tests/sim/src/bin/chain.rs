@@ -110,7 +110,8 @@ const FRAME: Duration = Duration::from_millis(100);
 ///
 /// A computer that is too slow delays the virtual time.
 fn fly_live(chain: &mut Chain, view: &mut LiveView, screen: &Screen, speed: f64) {
-    let frame = uav_relay::Duration::from_micros((FRAME.mul_f64(speed).as_micros() as u64).max(1));
+    let micros = FRAME.mul_f64(speed).as_micros();
+    let frame = uav_relay::Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
     let mut now = uav_relay::Instant::ZERO;
     loop {
         let begun = Instant::now();
