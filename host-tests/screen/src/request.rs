@@ -123,7 +123,7 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr) -> Answer {
     })
 }
 
-/// Returns true if `host` is the address `own`, or `localhost` for an address that only this computer reaches.
+/// Returns true if `host` is the address `own`, or `localhost` for a loopback address.
 fn is_own(host: &str, own: SocketAddr) -> bool {
     let (name, port) = match host.rsplit_once(':') {
         // A colon inside of brackets belongs to an IPv6 address.

@@ -1,4 +1,4 @@
-//! Server of the page: one thread that accepts connections, one that writes snapshots as JSON, and one for each connection.
+//! Server of the page. One thread accepts connections, one writes snapshots as JSON, and each connection has one.
 //!
 //! [`Screen::show`] only replaces the snapshot in the inbox, which no connection touches. A connection sends the newest snapshot when it
 //! has sent the one before, so that a slow browser skips snapshots and delays nobody. Log lines are kept apart, because no line may
@@ -34,7 +34,7 @@ const LINGER_TIME: Duration = Duration::from_millis(200);
 /// Time between two snapshots that browsers get, however many the program shows.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Time without a new snapshot after which a comment is sent, to find out whether the browser is still there.
+/// Time without a new snapshot after which a comment is sent, to detect a browser that has left.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// Stack size of a connection's thread, bytes.
@@ -174,7 +174,7 @@ impl Shared {
         self.has_ended.load(Ordering::SeqCst)
     }
 
-    /// Writes the newest snapshot of the inbox as JSON to the outbox, whenever there is one, until the screen ends.
+    /// Moves new snapshots from the inbox to the outbox, as JSON, until the screen ends.
     fn write_snapshots(&self) {
         while let Some((snapshot, lines)) = self.next() {
             let text = serde_json::to_string(&snapshot).unwrap_or_default();

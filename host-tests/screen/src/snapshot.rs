@@ -21,7 +21,7 @@ pub struct Snapshot {
     pub tx: Option<Position>,
     /// Position of the receiver.
     pub rx: Option<Position>,
-    /// All known relays, also lost ones.
+    /// Known relays, also lost ones.
     pub relays: Vec<RelaySnapshot>,
     /// Hops of the chain, from Tx to Rx.
     pub hops: Vec<Hop>,
@@ -31,7 +31,7 @@ pub struct Snapshot {
     pub geofence: Option<Fence>,
     /// No-fly areas: corners of each, x and y in m.
     pub no_fly: Vec<Vec<[f64; 2]>>,
-    /// All present alarms and those that have ended, each with a number of its own.
+    /// Alarms that last, and those that have ended, each with a number of its own.
     pub alarms: Vec<Alarm>,
     /// Log lines that no earlier snapshot had. The server keeps the last 1000 lines.
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! The server against its users: browsers, foreign pages, malformed requests, too many connections and slow readers.
+//! Server under load: many browsers, foreign pages, malformed requests and slow readers.
 //!
 //! The chain must not notice them: each test measures how long `Screen::show` takes meanwhile.
 #![allow(
@@ -67,7 +67,7 @@ fn connect(screen: &Screen) -> TcpStream {
     stream
 }
 
-/// Sends `request` and returns the whole response; empty if the server closed the connection without one.
+/// Sends `request` and returns the response; empty if the server closed the connection without one.
 fn asked(screen: &Screen, request: &[u8]) -> String {
     let mut stream = connect(screen);
     _ = stream.write_all(request);

@@ -106,7 +106,7 @@ fn screen(options: &Options) -> Result<Option<Screen>, Failure> {
 /// Time between two snapshots on the screen.
 const FRAME: Duration = Duration::from_millis(100);
 
-/// Runs the simulated chain in real time, times `speed`, until the end of the setup, and shows it on `screen`.
+/// Runs the simulated chain `speed` times faster than real time, and shows it on `screen`.
 ///
 /// A computer that is too slow delays the virtual time.
 fn fly_live(chain: &mut Chain, view: &mut LiveView, screen: &Screen, speed: f64) {

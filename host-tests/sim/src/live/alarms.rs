@@ -58,7 +58,7 @@ impl Reason {
         }
     }
 
-    /// Returns the text of an alarm about relay `subject` (0: about the reporters themselves), reported by `reporters`.
+    /// Returns the text of an alarm about relay `subject`, or about its `reporters` for subject 0.
     fn text(self, subject: u16, reporters: &[u16]) -> String {
         let by = named(reporters);
         match self {
@@ -185,7 +185,9 @@ impl Alarms {
         }
     }
 
-    /// Ends the alarms of a reason about relay `subject`; `None` to end only the part that the moment's relay has reported.
+    /// Ends the alarms of a reason about relay `subject`.
+    ///
+    /// `None` ends only the part that the moment's relay has reported.
     fn end(&mut self, moment: &Moment, reason: Reason, subject: Option<u16>) {
         let lasting = self
             .entries

@@ -57,7 +57,9 @@ impl Chain {
         &self.outcome.moments
     }
 
-    /// Returns the mission that the chain flies: that of the first relay which is on and has an agreed position.
+    /// Returns the mission that the chain flies.
+    ///
+    /// It is the mission of the first relay that is on and has an agreed position.
     ///
     /// Without such a relay it is the mission loaded at the start.
     pub fn mission(&self) -> &Mission {
