@@ -11,8 +11,10 @@ use std::time::{Duration, Instant};
 use clap::Parser as _;
 use uav_relay_capture::{Capture, Direction, Frame, Interface};
 use uav_relay_scenario::Scenario;
+use uav_relay_screen::Screen;
 use uav_relay_sim::cli::{Options, Prepared, Refused};
 use uav_relay_sim::command::Failure;
+use uav_relay_sim::live::LiveView;
 use uav_relay_sim::report::{AttackReport, ChainReport, seconds};
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::outcome::{Link, OnAir, Outcome};
@@ -46,6 +48,15 @@ fn run(options: &Options) -> Result<(), Failure> {
             return Err(failure);
         }
     };
+    if let Some(screen) = screen(options)? {
+        let setup = run.setup.clone();
+        let mut view = LiveView::new(&setup);
+        let chain = run.fly(setup, |chain| {
+            fly_live(chain, &mut view, &screen, options.web.speed());
+            Ok(())
+        })?;
+        return show(options, &run.report(&chain.finish()));
+    }
     let mut capture = match &options.capture {
         Some(file) => Some(AirCapture::begin(file, &run.setup)?),
         None => None,
@@ -71,6 +82,47 @@ fn run(options: &Options) -> Result<(), Failure> {
         command::write(file, &svg::draw(&run.picture(&outcome, &report)))?;
     }
     show(options, &report)
+}
+
+/// Starts the screen that the options ask for, if any, and prints its address.
+fn screen(options: &Options) -> Result<Option<Screen>, Failure> {
+    let Some(address) = options.web.address else {
+        return Ok(None);
+    };
+    let screen = Screen::start(address)
+        .map_err(|error| Failure::input(format!("--web {address}: {error}")))?;
+    let public = if screen.is_public() {
+        "; every computer that reaches this address can see it"
+    } else {
+        ""
+    };
+    command::print_line(&format!(
+        "open {} in a browser{public}; Ctrl-C ends the run",
+        screen.url()
+    ));
+    Ok(Some(screen))
+}
+
+/// Time between two snapshots on the screen.
+const FRAME: Duration = Duration::from_millis(100);
+
+/// Runs the simulated chain `speed` times faster than real time, and shows it on `screen`.
+///
+/// A computer that is too slow delays the virtual time.
+fn fly_live(chain: &mut Chain, view: &mut LiveView, screen: &Screen, speed: f64) {
+    let micros = FRAME.mul_f64(speed).as_micros();
+    let frame = uav_relay::Duration::from_micros(u64::try_from(micros).unwrap_or(u64::MAX));
+    let mut now = uav_relay::Instant::ZERO;
+    loop {
+        let begun = Instant::now();
+        now = now + frame;
+        let has_ended = chain.advance(now);
+        screen.show(view.snapshot(chain, now));
+        if has_ended {
+            return;
+        }
+        std::thread::sleep(FRAME.saturating_sub(begun.elapsed()));
+    }
 }
 
 fn fly(

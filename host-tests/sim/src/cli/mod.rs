@@ -13,6 +13,8 @@ mod options;
 mod prepared;
 mod time;
 mod upload;
+mod web;
 
 pub use options::{Method, Options};
 pub use prepared::{Prepared, Refused};
+pub use web::Web;

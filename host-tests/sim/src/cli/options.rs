@@ -10,6 +10,7 @@ use uav_relay_scenario::scene::Scene;
 
 use super::data::Data;
 use super::hostile::Hostile;
+use super::web::Web;
 use crate::command::{Failure, file, given_option, number, whole};
 use crate::simulator::setup::Setup;
 use crate::simulator::true_interference::TrueInterference;
@@ -82,6 +83,9 @@ pub struct Options {
     /// Failure, attack and upload options.
     #[command(flatten)]
     pub hostile: Hostile,
+    /// Options of the page that shows the run.
+    #[command(flatten)]
+    pub web: Web,
 }
 
 /// Method by which relays agree on their positions.

@@ -121,6 +121,7 @@ impl<'a> Prepared<'a> {
         let mut setup = setup(options, mission, sites)?;
         let axis = scenario.line.map(|line| line.axis);
         options.hostile.flight.prepare(&mut setup, axis)?;
+        options.web.prepare(&mut setup);
         setup.profiles = profiles;
         setup.held = mission::fixed_altitude_relays(&scenario, options.uavs);
         let told = setup.mission;

@@ -127,6 +127,30 @@ struct Group {
     sample: MomentReport,
 }
 
+/// Returns the line of the log about one event at one node. The line names the node.
+pub fn line(moment: &Moment) -> String {
+    let relay = moment.relay;
+    if let (TimelineEvent::Converged, Some(sir)) = (moment.what, moment.target) {
+        return format!("relay {relay}: position agreed, SIR {sir:.3}");
+    }
+    let sample = MomentReport::of(moment);
+    let line = Group {
+        first_s: sample.at_s,
+        last_s: sample.at_s,
+        relays: vec![relay],
+        sample,
+    }
+    .line();
+    // The other lines about agreements do not name the relay.
+    match moment.what {
+        TimelineEvent::ViewAccepted { .. }
+        | TimelineEvent::Converged
+        | TimelineEvent::Infeasible
+        | TimelineEvent::Adopted(_) => format!("relay {relay}: {line}"),
+        _ => line,
+    }
+}
+
 /// Longest time between two successive log entries that are grouped as one event, s.
 ///
 /// Neighbours may detect the same failure at different times.
@@ -328,7 +352,7 @@ pub(super) fn list(relays: &[u16]) -> String {
 }
 
 /// Formats relays by their numbers: "relay 3", "relays 3 and 5".
-fn named(relays: &[u16]) -> String {
+pub(crate) fn named(relays: &[u16]) -> String {
     let noun = if relays.len() > 1 { "relays" } else { "relay" };
     format!("{noun} {}", list(relays))
 }

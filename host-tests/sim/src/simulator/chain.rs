@@ -4,6 +4,7 @@ mod air;
 mod fleet;
 mod ground;
 mod judge;
+mod live;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -29,6 +30,7 @@ use super::watch::{ObservedState, Run, Watch};
 use fleet::LANDS_AFTER;
 use ground::{Station, stations};
 use judge::ChangedRelays;
+pub use live::LiveRelay;
 
 /// Largest number of events in a run. The limit ends runs that never settle, after some minutes of computing.
 const MAX_EVENTS: u64 = 400_000_000;
@@ -63,13 +65,17 @@ impl Chain {
                 self.end_soak(at);
                 return true;
             }
-            self.events += 1;
-            self.now = at;
-            let changed = ChangedRelays::of(&event, relay);
-            self.process_event(relay, event);
-            self.update_statistics(changed);
+            self.process(at, relay, event);
         }
         false
+    }
+
+    fn process(&mut self, at: Instant, relay: usize, event: QueuedEvent) {
+        self.events += 1;
+        self.now = at;
+        let changed = ChangedRelays::of(&event, relay);
+        self.process_event(relay, event);
+        self.update_statistics(changed);
     }
 
     /// Passes `samples` interference samples to every living relay that has a setpoint.
@@ -631,6 +637,12 @@ impl Queue {
     pub fn take(&mut self) -> Option<(Instant, usize, QueuedEvent)> {
         let Reverse(entry) = self.entries.pop()?;
         Some((entry.at, entry.relay, entry.event))
+    }
+
+    /// Removes the earliest event, if it is not after `until`, as [`take`](Self::take) does.
+    pub fn take_by(&mut self, until: Instant) -> Option<(Instant, usize, QueuedEvent)> {
+        let Reverse(next) = self.entries.peek()?;
+        (next.at <= until).then(|| self.take())?
     }
 }
 

@@ -14,7 +14,7 @@ pub fn point(place: Placement) -> Point {
     [place.x_m, place.y_m, place.altitude_m].map(f64::from)
 }
 
-pub(super) fn placement(at: Point) -> Placement {
+pub(crate) fn placement(at: Point) -> Placement {
     let [x_m, y_m, altitude_m] = at.map(narrow);
     Placement {
         x_m,

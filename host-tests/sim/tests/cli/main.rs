@@ -13,6 +13,7 @@ mod hostile;
 mod methods;
 mod traffic;
 mod upload;
+mod web;
 
 use std::fmt::Write as _;
 use std::io::Read as _;

@@ -7,6 +7,7 @@
 //! | `hand` | mouse, finger and keyboard input, and error messages |
 //! | `played` | playing a run |
 //! | `ways` | both directions of every hop |
+//! | `screen` | the screen of a flight, `cargo chain --fly --web` |
 //! | `layout` | wide and narrow, light and dark, accessibility, and response times |
 #![allow(
     clippy::unwrap_used,
@@ -21,4 +22,5 @@ mod hand;
 mod layout;
 mod opened;
 mod played;
+mod screen;
 mod ways;

@@ -34,12 +34,13 @@ use clap::Parser;
 use page::{Block, Kind};
 
 /// Pages of the documentation whose commands are run, in the order in which a new user reads them.
-const PAGES: [&str; 13] = [
+const PAGES: [&str; 14] = [
     "README.md",
     "examples/LINUX.md",
     "examples/BOARDS.md",
     "examples/SCENARIOS.md",
     "examples/PAGE.md",
+    "examples/SCREEN.md",
     "examples/CAPTURES.md",
     "src/docs/firmware.md",
     "src/docs/flight.md",

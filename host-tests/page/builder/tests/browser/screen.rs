@@ -1,0 +1,343 @@
+//! Screen of a flight in a browser: relays, alarms, layout and speed. A running simulation fills it.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use clap::Parser as _;
+use uav_relay_scenario::Scenario;
+use uav_relay_screen::{
+    Condition, Fence, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Screen, Snapshot,
+};
+use uav_relay_sim::cli::{Options, Prepared};
+use uav_relay_sim::live::LiveView;
+
+use super::chromium::Browser;
+use super::opened::number;
+
+/// A screen that shows snapshots until it is dropped.
+struct Shown {
+    screen: Arc<Screen>,
+    has_ended: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl Shown {
+    /// Shows ten snapshots of `next` a second.
+    fn begin(mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Arc::new(Screen::start("127.0.0.1:0".parse().unwrap()).unwrap());
+        let has_ended = Arc::new(AtomicBool::new(false));
+        let (shown, stop) = (Arc::clone(&screen), Arc::clone(&has_ended));
+        let thread = thread::spawn(move || {
+            while !stop.load(Ordering::Relaxed) {
+                shown.show(next());
+                thread::sleep(Duration::from_millis(100));
+            }
+        });
+        Self {
+            screen,
+            has_ended,
+            thread: Some(thread),
+        }
+    }
+
+    /// Shows a simulated flight with these options of `cargo chain`, `speed` times faster than real time.
+    fn flight(words: &'static str, speed: u64) -> Self {
+        let mut now = uav_relay::Instant::ZERO;
+        let words = format!("chain --fly --web 127.0.0.1:0 {words}");
+        let options = Options::try_parse_from(words.split_whitespace()).unwrap();
+        let options: &'static Options = Box::leak(Box::new(options));
+        let prepared = Prepared::new(options, Scenario::default(), None).unwrap();
+        let setup = prepared.setup.clone();
+        let mut view = LiveView::new(&setup);
+        let mut chain = prepared.fly(setup, |_| Ok(())).unwrap();
+        Self::begin(move || {
+            now = now + uav_relay::Duration::from_millis(100 * speed);
+            chain.advance(now);
+            view.snapshot(&chain, now)
+        })
+    }
+
+    fn opened(&self, width: u32, height: u32) -> Browser {
+        Browser::start(&self.screen.url(), width, height)
+    }
+}
+
+impl Drop for Shown {
+    fn drop(&mut self) {
+        self.has_ended.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            _ = thread.join();
+        }
+    }
+}
+
+/// JavaScript condition: the page has a row for each of `relays` relays, and has drawn the map.
+fn shows(relays: u16) -> String {
+    format!(
+        "document.readyState === 'complete' && byId('rows').childElementCount >= {relays} && map.frames > 0"
+    )
+}
+
+#[test]
+fn every_relay_is_there_within_a_second_and_a_lost_one_raises_an_alarm() {
+    let shown = Shown::flight("--kill 3@30", 10);
+    let mut browser = Browser::start("about:blank", 1280, 900);
+    browser.open(&shown.screen.url());
+    browser.until("location.protocol === 'http:'");
+    browser.until(&shows(9));
+    let took = number(&mut browser, "received.first");
+    println!("8 relays and Rx are on the page {took:.0} ms after it was opened");
+    assert!(took < 1_000.0, "{took} ms");
+    let names = browser
+        .text("[...document.querySelectorAll('#rows th')].map((it) => it.textContent).join()");
+    assert_eq!(names, "1,2,3,4,5,6,7,8,Rx");
+
+    browser.until("alarms.open.some(({ text }) => text.startsWith('relay 3 lost'))");
+    let title = browser.text("document.title");
+    assert!(
+        title.starts_with('▲') && title.contains("relay 3 lost"),
+        "{title}"
+    );
+    let row = browser.text("byId('rows').children[2].className");
+    assert_eq!(row, "lost");
+    let announced = browser.text("byId('announced').textContent");
+    assert!(announced.contains("critical: relay 3 lost"), "{announced}");
+    // The operator acknowledges it: the title is that of the page, and the alarm stays in the list while it lasts.
+    browser.run("byId('acknowledge-all').focus()");
+    browser.key("Enter", 13);
+    browser.run("byId('acknowledge-all').click()");
+    let open = browser.value("alarms.open.length");
+    assert_eq!(open, 0);
+    let title = browser.text("document.title");
+    assert_eq!(title, "Simulated chain of 8 relays");
+    let list = browser.text("byId('alarm-list').textContent");
+    assert!(
+        list.contains("relay 3 lost") && list.contains("acknowledged"),
+        "{list}"
+    );
+    // Seven relays close the gap, and the log says so.
+    browser.until("[...byId('lines').children].some((line) => line.textContent.includes('membership agreed: 7 relays'))");
+    let lost_s = "received.last.relays.find((relay) => relay.number === 3).age_s";
+    assert!(number(&mut browser, lost_s) > 10.0);
+    let hops = browser.text("received.last.hops.map((hop) => hop.to).join()");
+    assert_eq!(hops, "1,2,4,5,6,7,8,Rx");
+
+    // Nothing comes from elsewhere, and the browser has nothing to complain about.
+    let foreign = browser.value(
+        "performance.getEntriesByType('resource').map((it) => it.name).filter((name) => !name.startsWith(location.origin + '/'))",
+    );
+    assert_eq!(foreign.to_string(), "[]");
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn a_server_that_ends_is_noticed() {
+    let shown = Shown::flight("--uavs 3", 1);
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(3));
+    let connection = browser.text("byId('connection').textContent");
+    assert_eq!(connection, "live");
+    drop(shown);
+    browser.until("byId('connection').className === 'broken'");
+    let connection = browser.text("byId('connection').textContent");
+    assert!(
+        connection.contains("not connected to the server"),
+        "{connection}"
+    );
+}
+
+/// Returns a snapshot of `relays` relays that move, with everything that the map can show.
+fn full(relays: u16, time_s: f64) -> Snapshot {
+    let distance_m = 2_000.0;
+    let place = |number: u16, time_s: f64| {
+        let share = f64::from(number) / f64::from(relays + 1);
+        let phase = 0.3 * time_s + f64::from(number);
+        Position {
+            x_m: distance_m * share + 3.0 * phase.cos(),
+            y_m: 60.0 * (3.0 * share).sin() + 8.0 * phase.sin(),
+            altitude_m: Some(40.0),
+        }
+    };
+    let all = 1..=relays;
+    let relay = |number| RelaySnapshot {
+        age_s: Some(if number == 7 { 25.0 } else { 0.2 }),
+        condition: Some(match number {
+            7 => Condition::Lost,
+            9 => Condition::Fault,
+            4 => Condition::Waiting,
+            _ => Condition::Normal,
+        }),
+        position: Some(place(number, if number == 7 { 0.0 } else { time_s })),
+        agreed: Some(place(number, 0.0)),
+        control: Some("engaged".to_owned()),
+        phase: Some("agreed".to_owned()),
+        ..RelaySnapshot::new(number)
+    };
+    let node = |number: u16| match number {
+        0 => Node::Tx,
+        number if number > relays => Node::Rx,
+        number => Node::Relay(number),
+    };
+    Snapshot {
+        time_s: Some(time_s),
+        tx: Some(Position::default()),
+        rx: Some(Position {
+            x_m: distance_m,
+            ..Position::default()
+        }),
+        relays: all.map(relay).collect(),
+        hops: (0..=relays)
+            .map(|number| Hop {
+                sir_db: Some(6.0 - f64::from(number % 10)),
+                ..Hop::new(node(number), node(number + 1))
+            })
+            .collect(),
+        interferers: vec![InterfererSnapshot {
+            position: Position {
+                x_m: 900.0,
+                y_m: -350.0,
+                altitude_m: None,
+            },
+            power_w: Some(80.0),
+            uncertainty_m: Some(120.0),
+            is_estimated: true,
+        }],
+        geofence: Some(Fence {
+            x_m: [0.0, distance_m],
+            y_m: [-120.0, 120.0],
+            altitude_m: None,
+        }),
+        no_fly: vec![vec![[1200.0, -300.0], [1500.0, -320.0], [1400.0, -150.0]]],
+        ..Snapshot::default()
+    }
+}
+
+fn shown_full(relays: u16) -> Shown {
+    let begun = Instant::now();
+    Shown::begin(move || full(relays, begun.elapsed().as_secs_f64()))
+}
+
+fn save(name: &str, picture: &[u8]) {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("screen-{name}.png"));
+    std::fs::write(&file, picture).unwrap();
+    println!("{}", file.display());
+}
+
+#[test]
+fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
+    let flight = Shown::flight("--kill 3@45 --takeover 6@70-300 --takeover 2@50-52", 10);
+    let many = shown_full(100);
+    let start = Instant::now();
+    for (name, width, height) in [("390", 390, 844), ("1280", 1280, 800), ("1920", 1920, 1080)] {
+        for scheme in ["light", "dark"] {
+            for (shown, what, relays) in [(&flight, "flight", 8), (&many, "100", 100)] {
+                let mut browser = shown.opened(width, height);
+                if scheme == "dark" {
+                    browser.prefer_dark();
+                }
+                browser.until(&shows(relays));
+                if what == "flight" {
+                    browser.until("received.last.time_s > 90");
+                }
+                let over = number(
+                    &mut browser,
+                    "document.documentElement.scrollWidth - window.innerWidth",
+                );
+                assert!(over <= 0.0, "{name} {scheme} {what}: {over} px too wide");
+                let small = browser.value(
+                    "[...document.querySelectorAll('button')].map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
+                );
+                assert_eq!(
+                    small.to_string(),
+                    "[]",
+                    "{name}: buttons too small for a finger"
+                );
+                thread::sleep(Duration::from_millis(500));
+                save(&format!("{what}-{name}-{scheme}"), &browser.screenshot());
+                assert_eq!(browser.errors(), Vec::<String>::new());
+            }
+        }
+    }
+    println!("pictures took {:?}", start.elapsed());
+}
+
+#[test]
+fn a_hundred_relays_are_drawn_ten_times_a_second() {
+    let shown = shown_full(100);
+    let mut browser = Browser::start("about:blank", 1920, 1080);
+    thread::sleep(Duration::from_secs(1));
+    browser.open(&shown.screen.url());
+    browser.until("performance.getEntriesByName('first-contentful-paint').length > 0");
+    let paint = number(
+        &mut browser,
+        "performance.getEntriesByName('first-contentful-paint')[0].startTime",
+    );
+    println!("first paint after {paint:.0} ms");
+    browser.until(&shows(100));
+    // Ways of full length.
+    browser.run(
+        "for (const way of map.ways.values()) while (way.length < 390) way.push([way.length * 5, 100 * Math.sin(way.length)]); map.drawnFor = ''",
+    );
+    browser.run("window.begun = [performance.now(), map.frames, received.snapshots]");
+    thread::sleep(Duration::from_secs(5));
+    let rates = browser.value(
+        "(() => { const s = (performance.now() - begun[0]) / 1000; return [(map.frames - begun[1]) / s, (received.snapshots - begun[2]) / s]; })()",
+    );
+    let took = number(
+        &mut browser,
+        "(() => { const from = performance.now(); for (let at = 0; at < 20; at += 1) { map.draw(); map.pen.getImageData(0, 0, 1, 1); } return (performance.now() - from) / 20; })()",
+    );
+    println!("100 relays: frames and snapshots a second {rates}; a drawing takes {took:.1} ms");
+    // Ten snapshots a second are sent; the thread that sends them sleeps a little longer than asked.
+    assert!(rates[0].as_f64().unwrap() > 9.0, "{rates}");
+    assert!(took < 100.0, "{took} ms");
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// Checks names and roles for screen readers, and the keyboard.
+#[test]
+fn the_screen_can_be_heard_and_used_by_keyboard() {
+    let shown = shown_full(8);
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(8));
+    let nodes = browser.accessible();
+    for (role, name) in [
+        ("button", "Sound: off"),
+        ("button", "Zoom in"),
+        ("button", "Acknowledge all"),
+        ("region", "Table of the relays"),
+        ("rowheader", "7"),
+        ("columnheader", "SIR in, dB"),
+    ] {
+        let is_there = nodes.iter().any(|node| {
+            node["role"]["value"] == role && node["name"]["value"].as_str() == Some(name)
+        });
+        assert!(is_there, "no {role} {name}");
+    }
+    let image = nodes
+        .iter()
+        .find(|node| node["role"]["value"] == "image" || node["role"]["value"] == "img");
+    let name = image.expect("the map")["name"]["value"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    assert!(
+        name.starts_with("Map of the chain: 8 relays, lost: 7; worst hop"),
+        "{name}"
+    );
+    browser.run("byId('canvas').focus()");
+    let before = number(&mut browser, "map.view.scale");
+    browser.key("+", 187);
+    assert!(number(&mut browser, "map.view.scale") > 1.3 * before);
+    browser.key("0", 48);
+    browser.until("map.fitted && map.pending === 0");
+    assert!((number(&mut browser, "map.view.scale") / before - 1.0).abs() < 0.05);
+    // A click allows the sound.
+    browser.run("byId('sound').click()");
+    let pressed = browser.text("byId('sound').getAttribute('aria-pressed')");
+    assert_eq!(pressed, "true");
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}

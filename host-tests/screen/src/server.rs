@@ -1,0 +1,369 @@
+//! Server of the page. One thread accepts connections, one writes snapshots as JSON, and each connection has one.
+//!
+//! [`Screen::show`] only replaces the snapshot in the inbox, which no connection touches. A connection sends the newest snapshot when it
+//! has sent the one before, so that a slow browser skips snapshots and delays nobody. Log lines are kept apart, because no line may
+//! be skipped: each connection sends the lines that it has not sent yet, of the last [`LINES`].
+
+use std::collections::VecDeque;
+use std::io::{self, Read as _, Write as _};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{Builder, JoinHandle, sleep};
+use std::time::{Duration, Instant};
+
+use crate::ScreenError;
+use crate::request::{Answer, FULL, MAX_REQUEST, TOO_LARGE, TOO_SLOW, answer, body, head};
+use crate::snapshot::{LogLine, Snapshot};
+
+/// Largest number of open connections. Further ones get the status 503.
+pub const MAX_CONNECTIONS: usize = 64;
+
+/// Number of log lines that the server keeps for browsers that open the page later.
+const LINES: usize = 1_000;
+
+/// Time in which a request has to arrive.
+const REQUEST_TIME: Duration = Duration::from_secs(5);
+
+/// Time in which a browser has to take one file or one snapshot.
+const WRITE_TIME: Duration = Duration::from_secs(10);
+
+/// Time for which the server waits for the end of a refused request, so that the refusal arrives.
+const LINGER_TIME: Duration = Duration::from_millis(200);
+
+/// Time between two snapshots that browsers get, however many the program shows.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Time without a new snapshot after which a comment is sent, to detect a browser that has left.
+const SILENCE: Duration = Duration::from_secs(1);
+
+/// Stack size of a connection's thread, bytes.
+const STACK: usize = 256 * 1024;
+
+/// Server of the page that shows a chain. It ends when it is dropped.
+#[derive(Debug)]
+pub struct Screen {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    threads: Vec<JoinHandle<()>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    inbox: Mutex<Inbox>,
+    is_new: Condvar,
+    outbox: Mutex<Outbox>,
+    is_written: Condvar,
+    connections: AtomicUsize,
+    has_ended: AtomicBool,
+}
+
+/// Newest snapshot that is not yet written as JSON, and the log lines since the last one that was.
+#[derive(Debug, Default)]
+struct Inbox {
+    snapshot: Option<Snapshot>,
+    lines: VecDeque<LogLine>,
+}
+
+/// Newest snapshot and log lines as JSON.
+#[derive(Debug, Default)]
+struct Outbox {
+    /// Number of snapshots written so far; 0 before the first one.
+    number: u64,
+    /// Newest snapshot, as an event of the stream.
+    event: Arc<str>,
+    lines: VecDeque<Arc<str>>,
+    /// Number of log lines written so far, also those that are no longer kept.
+    line_count: u64,
+}
+
+impl Screen {
+    /// Binds `address` and serves the page there until the screen is dropped. Port 0 takes any free port.
+    ///
+    /// # Errors
+    /// [`ScreenError`] if the address cannot be bound.
+    pub fn start(address: SocketAddr) -> Result<Self, ScreenError> {
+        let failed = |error| ScreenError::Bind(address, error);
+        let listener = TcpListener::bind(address).map_err(failed)?;
+        let mut screen = Self {
+            shared: Arc::default(),
+            address: listener.local_addr().map_err(failed)?,
+            threads: Vec::new(),
+        };
+        let shared = Arc::clone(&screen.shared);
+        screen.spawn("screen: JSON", move || shared.write_snapshots())?;
+        let shared = Arc::clone(&screen.shared);
+        screen.spawn("screen: accept", move || accept(&listener, &shared))?;
+        Ok(screen)
+    }
+
+    fn spawn(
+        &mut self,
+        name: &str,
+        run: impl FnOnce() + Send + 'static,
+    ) -> Result<(), ScreenError> {
+        let thread = Builder::new().name(name.to_owned()).spawn(run);
+        self.threads.push(thread.map_err(ScreenError::Thread)?);
+        Ok(())
+    }
+
+    /// Passes a snapshot to all browsers, in place of earlier ones that they have not received yet. It does not wait for them.
+    pub fn show(&self, mut snapshot: Snapshot) {
+        let lines = std::mem::take(&mut snapshot.log);
+        let mut inbox = lock(&self.shared.inbox);
+        inbox.lines.extend(lines);
+        let over = inbox.lines.len().saturating_sub(LINES);
+        inbox.lines.drain(..over);
+        let replaced = inbox.snapshot.replace(snapshot);
+        drop(inbox);
+        self.shared.is_new.notify_one();
+        drop(replaced);
+    }
+
+    /// Returns the bound address, with the port that was chosen for port 0.
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Returns the address to open in a browser of this computer.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.reached())
+    }
+
+    /// Returns true if other computers can open the page.
+    pub fn is_public(&self) -> bool {
+        !self.address.ip().to_canonical().is_loopback()
+    }
+
+    /// Returns the number of open connections.
+    pub fn connections(&self) -> usize {
+        self.shared.connections.load(Ordering::Relaxed)
+    }
+
+    /// Returns an address at which this computer reaches the server.
+    fn reached(&self) -> SocketAddr {
+        let ip = match self.address.ip() {
+            IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
+            IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
+            ip => ip,
+        };
+        SocketAddr::new(ip, self.address.port())
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.shared.has_ended.store(true, Ordering::SeqCst);
+        // The locks order this after a check of `has_ended` and before the wait that follows the check.
+        drop(lock(&self.shared.inbox));
+        self.shared.is_new.notify_all();
+        drop(lock(&self.shared.outbox));
+        self.shared.is_written.notify_all();
+        // Wakes the thread that accepts connections.
+        let woken = TcpStream::connect_timeout(&self.reached(), Duration::from_secs(1));
+        if woken.is_ok() {
+            for thread in self.threads.drain(..) {
+                _ = thread.join();
+            }
+        }
+    }
+}
+
+impl Shared {
+    fn has_ended(&self) -> bool {
+        self.has_ended.load(Ordering::SeqCst)
+    }
+
+    /// Moves new snapshots from the inbox to the outbox, as JSON, until the screen ends.
+    fn write_snapshots(&self) {
+        while let Some((snapshot, lines)) = self.next() {
+            let text = serde_json::to_string(&snapshot).unwrap_or_default();
+            let event = format!("event: snapshot\ndata: {text}\n\n");
+            let lines: Vec<Arc<str>> = lines
+                .iter()
+                .filter_map(|line| serde_json::to_string(line).ok())
+                .map(Arc::from)
+                .collect();
+            let mut outbox = lock(&self.outbox);
+            outbox.number += 1;
+            outbox.event = event.into();
+            outbox.line_count += lines.len() as u64;
+            outbox.lines.extend(lines);
+            let over = outbox.lines.len().saturating_sub(LINES);
+            outbox.lines.drain(..over);
+            drop(outbox);
+            self.is_written.notify_all();
+            sleep(PAUSE);
+        }
+    }
+
+    /// Waits for the next snapshot in the inbox. `None` at the end of the screen.
+    fn next(&self) -> Option<(Snapshot, VecDeque<LogLine>)> {
+        let mut inbox = lock(&self.inbox);
+        loop {
+            if self.has_ended() {
+                return None;
+            }
+            if let Some(snapshot) = inbox.snapshot.take() {
+                return Some((snapshot, std::mem::take(&mut inbox.lines)));
+            }
+            let woken = self.is_new.wait(inbox);
+            inbox = woken.unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Sends snapshots and log lines to a browser until it leaves or is too slow, or the screen ends.
+    fn stream(&self, stream: &mut TcpStream) -> io::Result<()> {
+        let (mut sent, mut sent_lines) = (0, 0);
+        while !self.has_ended() {
+            let mut outbox = lock(&self.outbox);
+            if outbox.number == sent {
+                let woken = self.is_written.wait_timeout(outbox, SILENCE);
+                outbox = woken.unwrap_or_else(PoisonError::into_inner).0;
+            }
+            let mut event = Arc::from(":\n\n");
+            let mut lines = Vec::new();
+            if outbox.number != sent {
+                sent = outbox.number;
+                event = Arc::clone(&outbox.event);
+                let new = outbox.line_count - sent_lines;
+                sent_lines = outbox.line_count;
+                let kept = outbox.lines.len();
+                let skipped = kept.saturating_sub(usize::try_from(new).unwrap_or(kept));
+                lines.extend(outbox.lines.iter().skip(skipped).cloned());
+            }
+            drop(outbox);
+            write_all(stream, event.as_bytes())?;
+            if !lines.is_empty() {
+                let event = format!("event: log\ndata: [{}]\n\n", lines.join(","));
+                write_all(stream, event.as_bytes())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Connection that counts toward [`MAX_CONNECTIONS`] until it is dropped.
+struct Counted(Arc<Shared>);
+
+impl Counted {
+    fn new(shared: &Arc<Shared>) -> Option<Self> {
+        let before = shared.connections.fetch_add(1, Ordering::Relaxed);
+        let counted = Self(Arc::clone(shared));
+        (before < MAX_CONNECTIONS).then_some(counted)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.connections.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Accepts connections until the screen ends, and starts a thread for each.
+fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
+    loop {
+        let accepted = listener.accept();
+        if shared.has_ended() {
+            return;
+        }
+        let Ok((mut stream, _)) = accepted else {
+            // Too many open files, for example: connections that end will help.
+            sleep(Duration::from_millis(10));
+            continue;
+        };
+        let Some(counted) = Counted::new(shared) else {
+            // The buffer of a new connection is empty, so this does not wait.
+            _ = stream.set_nonblocking(true);
+            _ = stream.write_all(format!("{}{}", head(FULL), body(FULL)).as_bytes());
+            _ = stream.shutdown(Shutdown::Write);
+            continue;
+        };
+        // A connection without a thread is dropped.
+        let thread = Builder::new().name("screen: browser".to_owned());
+        _ = thread
+            .stack_size(STACK)
+            .spawn(move || _ = serve(stream, &counted.0));
+    }
+}
+
+/// Answers the request of one connection.
+fn serve(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
+    let own = stream.local_addr()?;
+    let answer = read(&mut stream, own)?;
+    write_all(
+        &mut stream,
+        format!("{}{}", head(answer), body(answer)).as_bytes(),
+    )?;
+    if answer == Answer::Events {
+        _ = stream.set_nodelay(true);
+        return shared.stream(&mut stream);
+    }
+    // The rest of a refused request is read, because unread bytes would reset the connection before the refusal arrives.
+    stream.shutdown(Shutdown::Write)?;
+    let until = Instant::now() + LINGER_TIME;
+    let mut rest = [0; 4096];
+    while read_some(&mut stream, &mut rest, until)? > 0 {}
+    Ok(())
+}
+
+/// Reads a request, and returns the answer to it.
+fn read(stream: &mut TcpStream, own: SocketAddr) -> io::Result<Answer> {
+    let until = Instant::now() + REQUEST_TIME;
+    let mut buffer = [0; MAX_REQUEST];
+    let mut len = 0;
+    loop {
+        let room = buffer.get_mut(len..).unwrap_or_default();
+        if room.is_empty() {
+            return Ok(TOO_LARGE);
+        }
+        match read_some(stream, room, until) {
+            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(count) => len += count,
+            Err(error) if is_timeout(&error) => return Ok(TOO_SLOW),
+            Err(error) => return Err(error),
+        }
+        if let Some(answer) = answer(buffer.get(..len).unwrap_or_default(), own) {
+            return Ok(answer);
+        }
+    }
+}
+
+fn is_timeout(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+    )
+}
+
+/// Returns the time left until `until`; an error if there is none.
+fn left(until: Instant) -> io::Result<Duration> {
+    let left = until.saturating_duration_since(Instant::now());
+    if left.is_zero() {
+        return Err(io::ErrorKind::TimedOut.into());
+    }
+    Ok(left)
+}
+
+/// Reads some bytes, and waits for them no longer than until `until`.
+fn read_some(stream: &mut TcpStream, bytes: &mut [u8], until: Instant) -> io::Result<usize> {
+    stream.set_read_timeout(Some(left(until)?))?;
+    stream.read(bytes)
+}
+
+/// Writes all bytes within [`WRITE_TIME`], however few of them the browser takes at a time.
+fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
+    let until = Instant::now() + WRITE_TIME;
+    while !bytes.is_empty() {
+        stream.set_write_timeout(Some(left(until)?))?;
+        match stream.write(bytes)? {
+            0 => return Err(io::ErrorKind::WriteZero.into()),
+            count => bytes = bytes.get(count..).unwrap_or_default(),
+        }
+    }
+    Ok(())
+}

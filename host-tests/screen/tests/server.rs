@@ -1,0 +1,393 @@
+//! Server under load: many browsers, foreign pages, malformed requests and slow readers.
+//!
+//! The chain must not notice them: each test measures how long `Screen::show` takes meanwhile.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs
+)]
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{Shutdown, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use uav_relay_screen::{
+    Hop, LogLine, MAX_CONNECTIONS, Node, Position, RelaySnapshot, Screen, ScreenError, Snapshot,
+};
+
+/// Time in which `Screen::show` has to return. A busy machine may take the processor away at any time, so 1 % of the calls may be late.
+const SHOW_TIME: Duration = Duration::from_millis(1);
+
+/// Time that no call of `Screen::show` may take: far less than a browser's time limits.
+const NEVER: Duration = Duration::from_millis(500);
+
+fn started() -> Screen {
+    Screen::start("127.0.0.1:0".parse().unwrap()).unwrap()
+}
+
+/// Returns a snapshot of `relays` relays at the time `time_s`, with one log line.
+fn snapshot(relays: u16, time_s: f64) -> Snapshot {
+    let place = |number: u16| Position {
+        x_m: 10.0 * f64::from(number),
+        y_m: 0.123_456_789,
+        altitude_m: Some(20.0),
+    };
+    let relay = |number| RelaySnapshot {
+        age_s: Some(0.1),
+        position: Some(place(number)),
+        setpoint: Some(place(number)),
+        agreed: Some(place(number)),
+        phase: Some("agreed".to_owned()),
+        ..RelaySnapshot::new(number)
+    };
+    Snapshot {
+        time_s: Some(time_s),
+        relays: (1..=relays).map(relay).collect(),
+        hops: (1..relays)
+            .map(|number| Hop::new(Node::Relay(number), Node::Relay(number + 1)))
+            .collect(),
+        log: vec![LogLine {
+            time_s,
+            text: "relay 1  setpoint".to_owned(),
+        }],
+        ..Snapshot::default()
+    }
+}
+
+fn connect(screen: &Screen) -> TcpStream {
+    let stream = TcpStream::connect(screen.address()).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    stream
+}
+
+/// Sends `request` and returns the response; empty if the server closed the connection without one.
+fn asked(screen: &Screen, request: &[u8]) -> String {
+    let mut stream = connect(screen);
+    _ = stream.write_all(request);
+    _ = stream.shutdown(Shutdown::Write);
+    let mut response = Vec::new();
+    _ = stream.read_to_end(&mut response);
+    String::from_utf8(response).unwrap()
+}
+
+fn get(screen: &Screen, path: &str) -> Vec<u8> {
+    format!("GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n", screen.address()).into_bytes()
+}
+
+/// Opens the stream of snapshots.
+fn events(screen: &Screen) -> BufReader<TcpStream> {
+    let mut stream = connect(screen);
+    stream.write_all(&get(screen, "/events")).unwrap();
+    BufReader::new(stream)
+}
+
+/// Reads the stream until a snapshot of at least the time `time_s` has arrived; returns its JSON.
+fn until(reader: &mut BufReader<TcpStream>, time_s: f64) -> serde_json::Value {
+    loop {
+        let mut line = String::new();
+        assert!(reader.read_line(&mut line).unwrap() > 0, "the stream ended");
+        if let Some(text) = line.strip_prefix("data: {") {
+            let json: serde_json::Value = serde_json::from_str(&format!("{{{text}")).unwrap();
+            if json["time_s"].as_f64() >= Some(time_s) {
+                return json;
+            }
+        }
+    }
+}
+
+/// A chain that shows snapshots of 100 relays until it is stopped, and measures each call.
+struct Flight {
+    has_ended: Arc<AtomicBool>,
+    thread: thread::JoinHandle<Vec<Duration>>,
+}
+
+impl Flight {
+    fn begin(screen: &Arc<Screen>, period: Duration) -> Self {
+        let has_ended = Arc::new(AtomicBool::new(false));
+        let (screen, stop) = (Arc::clone(screen), Arc::clone(&has_ended));
+        let thread = thread::spawn(move || {
+            let mut took = Vec::new();
+            let mut time_s = 0.0;
+            while !stop.load(Ordering::Relaxed) {
+                time_s += 0.01;
+                let snapshot = snapshot(100, time_s);
+                let begun = Instant::now();
+                screen.show(snapshot);
+                took.push(begun.elapsed());
+                thread::sleep(period);
+            }
+            took
+        });
+        Self { has_ended, thread }
+    }
+
+    /// Ends the flight, and checks that it did not wait for anybody.
+    fn end(self, what: &str) {
+        self.has_ended.store(true, Ordering::Relaxed);
+        let mut took = self.thread.join().unwrap();
+        took.sort();
+        let at = |share: usize| took[(took.len() - 1) * share / 1000];
+        println!(
+            "{what}: {} calls of show: median {:?}, 99 % {:?}, longest {:?}",
+            took.len(),
+            at(500),
+            at(990),
+            at(1000)
+        );
+        assert!(at(990) < SHOW_TIME, "{what}: {:?}", at(990));
+        assert!(at(1000) < NEVER, "{what}: {:?}", at(1000));
+    }
+}
+
+/// Returns the memory of this process that is in use, bytes.
+fn memory() -> usize {
+    let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    let pages = text.split(' ').nth(1).and_then(|it| it.parse().ok());
+    4096 * pages.unwrap_or(0_usize)
+}
+
+#[test]
+fn the_page_comes_with_a_policy_and_needs_nothing_from_elsewhere() {
+    let screen = started();
+    let mut page = String::new();
+    for path in [
+        "/",
+        "/screen.css",
+        "/map.js",
+        "/alarms.js",
+        "/screen.js",
+        "/icon.svg",
+    ] {
+        let response = asked(&screen, &get(&screen, path));
+        let (head, body) = response.split_once("\r\n\r\n").unwrap();
+        assert!(head.starts_with("HTTP/1.1 200 OK\r\n"), "{path}: {head}");
+        assert!(head.contains("Content-Security-Policy: default-src 'none'; script-src 'self'"));
+        assert!(!head.contains("unsafe"), "{head}");
+        let length = format!("Content-Length: {}\r\n", body.len());
+        assert!(head.contains(&length), "{path}: {head}");
+        page += body;
+    }
+    assert!(!page.contains("https://"), "nothing from elsewhere");
+    let foreign = page.replace("http://www.w3.org/2000/svg", "");
+    assert!(!foreign.contains("http://"), "nothing from elsewhere");
+}
+
+#[test]
+fn a_browser_gets_snapshots_and_every_line_of_the_log() {
+    let screen = started();
+    screen.show(snapshot(3, 1.0));
+    let mut reader = events(&screen);
+    let json = until(&mut reader, 1.0);
+    assert_eq!(json["relays"][2]["number"], 3);
+    assert_eq!(json["relays"][2]["hold_reason"], serde_json::Value::Null);
+    assert_eq!(json["hops"][0]["to"], "2");
+    // Faster than the browser gets snapshots: it misses some of them, but no line.
+    for step in 0..200 {
+        screen.show(snapshot(3, 2.0 + f64::from(step)));
+    }
+    let mut lines = Vec::new();
+    while lines.len() < 201 {
+        let mut line = String::new();
+        reader.read_line(&mut line).unwrap();
+        if let Some(text) = line.strip_prefix("data: [") {
+            let all: serde_json::Value = serde_json::from_str(&format!("[{text}")).unwrap();
+            lines.extend(
+                all.as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|it| it["time_s"].as_f64().unwrap()),
+            );
+        }
+    }
+    let expected: Vec<f64> = (0..=200).map(|step| 1.0 + f64::from(step)).collect();
+    assert_eq!(lines, expected);
+}
+
+#[test]
+fn other_hosts_origins_and_methods_are_refused() {
+    let screen = started();
+    let own = screen.address();
+    for (lines, status) in [
+        (
+            "GET /events HTTP/1.1\r\nHost: attacker.example".to_owned(),
+            403,
+        ),
+        (
+            format!(
+                "GET /events HTTP/1.1\r\nHost: attacker.example:{}",
+                own.port()
+            ),
+            403,
+        ),
+        (
+            format!("GET /events HTTP/1.1\r\nHost: {own}\r\nOrigin: http://attacker.example"),
+            403,
+        ),
+        (
+            format!("GET /events HTTP/1.1\r\nHost: {own}\r\nOrigin: null"),
+            403,
+        ),
+        ("GET / HTTP/1.0".to_owned(), 400),
+        (format!("POST /events HTTP/1.1\r\nHost: {own}"), 405),
+        (format!("OPTIONS / HTTP/1.1\r\nHost: {own}"), 405),
+        (format!("GET /no HTTP/1.1\r\nHost: {own}"), 404),
+        (
+            format!("GET / HTTP/1.1\r\nHost: {own}\r\nA: {}", "a".repeat(9000)),
+            431,
+        ),
+    ] {
+        let response = asked(&screen, format!("{lines}\r\n\r\n").as_bytes());
+        let expected = format!("HTTP/1.1 {status} ");
+        assert!(
+            response.starts_with(&expected),
+            "{lines:.80}: {response:.80}"
+        );
+    }
+}
+
+/// Returns pseudorandom numbers (an xorshift generator), for requests that differ.
+fn random(state: &mut u64) -> usize {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    usize::try_from(*state >> 33).unwrap()
+}
+
+#[test]
+fn ten_thousand_malformed_requests_do_not_disturb_the_chain() {
+    let screen = Arc::new(started());
+    let good = get(&screen, "/");
+    let flight = Flight::begin(&screen, Duration::from_millis(2));
+    let (mut seed, mut refused) = (1, 0);
+    for number in 0..10_000 {
+        let mut request = good.clone();
+        match number % 4 {
+            // Noise.
+            0 => {
+                request = (0..random(&mut seed) % 200)
+                    .map(|_| random(&mut seed).to_le_bytes()[0])
+                    .collect()
+            }
+            // A request with some bytes replaced.
+            1 => {
+                for _ in 0..3 {
+                    let at = random(&mut seed) % request.len();
+                    request[at] = random(&mut seed).to_le_bytes()[0];
+                }
+            }
+            // A request that ends early.
+            2 => request.truncate(random(&mut seed) % good.len()),
+            // More headers than any browser sends.
+            _ => {
+                request.truncate(good.len() - 2);
+                request.extend("A: b\r\n".repeat(random(&mut seed) % 1000).bytes());
+                request.extend(b"\r\n");
+            }
+        }
+        let response = asked(&screen, &request);
+        let is_served = response.starts_with("HTTP/1.1 200 ");
+        assert!(
+            response.is_empty() || is_served || response.starts_with("HTTP/1.1 4"),
+            "{request:?}: {response}"
+        );
+        refused += u32::from(!is_served);
+    }
+    assert!(refused > 8_000, "{refused} of 10000");
+    flight.end("10 000 malformed requests");
+    until(&mut events(&screen), 0.0);
+}
+
+#[test]
+fn fifty_browsers_get_the_newest_snapshot_and_too_many_are_refused() {
+    let screen = Arc::new(started());
+    let flight = Flight::begin(&screen, Duration::from_millis(20));
+    let mut browsers: Vec<_> = (0..50).map(|_| events(&screen)).collect();
+    let begun = Instant::now();
+    for browser in &mut browsers {
+        assert_eq!(until(browser, 0.5)["relays"].as_array().unwrap().len(), 100);
+    }
+    println!("50 browsers have the snapshot after {:?}", begun.elapsed());
+    while screen.connections() < MAX_CONNECTIONS {
+        browsers.push(events(&screen));
+        thread::sleep(Duration::from_millis(5));
+    }
+    for _ in 0..100 {
+        let response = asked(&screen, &get(&screen, "/"));
+        assert!(response.starts_with("HTTP/1.1 503 "), "{response}");
+    }
+    // Browsers that have left make room.
+    drop(browsers);
+    let begun = Instant::now();
+    while screen.connections() > 0 {
+        assert!(
+            begun.elapsed() < Duration::from_secs(20),
+            "{} left",
+            screen.connections()
+        );
+        thread::sleep(Duration::from_millis(20));
+    }
+    assert!(asked(&screen, &get(&screen, "/")).starts_with("HTTP/1.1 200 "));
+    flight.end("50 browsers");
+}
+
+#[test]
+fn a_slow_reader_is_dropped_and_the_memory_stays_bounded() {
+    let screen = Arc::new(started());
+    let mut reader = events(&screen);
+    // These never read; one of them never completes its request.
+    let slow: Vec<_> = (0..10).map(|_| events(&screen)).collect();
+    let mut half = connect(&screen);
+    half.write_all(b"GET / HTTP/1.1\r\n").unwrap();
+    let flight = Flight::begin(&screen, Duration::from_micros(500));
+    until(&mut reader, 1.0);
+    let before = memory();
+    let begun = Instant::now();
+    while screen.connections() > 1 {
+        until(&mut reader, 0.0);
+        assert!(
+            begun.elapsed() < Duration::from_secs(60),
+            "{} left",
+            screen.connections()
+        );
+    }
+    println!("slow readers are dropped after {:?}", begun.elapsed());
+    let grown = memory().saturating_sub(before);
+    println!("memory: {} KiB more than before", grown / 1024);
+    assert!(grown < 64 << 20, "{grown} bytes");
+    let mut response = String::new();
+    half.read_to_string(&mut response).unwrap();
+    assert!(response.starts_with("HTTP/1.1 408 "), "{response}");
+    flight.end("slow readers");
+    drop(slow);
+}
+
+#[test]
+fn an_address_that_cannot_be_bound_is_named() {
+    let screen = started();
+    let refused = |address: &str| Screen::start(address.parse().unwrap()).unwrap_err();
+    let again = refused(&screen.address().to_string());
+    assert!(matches!(again, ScreenError::Bind(..)), "{again:?}");
+    let port = screen.address().port();
+    assert!(
+        again
+            .to_string()
+            .starts_with(&format!("port {port} is in use")),
+        "{again}"
+    );
+    let elsewhere = refused("192.0.2.1:8080").to_string();
+    assert!(
+        elsewhere.starts_with("192.0.2.1 is not an address of this computer"),
+        "{elsewhere}"
+    );
+    // The port is free again after the end of the screen.
+    let address = screen.address();
+    drop(screen);
+    assert_eq!(Screen::start(address).unwrap().address(), address);
+}

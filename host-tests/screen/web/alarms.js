@@ -1,0 +1,124 @@
+"use strict";
+// Alarms: order, acknowledgement on this page, sound and title.
+
+const URGENCY = ["critical", "warning", "notice"];
+
+/** Symbol of each urgency, beside its colour. */
+const MARKS = { critical: "▲", warning: "◆", notice: "●" };
+
+/** Periods of the sound for the most urgent alarm that is not acknowledged, ms. A notice is silent. */
+const SOUNDS = { critical: 1500, warning: 5000 };
+
+const byId = (id) => document.getElementById(id);
+
+/** Formats a time of the flight. */
+function clock(time_s) {
+  const whole = Math.floor(time_s);
+  const two = (number) => String(number).padStart(2, "0");
+  return `${two(Math.floor(whole / 3600))}:${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
+}
+
+const alarms = {
+  all: [],
+  acknowledged: new Set(),
+  announced: new Set(),
+  shown: "",
+  audio: null,
+  sounded: 0,
+
+  take(all) {
+    this.all = all;
+    this.show();
+  },
+
+  forget() {
+    this.acknowledged.clear();
+    this.announced.clear();
+    this.take([]);
+  },
+
+  /** Alarms that the operator has not acknowledged, the most urgent and newest first. */
+  get open() { return this.sorted().filter(({ number }) => !this.acknowledged.has(number)); },
+
+  sorted() {
+    const rank = (alarm) => URGENCY.indexOf(alarm.urgency);
+    return [...this.all].sort((one, other) => rank(one) - rank(other) || (one.cleared_s !== null) - (other.cleared_s !== null) || other.time_s - one.time_s || other.number - one.number);
+  },
+
+  acknowledge(numbers) {
+    for (const number of numbers) this.acknowledged.add(number);
+    this.show();
+  },
+
+  show() {
+    const visible = this.sorted().filter(({ number, cleared_s: cleared }) => cleared === null || !this.acknowledged.has(number));
+    const open = this.open;
+    const first = open[0];
+    document.title = first ? `${MARKS[first.urgency]} ${open.length > 1 ? `(${open.length}) ` : ""}${first.text}` : byId("name").textContent;
+    this.announce(open);
+    const state = JSON.stringify(visible.map((alarm) => [alarm, this.acknowledged.has(alarm.number)]));
+    if (state === this.shown) return;
+    this.shown = state;
+    byId("no-alarms").hidden = visible.length > 0;
+    byId("acknowledge-all").disabled = open.length === 0;
+    const focused = document.activeElement?.dataset?.alarm;
+    byId("alarm-list").replaceChildren(...visible.map((alarm) => this.item(alarm)));
+    if (focused) (document.querySelector(`[data-alarm="${focused}"]`) || byId("acknowledge-all")).focus();
+  },
+
+  item(alarm) {
+    const { number, urgency, text, time_s: begun, cleared_s: cleared } = alarm;
+    const made = (name, content, kind = "") => Object.assign(document.createElement(name), { textContent: content, className: kind });
+    const item = made("li", "", `${urgency} ${cleared === null ? "" : "past"}`);
+    const words = made("span", "");
+    words.append(made("b", `${MARKS[urgency]} ${urgency} `), text);
+    const state = cleared === null ? "" : `, ended at ${clock(cleared)}`;
+    item.append(words, made("span", `since ${clock(begun)}${state}${this.acknowledged.has(number) ? ", acknowledged" : ""}`, "when"));
+    if (!this.acknowledged.has(number)) {
+      const button = made("button", "Acknowledge");
+      button.type = "button";
+      button.dataset.alarm = number;
+      button.setAttribute("aria-label", `Acknowledge: ${text}`);
+      button.addEventListener("click", () => this.acknowledge([number]));
+      item.append(button);
+    }
+    return item;
+  },
+
+  /** Passes the texts of new alarms to screen readers. */
+  announce(open) {
+    const fresh = open.filter(({ number }) => !this.announced.has(number));
+    if (fresh.length === 0) return;
+    for (const { number } of fresh) this.announced.add(number);
+    byId("announced").textContent = fresh.map(({ urgency, text }) => `${urgency}: ${text}`).join(". ");
+  },
+
+  /** Sounds if an alarm is open and it is time. Browsers allow sound only after a click. */
+  sound(now) {
+    const period = SOUNDS[this.open[0]?.urgency];
+    if (!this.audio || !period || now - this.sounded < period) return;
+    this.sounded = now;
+    const start = this.audio.currentTime;
+    for (const [at, hertz] of [[0, 880], [0.2, 660]]) {
+      const [tone, volume] = [this.audio.createOscillator(), this.audio.createGain()];
+      tone.frequency.value = hertz;
+      volume.gain.setValueAtTime(0.25, start + at);
+      volume.gain.exponentialRampToValueAtTime(0.001, start + at + 0.18);
+      tone.connect(volume).connect(this.audio.destination);
+      tone.start(start + at);
+      tone.stop(start + at + 0.18);
+    }
+  },
+
+  toggleSound() {
+    if (this.audio) this.audio.close();
+    this.audio = this.audio ? null : new AudioContext();
+    const button = byId("sound");
+    button.setAttribute("aria-pressed", String(this.audio !== null));
+    button.textContent = this.audio ? "Sound: on" : "Sound: off";
+  },
+};
+
+byId("sound").addEventListener("click", () => alarms.toggleSound());
+byId("acknowledge-all").addEventListener("click", () => alarms.acknowledge(alarms.open.map(({ number }) => number)));
+setInterval(() => alarms.sound(performance.now()), 100);
