@@ -157,7 +157,7 @@ pub enum ConfigError {
     /// Settings for estimating an unknown interferer out of range. Or the block has these settings, and gives the
     /// interference as a distribution along x.
     Listen,
-    /// Error: there is traffic from receiver to transmitter, which the joint method does not support.
+    /// Error: both the joint method with an unknown interferer and traffic from receiver to transmitter.
     Reverse,
     /// Error: the block gives fitted slots, but not the joint method or no known interferer.
     Fitted,
