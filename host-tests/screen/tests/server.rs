@@ -273,7 +273,7 @@ fn ten_thousand_malformed_requests_do_not_disturb_the_chain() {
             0 => {
                 request = (0..random(&mut seed) % 200)
                     .map(|_| random(&mut seed).to_le_bytes()[0])
-                    .collect()
+                    .collect();
             }
             // A request with some bytes replaced.
             1 => {
