@@ -87,7 +87,7 @@ pub use geodetic::{Geodetic, LineError, Sites};
 pub use ground::{FlownMission, Ground, Progress};
 pub use guard::HoldReason;
 pub use guard::config::{Geofence, GuardConfig};
-pub use mission::{Band, Heading, Interference, Interferer, Mission, MissionConfig, Profile};
+pub use mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 pub use node::round::state::Phase;
 pub use node::sample::Sample;
 pub use node::view::record::{RecordError, ViewRecord};
@@ -98,6 +98,9 @@ pub use place::Placement;
 pub use relay::{Port, Relay, Transmit};
 pub use sensing::Listen;
 pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub use side::Heading;
 pub use side::Side;
 pub use stats::Stats;
 pub use time::{Duration, Instant};

@@ -1,6 +1,16 @@
 //! The two sides of a relay, and the direction of passes.
 
-use crate::mission::Heading;
+/// Order in which the positions of a chain are computed; it determines the leader.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Heading {
+    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each position is computed from that
+    /// of the previous relay, which sends to it.
+    TowardRx,
+    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each position is computed
+    /// from that of the relay's receiver, where the interference is known.
+    TowardTx,
+}
 
 /// Side of a relay along the chain, toward Tx or toward Rx. It also stands for the neighbour on that side, or for the
 /// link to it.

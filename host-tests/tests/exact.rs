@@ -27,8 +27,8 @@ const ROUNDING: f64 = 2e-4;
 fn is_met_greedily(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {
-        uav_relay::mission::Heading::TowardRx => 0.0,
-        uav_relay::mission::Heading::TowardTx => mission.config().distance_m,
+        uav_relay::Heading::TowardRx => 0.0,
+        uav_relay::Heading::TowardTx => mission.config().distance_m,
     };
     let mut from = PerTarget::from_slice(&[first]).unwrap();
     loop {

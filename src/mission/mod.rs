@@ -8,6 +8,7 @@ use crate::field::{Field, InNoise};
 use crate::place::{CrossSection, Station};
 use crate::power_ratio::PowerRatio;
 use crate::root::sqrt;
+use crate::side::Heading;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -205,18 +206,6 @@ pub enum Interference {
     /// Single interfering transmitter at an unknown position. Relays spread evenly until they find it
     /// ([`crate::Settings::listen`]).
     Unknown,
-}
-
-/// Order in which the positions of a chain are computed; it determines the leader.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Heading {
-    /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each position is computed from that
-    /// of the previous relay, which sends to it.
-    TowardRx,
-    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each position is computed
-    /// from that of the relay's receiver, where the interference is known.
-    TowardTx,
 }
 
 /// Range of altitudes or of lateral offsets that a relay may choose from.
@@ -608,6 +597,7 @@ impl Mission {
 
     /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to relay N), or in an
     /// interference field toward Tx (relay N to relay 1).
+    #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
             None => Heading::TowardRx,

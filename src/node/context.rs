@@ -1,9 +1,10 @@
 //! State that every layer receives, effects of a layer on the others, and shared durations.
 
-use crate::mission::{Band, Heading, Interference, Mission};
+use crate::mission::{Band, Interference, Mission};
 use crate::node::circulation::Path;
 use crate::place::Placement;
 use crate::settings::{Method, Settings};
+use crate::side::Heading;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, digest};

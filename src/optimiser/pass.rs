@@ -17,9 +17,10 @@ use super::ladder::{Ladder, TARGETS};
 use super::retreat::{HopInterference, Retreat, Step, least};
 use super::reverse::FromRx;
 use super::spacing::{Hop, RequiredPosition, receiver_reach};
-use crate::mission::{Heading, Mission, Profile, ROUNDING};
+use crate::mission::{Mission, Profile, ROUNDING};
 use crate::place::Station;
 use crate::root::sqrt_in_place;
+use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
 /// Maximum number of positions at which the last relay tries to receive Rx well enough. Only for traffic in both

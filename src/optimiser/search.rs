@@ -16,9 +16,10 @@ use core::ops::Range;
 
 use super::ladder::Ladder;
 use super::pass::{Verdict, met};
-use crate::mission::{Heading, Mission, MissionConfig, Profile};
+use crate::mission::{Mission, MissionConfig, Profile};
 use crate::place::Placement;
 use crate::root::sqrt;
+use crate::side::Heading;
 use crate::sir::{self, Sender};
 
 /// Schedule by which the leader selects the target SIRs of the next sweep, a pass along the chain.

@@ -2,9 +2,10 @@
 
 use super::Node;
 use crate::event::Event;
-use crate::mission::{Heading, Mission};
+use crate::mission::Mission;
 use crate::node::context::ProposalOutcome;
 use crate::settings::Method;
+use crate::side::Heading;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;

@@ -2,7 +2,6 @@
 
 use super::computation::{ADJUST, ALTITUDE, Computation, LeaderTask, PassKind};
 use super::state::Action;
-use crate::mission::Heading;
 use crate::node::context::Context;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
@@ -10,6 +9,7 @@ use crate::optimiser::pass::{Behind, Link, Verdict, close};
 use crate::optimiser::spacing::RequiredPosition;
 use crate::place::Station;
 use crate::settings::Method;
+use crate::side::Heading;
 use crate::wire::message::{Sweep, SweepVerdict};
 
 impl Computation {

@@ -17,12 +17,13 @@
 //! relays never have a lower SIR. N of them meet a target if and only if the ranges of `optimiser::retreat` end at a position
 //! within the reach of the first hop.
 
-use crate::mission::{Heading, MAX_RELAYS, Mission, Profile};
+use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::optimiser::pass::{Walk, before};
 use crate::optimiser::spacing::RequiredPosition;
 use crate::place::Placement;
 #[cfg(feature = "internals")]
 use crate::root::sqrt;
+use crate::side::Heading;
 use crate::sir;
 #[cfg(feature = "internals")]
 use crate::sir::square;
