@@ -19,7 +19,7 @@ fn version(number: u16) -> Upload {
 fn the_stated_number_of_uploads_is_stored_in_a_flight() {
     let mut flash = Ram::blank(SECTOR, 1);
     let mut log = Journal::new(&mut flash, WORDS, 7);
-    assert_eq!(SECTOR / (WORDS + OVERHEAD), 1_024);
+    assert_eq!(SECTOR / (WORDS + OVERHEAD), 992);
     assert!(log.append(&pack_upload(&version(1)), WhenFull::Refuse));
     assert!(log.append(&pack_upload(&version(2)), WhenFull::Refuse));
     let newest = log.newest::<WORDS>().unwrap();

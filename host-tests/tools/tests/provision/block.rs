@@ -413,7 +413,7 @@ fn fitted_slots_are_stored_for_joint_only() {
         flight.with_access(scenario)
     };
     let block = flight(&scenario, Method::Joint).unwrap().block(3).unwrap();
-    let gap = 10_f32.powf(0.3);
+    let gap = 10_f64.powf(0.3) as f32;
     assert_eq!(block[384..388], gap.to_le_bytes());
     flies(&reads(&block).unwrap());
     let equal = flight(&scenario, Method::Align).unwrap().block(3).unwrap();
