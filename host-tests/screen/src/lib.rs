@@ -22,15 +22,20 @@
 //! | --- | --- |
 //! | `snapshot` | the state that the page shows |
 //! | `server` | connections, their limits, and the stream of snapshots |
+//! | `clean` | values that the page cannot show |
 //! | `request` | checks of a request, and the files of the page |
 //!
 //! # Security
 //!
-//! The page only shows: no request changes anything. Requests other than GET, requests with a body, and requests for another host or
-//! from a page of another site are refused, so that no site in the operator's browser can read the screen. The page loads nothing
+//! The page only shows: no request changes anything. The server refuses requests other than GET, requests with a body, requests for
+//! another host, and requests that the browser marks as those of another site's page, by `Origin` or `Sec-Fetch-Site`. Browsers send
+//! `Sec-Fetch-Site` only to loopback addresses as long as the page comes by plain HTTP. At other addresses the server answers a foreign
+//! page's request without `Origin`, as for a picture or a script, and only the browser keeps the answer from that page:
+//! by `Cross-Origin-Resource-Policy`, `nosniff`, and because no answer allows another origin. The page loads nothing
 //! from elsewhere, and its content security policy allows only its own files. There is no password: everyone who reaches the address
 //! sees the screen. [`Screen::is_public`] tells whether other computers can reach it.
 
+mod clean;
 mod request;
 mod server;
 mod snapshot;
@@ -39,7 +44,7 @@ use std::fmt;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
 
-pub use server::{MAX_CONNECTIONS, Screen};
+pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, Screen};
 pub use snapshot::{
     Alarm, Condition, Fence, Frame, Hop, InterfererSnapshot, LogLine, Node, Position,
     RelaySnapshot, Snapshot, Urgency,

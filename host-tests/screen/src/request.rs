@@ -1,7 +1,10 @@
 //! Requests of browsers: parsing, checks, and the files of the page.
 //!
-//! A request is refused before its path is looked at unless it is a GET without a body for the address that it arrived at. The check
-//! of `Host` prevents DNS rebinding: a foreign name that resolves to this computer. The check of `Origin` refuses pages of other sites.
+//! A request is refused unless it is a GET without a body for the address that it arrived at. The check of `Host` prevents DNS
+//! rebinding: a foreign name that resolves to this computer. Requests of other sites' pages are refused if the browser marks them:
+//! by `Origin`, or by `Sec-Fetch-Site`, which browsers send to loopback addresses but not to other addresses by plain HTTP. Only a
+//! link to `/` may be on another site. A foreign page's request without either header is answered, and the headers of the
+//! response tell the browser to keep the answer from that page.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -104,6 +107,13 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr) -> Answer {
     if origins.any(|origin| origin.strip_prefix("http://") != Some(host)) {
         return FOREIGN;
     }
+    let target = request.path.unwrap_or_default();
+    let path = target.split('?').next().unwrap_or_default();
+    let is_foreign = values("sec-fetch-site").any(|site| !matches!(site, "same-origin" | "none"));
+    let is_link = path == "/" && values("sec-fetch-mode").eq(["navigate"]);
+    if is_foreign && !is_link {
+        return FOREIGN;
+    }
     if request.method != Some("GET") {
         return Answer::Refused(405, "Method Not Allowed");
     }
@@ -112,8 +122,6 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr) -> Answer {
     if has_body {
         return MALFORMED;
     }
-    let target = request.path.unwrap_or_default();
-    let path = target.split('?').next().unwrap_or_default();
     if path == EVENTS {
         return Answer::Events;
     }
@@ -242,6 +250,41 @@ mod tests {
             ),
         ] {
             assert_eq!(status(lines), expected, "{lines}");
+        }
+    }
+
+    #[test]
+    fn foreign_pages_may_only_link_to_the_page() {
+        for (path, headers, expected) in [
+            ("/events", "Sec-Fetch-Site: same-origin", 200),
+            ("/", "Sec-Fetch-Site: none\nSec-Fetch-Mode: navigate", 200),
+            ("/icon.svg", "Sec-Fetch-Site: cross-site", 403),
+            (
+                "/events",
+                "Sec-Fetch-Site: same-site\nSec-Fetch-Mode: no-cors",
+                403,
+            ),
+            (
+                "/events",
+                "Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: navigate",
+                403,
+            ),
+            (
+                "/",
+                "Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: no-cors",
+                403,
+            ),
+            ("/", "Sec-Fetch-Site: cross-site", 403),
+            ("/", "Sec-Fetch-Site: ", 403),
+            ("/", "Sec-Fetch-Site: none\nSec-Fetch-Site: cross-site", 403),
+            (
+                "/?a",
+                "Sec-Fetch-Site: cross-site\nSec-Fetch-Mode: navigate",
+                200,
+            ),
+        ] {
+            let lines = format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:8080\n{headers}");
+            assert_eq!(status(&lines), expected, "{lines}");
         }
     }
 

@@ -5,19 +5,26 @@
 //! be skipped: each connection sends the lines that it has not sent yet, of the last [`LINES`].
 
 use std::collections::VecDeque;
+use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
+
 use crate::ScreenError;
+use crate::clean::{clean, clean_line};
 use crate::request::{Answer, FULL, MAX_REQUEST, TOO_LARGE, TOO_SLOW, answer, body, head};
 use crate::snapshot::{LogLine, Snapshot};
 
 /// Largest number of open connections. Further ones get the status 503.
 pub const MAX_CONNECTIONS: usize = 64;
+
+/// Largest number of open connections from one other computer, so that it leaves room for others.
+pub const MAX_PER_ADDRESS: usize = 16;
 
 /// Number of log lines that the server keeps for browsers that open the page later.
 const LINES: usize = 1_000;
@@ -50,11 +57,14 @@ pub struct Screen {
 
 #[derive(Debug, Default)]
 struct Shared {
+    /// Random identifier of this run. The page forgets alarms and ways when it changes.
+    run: String,
     inbox: Mutex<Inbox>,
     is_new: Condvar,
     outbox: Mutex<Outbox>,
     is_written: Condvar,
-    connections: AtomicUsize,
+    /// Remote address of each open connection.
+    peers: Mutex<Vec<IpAddr>>,
     has_ended: AtomicBool,
 }
 
@@ -72,9 +82,19 @@ struct Outbox {
     number: u64,
     /// Newest snapshot, as an event of the stream.
     event: Arc<str>,
+    /// Time when the newest snapshot was written.
+    written: Option<Instant>,
     lines: VecDeque<Arc<str>>,
     /// Number of log lines written so far, also those that are no longer kept.
     line_count: u64,
+}
+
+/// Snapshot as browsers get it.
+#[derive(Serialize)]
+struct Sent<'a> {
+    run: &'a str,
+    #[serde(flatten)]
+    snapshot: &'a Snapshot,
 }
 
 impl Screen {
@@ -86,7 +106,10 @@ impl Screen {
         let failed = |error| ScreenError::Bind(address, error);
         let listener = TcpListener::bind(address).map_err(failed)?;
         let mut screen = Self {
-            shared: Arc::default(),
+            shared: Arc::new(Shared {
+                run: format!("{:016x}", RandomState::new().hash_one(0)),
+                ..Shared::default()
+            }),
             address: listener.local_addr().map_err(failed)?,
             threads: Vec::new(),
         };
@@ -108,6 +131,8 @@ impl Screen {
     }
 
     /// Passes a snapshot to all browsers, in place of earlier ones that they have not received yet. It does not wait for them.
+    ///
+    /// Positions and SIRs that are not finite or beyond the limits of a map, and hidden characters of texts are not shown.
     pub fn show(&self, mut snapshot: Snapshot) {
         let lines = std::mem::take(&mut snapshot.log);
         let mut inbox = lock(&self.shared.inbox);
@@ -137,7 +162,7 @@ impl Screen {
 
     /// Returns the number of open connections.
     pub fn connections(&self) -> usize {
-        self.shared.connections.load(Ordering::Relaxed)
+        lock(&self.shared.peers).len()
     }
 
     /// Returns an address at which this computer reaches the server.
@@ -176,8 +201,14 @@ impl Shared {
 
     /// Moves new snapshots from the inbox to the outbox, as JSON, until the screen ends.
     fn write_snapshots(&self) {
-        while let Some((snapshot, lines)) = self.next() {
-            let text = serde_json::to_string(&snapshot).unwrap_or_default();
+        while let Some((mut snapshot, mut lines)) = self.next() {
+            clean(&mut snapshot);
+            lines.iter_mut().for_each(clean_line);
+            let sent = Sent {
+                run: &self.run,
+                snapshot: &snapshot,
+            };
+            let text = serde_json::to_string(&sent).unwrap_or_default();
             let event = format!("event: snapshot\ndata: {text}\n\n");
             let lines: Vec<Arc<str>> = lines
                 .iter()
@@ -187,6 +218,7 @@ impl Shared {
             let mut outbox = lock(&self.outbox);
             outbox.number += 1;
             outbox.event = event.into();
+            outbox.written = Some(Instant::now());
             outbox.line_count += lines.len() as u64;
             outbox.lines.extend(lines);
             let over = outbox.lines.len().saturating_sub(LINES);
@@ -222,10 +254,11 @@ impl Shared {
                 outbox = woken.unwrap_or_else(PoisonError::into_inner).0;
             }
             let mut event = Arc::from(":\n\n");
-            let mut lines = Vec::new();
+            let (mut age, mut lines) = (None, Vec::new());
             if outbox.number != sent {
                 sent = outbox.number;
                 event = Arc::clone(&outbox.event);
+                age = outbox.written.map(|at| at.elapsed().as_millis());
                 let new = outbox.line_count - sent_lines;
                 sent_lines = outbox.line_count;
                 let kept = outbox.lines.len();
@@ -233,6 +266,10 @@ impl Shared {
                 lines.extend(outbox.lines.iter().skip(skipped).cloned());
             }
             drop(outbox);
+            if let Some(age) = age {
+                // A browser that connects when snapshots have stopped gets an old one.
+                write_all(stream, format!("event: age\ndata: {age}\n\n").as_bytes())?;
+            }
             write_all(stream, event.as_bytes())?;
             if !lines.is_empty() {
                 let event = format!("event: log\ndata: [{}]\n\n", lines.join(","));
@@ -247,20 +284,30 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Connection that counts toward [`MAX_CONNECTIONS`] until it is dropped.
-struct Counted(Arc<Shared>);
+/// Connection that counts toward [`MAX_CONNECTIONS`] and [`MAX_PER_ADDRESS`] until it is dropped.
+struct Counted(Arc<Shared>, IpAddr);
 
 impl Counted {
-    fn new(shared: &Arc<Shared>) -> Option<Self> {
-        let before = shared.connections.fetch_add(1, Ordering::Relaxed);
-        let counted = Self(Arc::clone(shared));
-        (before < MAX_CONNECTIONS).then_some(counted)
+    /// Counts a connection from `peer`; `None` beyond a limit.
+    fn new(shared: &Arc<Shared>, peer: IpAddr) -> Option<Self> {
+        let peer = peer.to_canonical();
+        let mut peers = lock(&shared.peers);
+        let same = peers.iter().filter(|it| **it == peer).count();
+        let has_room =
+            peers.len() < MAX_CONNECTIONS && (peer.is_loopback() || same < MAX_PER_ADDRESS);
+        has_room.then(|| {
+            peers.push(peer);
+            Self(Arc::clone(shared), peer)
+        })
     }
 }
 
 impl Drop for Counted {
     fn drop(&mut self) {
-        self.0.connections.fetch_sub(1, Ordering::Relaxed);
+        let mut peers = lock(&self.0.peers);
+        if let Some(at) = peers.iter().position(|it| *it == self.1) {
+            peers.swap_remove(at);
+        }
     }
 }
 
@@ -271,12 +318,12 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
         if shared.has_ended() {
             return;
         }
-        let Ok((mut stream, _)) = accepted else {
+        let Ok((mut stream, peer)) = accepted else {
             // Too many open files, for example: connections that end will help.
             sleep(Duration::from_millis(10));
             continue;
         };
-        let Some(counted) = Counted::new(shared) else {
+        let Some(counted) = Counted::new(shared, peer.ip()) else {
             // The buffer of a new connection is empty, so this does not wait.
             _ = stream.set_nonblocking(true);
             _ = stream.write_all(format!("{}{}", head(FULL), body(FULL)).as_bytes());
@@ -366,4 +413,34 @@ fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::expect_used, reason = "a test fails by it")]
+
+    use std::net::IpAddr;
+    use std::sync::Arc;
+
+    use super::{Counted, MAX_CONNECTIONS, MAX_PER_ADDRESS, Shared, lock};
+
+    #[test]
+    fn one_other_computer_leaves_room_for_others() {
+        let shared = Arc::<Shared>::default();
+        let from = |text: &str| Counted::new(&shared, text.parse::<IpAddr>().expect(text));
+        let mut first: Vec<_> = (0..MAX_PER_ADDRESS)
+            .filter_map(|_| from("192.0.2.1"))
+            .collect();
+        assert_eq!(first.len(), MAX_PER_ADDRESS);
+        assert!(from("192.0.2.1").is_none() && from("::ffff:192.0.2.1").is_none());
+        let second = from("192.0.2.2").expect("room");
+        // A connection that ends makes room.
+        drop(first.pop());
+        first.push(from("192.0.2.1").expect("room"));
+        // Loopback connections have the limit of all connections.
+        let rest: Vec<_> = std::iter::from_fn(|| from("127.0.0.1")).collect();
+        assert_eq!(rest.len(), MAX_CONNECTIONS - MAX_PER_ADDRESS - 1);
+        drop((first, second, rest));
+        assert!(lock(&shared.peers).is_empty());
+    }
 }

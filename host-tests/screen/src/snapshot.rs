@@ -8,7 +8,9 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// State of a chain at one time. Texts are shown as they are.
+/// State of a chain at one time.
+///
+/// Texts are shown as plain text without control characters and direction marks, and end after 300 characters.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct Snapshot {
     /// Time of the state, s since the start of the flight or the run.

@@ -13,6 +13,7 @@ const byId = (id) => document.getElementById(id);
 
 /** Formats a time of the flight. */
 function clock(time_s) {
+  if (typeof time_s !== "number") return "–";
   const whole = Math.floor(time_s);
   const two = (number) => String(number).padStart(2, "0");
   return `${two(Math.floor(whole / 3600))}:${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
@@ -20,6 +21,9 @@ function clock(time_s) {
 
 const alarms = {
   all: [],
+  /** Alarm of the page itself that no data arrive; it is kept until it is acknowledged. Its numbers are below 0. */
+  silence: null,
+  silences: 0,
   acknowledged: new Set(),
   announced: new Set(),
   shown: "",
@@ -28,21 +32,39 @@ const alarms = {
 
   take(all) {
     this.all = all;
+    byId("no-alarms").textContent = "No alarm.";
     this.show();
   },
 
+  /** Forgets the alarms of another run of the program. */
   forget() {
     this.acknowledged.clear();
     this.announced.clear();
-    this.take([]);
+    this.silence = null;
+    this.all = [];
+  },
+
+  /** Begins or ends the alarm that no data arrive, at a time of the flight. */
+  silent(is, time_s) {
+    if (is === (this.silence?.cleared_s === null)) return;
+    if (is) {
+      this.silences += 1;
+      this.silence = { number: -this.silences, urgency: "critical", text: "no data: the page shows an old state", time_s, cleared_s: null };
+    } else {
+      this.silence.cleared_s = time_s ?? this.silence.time_s ?? 0;
+    }
+    this.show();
   },
 
   /** Alarms that the operator has not acknowledged, the most urgent and newest first. */
   get open() { return this.sorted().filter(({ number }) => !this.acknowledged.has(number)); },
 
+  /** Open alarms that last: only these sound and are in the title. */
+  get lasting() { return this.open.filter(({ cleared_s: cleared }) => cleared === null); },
+
   sorted() {
     const rank = (alarm) => URGENCY.indexOf(alarm.urgency);
-    return [...this.all].sort((one, other) => rank(one) - rank(other) || (one.cleared_s !== null) - (other.cleared_s !== null) || other.time_s - one.time_s || other.number - one.number);
+    return [...(this.silence ? [this.silence] : []), ...this.all].sort((one, other) => rank(one) - rank(other) || (one.cleared_s !== null) - (other.cleared_s !== null) || other.time_s - one.time_s || other.number - one.number);
   },
 
   acknowledge(numbers) {
@@ -53,8 +75,8 @@ const alarms = {
   show() {
     const visible = this.sorted().filter(({ number, cleared_s: cleared }) => cleared === null || !this.acknowledged.has(number));
     const open = this.open;
-    const first = open[0];
-    document.title = first ? `${MARKS[first.urgency]} ${open.length > 1 ? `(${open.length}) ` : ""}${first.text}` : byId("name").textContent;
+    const { lasting, lasting: [first] } = this;
+    document.title = first ? `${MARKS[first.urgency]} ${lasting.length > 1 ? `(${lasting.length}) ` : ""}${first.text}` : byId("name").textContent;
     this.announce(open);
     const state = JSON.stringify(visible.map((alarm) => [alarm, this.acknowledged.has(alarm.number)]));
     if (state === this.shown) return;
@@ -93,9 +115,9 @@ const alarms = {
     byId("announced").textContent = fresh.map(({ urgency, text }) => `${urgency}: ${text}`).join(". ");
   },
 
-  /** Sounds if an alarm is open and it is time. Browsers allow sound only after a click. */
+  /** Sounds if an open alarm lasts and it is time. Browsers allow sound only after a click. */
   sound(now) {
-    const period = SOUNDS[this.open[0]?.urgency];
+    const period = SOUNDS[this.lasting[0]?.urgency];
     if (!this.audio || !period || now - this.sounded < period) return;
     this.sounded = now;
     const start = this.audio.currentTime;

@@ -10,8 +10,21 @@ const sirClass = (db) => (typeof db !== "number" ? "unknown" : db >= GOOD_DB ? "
 /** Line style of each SIR class: width and dashes, px. */
 const STYLES = { good: [4, []], fair: [3, [8, 4]], poor: [4, [3, 3]], unknown: [1.5, []] };
 
-/** SIR that counts for a hop toward Rx, dB: the measured one, or else that of the model. */
+/** SIR that counts for a hop toward Rx or back toward Tx, dB: the measured one, or else that of the model. */
 const hopDb = (hop) => hop.measured_db ?? hop.sir_db;
+const backDb = (hop) => hop.measured_back_db ?? hop.sir_back_db;
+
+/** SIR of the worse direction of a hop that is known, dB; null if none is. */
+function worseDb(hop) {
+  const known = [hopDb(hop), backDb(hop)].filter((db) => typeof db === "number");
+  return known.length ? Math.min(...known) : null;
+}
+
+/** Largest number of grid lines in each direction. */
+const GRID_LINES = 200;
+
+/** Number of new parts of ways beyond which all ways are drawn again. */
+const MOST_PARTS = 4000;
 
 /** Distance that a relay moves before the next point of its way is kept, m, and the largest number of points of a way. */
 const WAY_STEP = 1;
@@ -29,7 +42,7 @@ const SHOWN_AGE = 2;
 /** Returns the largest of 1, 2 or 5 times a power of ten that is at most `most`. */
 function round125(most) {
   const power = 10 ** Math.floor(Math.log10(most));
-  return [5, 2, 1].find((it) => it * power <= most) * power;
+  return ([5, 2, 1].find((it) => it * power <= most) ?? 1) * power;
 }
 
 class ChainMap {
@@ -37,6 +50,8 @@ class ChainMap {
     this.canvas = canvas;
     this.pen = canvas.getContext("2d");
     this.snapshot = null;
+    /** Time since the last snapshot, s, by which all ages grow while none arrives. */
+    this.silence = 0;
     this.ways = new Map();
     /** Picture of the ways as drawn so far, and the parts of ways that are not yet in it; `drawnFor` is the area that it shows. */
     this.trail = document.createElement("canvas").getContext("2d");
@@ -76,6 +91,11 @@ class ChainMap {
       if (last) this.newParts.push([last, way.at(-1)]);
       // A long way keeps every other of its older points.
       if (way.length > WAY_POINTS) this.ways.set(number, way.filter((_, at) => at % 2 === 0 || at > WAY_POINTS / 2));
+    }
+    // A hidden page is not drawn, so nothing would take the new parts away.
+    if (document.hidden || this.newParts.length > MOST_PARTS) {
+      this.newParts = [];
+      this.drawnFor = "";
     }
     this.request();
   }
@@ -246,13 +266,18 @@ class ChainMap {
     const [right, bottom] = this.metres([this.width, this.height]);
     pen.fillStyle = this.colours.soft;
     pen.textBaseline = "middle";
-    for (let x = Math.ceil(left / step) * step; x < right; x += step) {
+    // Integers are counted: adding a step to a large coordinate might not change it.
+    const lines = (from, to) => {
+      const first = Math.ceil(from / step);
+      return Array.from({ length: Math.min(GRID_LINES, Math.ceil(to / step) - first) }, (_, at) => (first + at) * step);
+    };
+    for (const x of lines(left, right)) {
       this.trace([[x, top], [x, bottom]], "grid", 1);
       const [px] = this.pixels(x, 0);
       pen.textAlign = "center";
       if (px > 40 && px < this.width - 20) pen.fillText(String(Math.round(x)), px, 9);
     }
-    for (let y = Math.ceil(top / step) * step; y < bottom; y += step) {
+    for (const y of lines(top, bottom)) {
       this.trace([[left, y], [right, y]], "grid", 1);
       const [, py] = this.pixels(0, y);
       pen.textAlign = "left";
@@ -273,7 +298,7 @@ class ChainMap {
   north() {
     const azimuth = this.snapshot.frame?.azimuth_deg;
     const { pen } = this;
-    const [x, y] = [this.width - 26, this.height - 34];
+    const [x, y] = [this.width - 34, this.height - 42];
     if (typeof azimuth !== "number") return;
     const angle = (-azimuth * Math.PI) / 180;
     const [dx, dy] = [Math.cos(angle), Math.sin(angle)];
@@ -288,7 +313,7 @@ class ChainMap {
     pen.lineTo(x + 4 * dx - 5 * dy, y + 4 * dy + 5 * dx);
     pen.lineTo(x + 4 * dx + 5 * dy, y + 4 * dy - 5 * dx);
     pen.fill();
-    this.write("N", x - 19 * dx, y - 19 * dy, "ink", true);
+    this.write("N", x + 23 * dx, y + 23 * dy, "ink", true);
   }
 
   areas() {
@@ -363,11 +388,11 @@ class ChainMap {
     const places = new Map();
     if (snapshot.tx) places.set("Tx", snapshot.tx);
     if (snapshot.rx) places.set("Rx", snapshot.rx);
-    for (const relay of snapshot.relays) if (relay.position || relay.agreed) places.set(String(relay.number), relay.position || relay.agreed);
+    for (const relay of snapshot.relays) if (relay.position) places.set(String(relay.number), relay.position);
     const at = new Map([...places].map(([name, place]) => [name, this.pixels(place.x_m, place.y_m)]));
     const drawn = snapshot.hops.filter((hop) => at.has(hop.from) && at.has(hop.to));
     for (const hop of drawn) {
-      const kind = sirClass(hopDb(hop));
+      const kind = sirClass(worseDb(hop));
       const ends = [hop.from, hop.to].map((name) => places.get(name)).map((place) => [place.x_m, place.y_m]);
       this.trace(ends, kind, ...STYLES[kind]);
     }
@@ -381,11 +406,15 @@ class ChainMap {
     const relays = snapshot.relays.filter((relay) => places.has(String(relay.number))).sort((one, other) => urgent(one) - urgent(other));
     for (const relay of relays) this.relay(relay, at.get(String(relay.number)), crowded);
     for (const relay of [...relays].reverse()) this.label(relay, at.get(String(relay.number)), crowded);
-    // The worst hops are labelled first.
-    for (const hop of drawn.sort((one, other) => (hopDb(one) ?? 1e9) - (hopDb(other) ?? 1e9))) {
+    for (const relay of snapshot.relays) if (!relay.position && relay.agreed) this.unplaced(relay);
+    // The worst hops are labelled first: toward Rx and back where there is room, or else by the worse direction.
+    for (const hop of drawn.sort((one, other) => (worseDb(one) ?? 1e9) - (worseDb(other) ?? 1e9))) {
+      const worse = worseDb(hop);
+      if (worse === null) continue;
       const [[x1, y1], [x2, y2]] = [at.get(hop.from), at.get(hop.to)];
-      const db = hopDb(hop);
-      if (typeof db === "number") this.write(`${db.toFixed(1)} dB`, (x1 + x2) / 2, (y1 + y2) / 2 + 16, sirClass(db));
+      const both = [hopDb(hop), backDb(hop)].map((db) => (typeof db === "number" ? db.toFixed(1) : "–"));
+      const texts = typeof backDb(hop) === "number" ? [`${both.join(" / ")} dB`, `${worse.toFixed(1)} dB`] : [`${worse.toFixed(1)} dB`];
+      texts.some((text) => this.write(text, (x1 + x2) / 2, (y1 + y2) / 2 + 16, sirClass(worse)));
     }
   }
 
@@ -404,6 +433,15 @@ class ChainMap {
     for (const [dx, dy] of [[0, -6], [6, 0], [0, 6], [-6, 0]]) pen.lineTo(x + dx, y + dy);
     pen.closePath();
     pen.stroke();
+  }
+
+  /** Labels the agreed position of a relay whose own position is unknown. The number is always there. */
+  unplaced({ number, condition, agreed }) {
+    const bad = condition === "lost" || condition === "fault";
+    const [x, y] = this.pixels(agreed.x_m, agreed.y_m);
+    const [colour, name] = [bad ? "poor" : "relay", bad ? `${number} ${condition}` : String(number)];
+    const texts = [`${name}, position unknown`, `${name}, unknown`];
+    if (!texts.some((text) => [16, 31].some((up) => this.write(text, x, y - up, colour)))) this.write(name, x, y - 16, colour, true);
   }
 
   site(name, [x, y]) {
@@ -437,7 +475,7 @@ class ChainMap {
     const { pen } = this;
     const bad = condition === "lost" || condition === "fault";
     const colour = bad ? "poor" : "relay";
-    const old = typeof age === "number" && age >= SHOWN_AGE ? `${age.toFixed(0)} s ago` : "";
+    const old = typeof age === "number" && age + this.silence >= SHOWN_AGE ? `${(age + this.silence).toFixed(0)} s ago` : "";
     const words = [bad ? condition : "", bad || !crowded ? old : ""].filter(Boolean).join(", ");
     if (!crowded) {
       pen.font = "600 11px system-ui, sans-serif";

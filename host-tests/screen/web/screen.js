@@ -1,8 +1,9 @@
 "use strict";
 // Page: receives the snapshots, and fills heading, table and log.
 
-/** Time without a snapshot after which the page says so, ms. */
+/** Time without a snapshot after which it is an alarm, and after which the page connects again, ms. */
 const SILENT = 3000;
+const STUCK = 10000;
 
 /** Time until a connection that was refused is tried again, ms. */
 const AGAIN = 2000;
@@ -14,40 +15,43 @@ const LINES = 1000;
 const OLD = 5;
 
 const map = new ChainMap(byId("canvas"));
-const received = { snapshots: 0, first: 0, last: null, at: 0, source: null };
+/** `at` is the time when the server wrote the last snapshot, and `age` how long before it was sent; both in ms. */
+const received = { snapshots: 0, first: 0, last: null, at: 0, age: 0, source: null, tried: 0 };
 
 const number = (value, digits) => (typeof value === "number" ? value.toFixed(digits) : "–");
 
 /** Formats the SIR of a hop: that of the model, and the measured one after a slash. */
 const sirText = (model, measured) => (typeof measured === "number" ? `${number(model, 1)} / ${number(measured, 1)}` : number(model, 1));
 
-/** Returns the distance of a relay from its agreed position, m. */
+/** Returns the distance of a relay from its agreed position, m; null if it or one of two altitudes is unknown. */
 function off({ position, agreed }) {
   if (!position || !agreed) return null;
+  if (typeof position.altitude_m !== typeof agreed.altitude_m) return null;
   const up = (position.altitude_m ?? 0) - (agreed.altitude_m ?? 0);
   return Math.hypot(position.x_m - agreed.x_m, position.y_m - agreed.y_m, up);
 }
 
-/** Returns the row of a relay: class, cells, and the classes of cells. */
-function row(relay, hop) {
+/** Returns the row of a relay: class, cells, and the classes of cells. Its age has grown by `silence` seconds. */
+function row(relay, hop, silence) {
   const place = relay.position || {};
   const lost = relay.lost_neighbours.map((it) => `does not receive relay ${it}`);
   const remarks = [relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
   const db = hop ? hopDb(hop) : null;
+  const age = typeof relay.age_s === "number" ? relay.age_s + silence : null;
   return {
     kind: relay.condition || "",
-    cells: [String(relay.number), relay.control || "–", relay.phase || "–", sirText(hop?.sir_db, hop?.measured_db), sirText(hop?.sir_back_db, hop?.measured_back_db), number(off(relay), 1), number(place.x_m, 1), number(place.y_m, 1), number(place.altitude_m, 1), number(relay.age_s, 1), remarks],
-    kinds: { 3: sirClass(db), 4: sirClass(hop?.measured_back_db ?? hop?.sir_back_db), 9: relay.age_s >= OLD ? "old" : "" },
+    cells: [String(relay.number), relay.control || "–", relay.phase || "–", sirText(hop?.sir_db, hop?.measured_db), sirText(hop?.sir_back_db, hop?.measured_back_db), number(off(relay), 1), number(place.x_m, 1), number(place.y_m, 1), number(place.altitude_m, 1), number(age, 1), remarks],
+    kinds: { 3: sirClass(db), 4: sirClass(hop ? backDb(hop) : null), 9: age >= OLD ? "old" : "" },
   };
 }
 
 /** Fills the table; only texts that have changed are written. */
-function table({ relays, hops }) {
+function table({ relays, hops }, silence = 0) {
   const into = new Map(hops.map((hop) => [hop.to, hop]));
-  const rows = [...relays].sort((one, other) => one.number - other.number).map((relay) => row(relay, into.get(String(relay.number))));
-  if (into.has("Rx")) rows.push({ ...row({ number: "Rx", lost_neighbours: [] }, into.get("Rx")), kind: "" });
+  const rows = [...relays].sort((one, other) => one.number - other.number).map((relay) => row(relay, into.get(String(relay.number)), silence));
+  if (into.has("Rx")) rows.push({ ...row({ number: "Rx", lost_neighbours: [] }, into.get("Rx"), silence), kind: "" });
   // The column of the way back is there if it is known of any hop.
-  const hasBack = hops.some((hop) => typeof (hop.sir_back_db ?? hop.measured_back_db) === "number");
+  const hasBack = hops.some((hop) => typeof backDb(hop) === "number");
   byId("table").classList.toggle("one-way", !hasBack);
   const body = byId("rows");
   while (body.childElementCount > rows.length) body.lastChild.remove();
@@ -71,8 +75,9 @@ function table({ relays, hops }) {
 
 function summary({ relays, hops }) {
   const lost = relays.filter(({ condition }) => condition === "lost").map((relay) => relay.number);
-  const known = hops.map((hop) => ({ hop, db: hopDb(hop) })).filter(({ db }) => typeof db === "number").sort((one, other) => one.db - other.db);
-  const worst = known.length ? `worst hop ${known[0].hop.from} to ${known[0].hop.to}: ${known[0].db.toFixed(1)} dB` : "no SIR known";
+  const ways = hops.flatMap((hop) => [{ from: hop.from, to: hop.to, db: hopDb(hop) }, { from: hop.to, to: hop.from, db: backDb(hop) }]);
+  const [first] = ways.filter(({ db }) => typeof db === "number").sort((one, other) => one.db - other.db);
+  const worst = first ? `worst hop ${first.from} to ${first.to}: ${first.db.toFixed(1)} dB` : "no SIR known";
   return `${relays.length} relays, ${lost.length ? `lost: ${lost.join(", ")}` : "none lost"}; ${worst}`;
 }
 
@@ -80,15 +85,15 @@ function say(id, text) {
   if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
-/** Shows a snapshot. A time that goes back is another flight. */
+/** Shows a snapshot. Another run of the program numbers its alarms and relays anew. */
 function show(snapshot) {
-  if (received.last && snapshot.time_s < received.last.time_s) {
+  if (received.last && snapshot.run !== received.last.run) {
     map.forget();
     alarms.forget();
   }
   received.snapshots += 1;
   received.last = snapshot;
-  received.at = performance.now();
+  received.at = performance.now() - received.age;
   say("name", snapshot.name || "Relay chain");
   say("clock", typeof snapshot.time_s === "number" ? clock(snapshot.time_s) : "");
   const words = summary(snapshot);
@@ -113,25 +118,41 @@ function addLines(lines) {
   while (all.childElementCount > LINES) all.lastChild.remove();
 }
 
-/** Shows the state of the connection to the server. */
+/** Shows the state of the connection to the server, and lets all ages grow while no snapshot arrives. */
 function connection() {
-  const silent = performance.now() - received.at;
-  const broken = received.at > 0 && silent > SILENT;
+  const now = performance.now();
+  const silent = now - received.at;
+  const broken = received.last !== null && silent > SILENT;
   const closed = received.source?.readyState !== EventSource.OPEN;
-  say("connection", broken ? `no data for ${Math.floor(silent / 1000)} s${closed ? ": not connected to the server" : ""}` : closed ? "connecting" : "live");
+  // Screen readers announce the state only; the seconds are beside it.
+  const state = received.last === null ? "no data yet" : broken ? "no data" : closed ? "connecting" : "live";
+  say("state", `${state}${closed && state.startsWith("no data") ? ", not connected to the server" : ""}`);
+  say("seconds", broken ? ` for ${Math.floor(silent / 1000)} s` : "");
   byId("connection").className = broken ? "broken" : "";
+  document.body.classList.toggle("stale", broken);
+  const silence = broken ? silent / 1000 : 0;
+  if (silence !== map.silence) {
+    map.silence = silence;
+    map.request();
+    table(received.last, silence);
+  }
+  if (received.last) alarms.silent(broken, received.last.time_s);
+  // A connection can be dead without an error, for example after the computer was suspended.
+  if (now - Math.max(received.at, received.tried) > STUCK) connect();
 }
 
-/** Opens the stream of snapshots. The browser opens it again after a fault, except after a refusal. */
+/** Opens the stream of snapshots in place of an earlier one. The browser opens it again after a fault, except after a refusal. */
 function connect() {
+  received.source?.close();
   const source = new EventSource("/events");
-  received.source = source;
+  Object.assign(received, { source, tried: performance.now() });
   // The server sends all lines that it keeps on each connection.
   source.addEventListener("open", () => byId("lines").replaceChildren());
+  source.addEventListener("age", (event) => { received.age = Number(event.data); });
   source.addEventListener("snapshot", (event) => show(JSON.parse(event.data)));
   source.addEventListener("log", (event) => addLines(JSON.parse(event.data)));
   source.addEventListener("error", () => {
-    if (source.readyState === EventSource.CLOSED) setTimeout(connect, AGAIN);
+    if (source.readyState === EventSource.CLOSED) setTimeout(() => received.source === source && connect(), AGAIN);
     connection();
   });
 }

@@ -20,7 +20,7 @@ use crate::report::seconds;
 use crate::report::timeline::named;
 use crate::simulator::outcome::{Moment, TimelineEvent};
 
-/// Largest number of alarms that are kept. Beyond it the oldest ones are dropped, first those that have ended.
+/// Number of alarms beyond which ended ones are dropped: the least urgent first, of these the oldest. Lasting ones stay.
 const MOST: usize = 200;
 
 /// Reason of an alarm.
@@ -177,11 +177,11 @@ impl Alarms {
             reporters: vec![by],
         });
         if self.entries.len() > MOST {
-            let ended = self
-                .entries
-                .iter()
-                .position(|it| it.alarm.cleared_s.is_some());
-            self.entries.remove(ended.unwrap_or(0));
+            let all = self.entries.iter().enumerate();
+            let ended = all.filter(|(_, it)| it.alarm.cleared_s.is_some());
+            if let Some((at, _)) = ended.min_by_key(|(_, it)| it.alarm.urgency) {
+                self.entries.remove(at);
+            }
         }
     }
 
@@ -237,6 +237,7 @@ mod tests {
     #![allow(clippy::indexing_slicing, reason = "a test fails by it")]
 
     use uav_relay::{Instant, Side};
+    use uav_relay_screen::Urgency;
 
     use super::{Alarms, MOST};
     use crate::simulator::outcome::{Moment, TimelineEvent};
@@ -298,5 +299,31 @@ mod tests {
         let all = alarms.all();
         assert_eq!(all.len(), MOST);
         assert_eq!(all[MOST - 1].number, 1_000);
+    }
+
+    #[test]
+    fn notices_make_room_before_warnings_and_lasting_alarms_stay() {
+        let mut alarms = Alarms::default();
+        alarms.observe(&moment(0, 2, TimelineEvent::Blind, 0));
+        alarms.observe(&moment(1, 2, TimelineEvent::Engaged, 0));
+        for second in 0..1_000 {
+            for event in [TimelineEvent::Restarted, TimelineEvent::Released] {
+                alarms.observe(&moment(second, 1, event, 0));
+            }
+            alarms.observe(&moment(second, 1, TimelineEvent::Engaged, 0));
+        }
+        let all = alarms.all();
+        assert_eq!(all.len(), MOST);
+        let count = |urgency| all.iter().filter(|it| it.urgency == urgency).count();
+        assert_eq!(all[0].number, 1, "the critical alarm that has ended");
+        assert!(count(Urgency::Warning) >= MOST - 2);
+        // More lasting alarms than there is room for.
+        let relays = u16::try_from(MOST).unwrap_or_default() + 50;
+        for relay in 1..=relays {
+            alarms.observe(&moment(2_000, relay, TimelineEvent::Released, 0));
+        }
+        let all = alarms.all();
+        assert_eq!(all.len(), usize::from(relays));
+        assert!(all.iter().all(|it| it.cleared_s.is_none()));
     }
 }

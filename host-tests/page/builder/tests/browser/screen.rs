@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 use clap::Parser as _;
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Condition, Fence, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Screen, Snapshot,
+    Alarm, Condition, Fence, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Screen,
+    Snapshot, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -142,11 +143,127 @@ fn a_server_that_ends_is_noticed() {
     assert_eq!(connection, "live");
     drop(shown);
     browser.until("byId('connection').className === 'broken'");
+    browser.until("byId('state').textContent.includes('not connected')");
     let connection = browser.text("byId('connection').textContent");
     assert!(
         connection.contains("not connected to the server"),
         "{connection}"
     );
+}
+
+/// Returns the texts that the map writes when it is drawn again, in an array.
+fn written(browser: &mut Browser) -> String {
+    browser.text(
+        "(() => { const texts = [], plain = map.write; map.write = function (text, ...rest) { const is = plain.call(this, text, ...rest); if (is) texts.push(text); return is; }; map.draw(); delete map.write; return texts.join('|'); })()",
+    )
+}
+
+#[test]
+fn snapshots_that_stop_are_an_alarm_and_another_run_begins_anew() {
+    let screen = Screen::start("127.0.0.1:0".parse().unwrap()).unwrap();
+    let mut browser = Browser::start(&screen.url(), 1280, 900);
+    browser.until("byId('state').textContent === 'no data yet'");
+    let none = browser.text("byId('no-alarms').textContent");
+    assert_eq!(none, "No data yet.");
+    screen.show(full(8, 0.0));
+    browser.until(&shows(8));
+    browser.until("byId('connection').className === 'broken'");
+    let title = browser.text("document.title");
+    assert_eq!(title, "▲ no data: the page shows an old state");
+    let list = browser.text("byId('alarm-list').textContent");
+    assert!(list.contains("critical no data"), "{list}");
+    assert_eq!(
+        browser.text("getComputedStyle(byId('canvas')).opacity"),
+        "0.5"
+    );
+    // The table and the map count on, and screen readers hear of the change only.
+    browser.until("Number(byId('rows').children[0].children[9].textContent) > 3.5");
+    let texts = written(&mut browser);
+    assert!(
+        texts.contains("s ago") && !texts.contains("25 s ago"),
+        "{texts}"
+    );
+    let state = browser.text("byId('state').textContent");
+    assert_eq!(state, "no data");
+    // A new connection, after 10 s, brings the same snapshot, which is no news.
+    browser.run("window.before = received.source");
+    browser.until("received.source !== before && received.snapshots > 1");
+    assert_eq!(browser.value("byId('connection').className"), "broken");
+    browser.run("byId('acknowledge-all').click()");
+    // New data end the alarm.
+    screen.show(full(8, 20.0));
+    browser.until("byId('state').textContent === 'live'");
+    assert_eq!(browser.value("alarms.silence.cleared_s"), 20.0);
+    assert_eq!(browser.value("document.body.className"), "");
+    // Another run: acknowledgements and ways are forgotten, also at a later time of the flight.
+    browser.run("alarms.acknowledge([1])");
+    browser.run("show({ ...received.last, run: 'another' })");
+    assert_eq!(browser.value("alarms.acknowledged.size"), 0);
+    assert_eq!(
+        browser.value("Math.max(...[...map.ways.values()].map((it) => it.length))"),
+        1
+    );
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
+    let shown = Shown::begin(|| {
+        let mut snapshot = full(5, 0.0);
+        snapshot.relays[2].position = None;
+        snapshot.relays[4].agreed.as_mut().unwrap().altitude_m = None;
+        snapshot.hops[1].sir_db = Some(8.0);
+        snapshot.hops[1].sir_back_db = Some(-5.0);
+        snapshot.no_fly.push(vec![[1e22, 0.0], [1e22, 1e22]]);
+        snapshot
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(6));
+    let texts = written(&mut browser);
+    assert!(texts.contains("3, position unknown"), "{texts}");
+    assert!(texts.contains("8.0 / -5.0 dB"), "{texts}");
+    // The hops from relay 2 to 3 and from 3 to 4 have 4.0 and 3.0 dB.
+    assert!(
+        !texts.contains("4.0 dB") && !texts.contains("3.0 dB"),
+        "{texts}"
+    );
+    let summary = browser.text("byId('summary').textContent");
+    assert!(summary.ends_with("worst hop 2 to 1: -5.0 dB"), "{summary}");
+    let off =
+        browser.text("[...byId('rows').children].map((row) => row.children[5].textContent).join()");
+    assert_eq!(off, "0.0,0.0,–,0.0,–,–");
+    // An area far beyond every limit ends the drawing all the same.
+    browser.run("map.view.x = 1e22; map.fitted = false; map.draw(); map.fit()");
+    // A hidden page keeps no parts of ways.
+    browser.run("for (let at = 0; at < 9000; at += 1) map.newParts.push([[0, 0], [1, 1]]); map.take(map.snapshot)");
+    assert_eq!(browser.value("map.newParts.length"), 0);
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+#[test]
+fn only_alarms_that_last_sound_and_are_in_the_title() {
+    let alarm = |number, urgency, cleared_s| Alarm {
+        number,
+        time_s: 1.0,
+        urgency,
+        text: format!("alarm {number}"),
+        cleared_s,
+    };
+    let shown = Shown::begin(move || Snapshot {
+        alarms: vec![
+            alarm(1, Urgency::Critical, Some(2.0)),
+            alarm(2, Urgency::Warning, None),
+        ],
+        ..full(3, 3.0)
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(3));
+    let title = browser.text("document.title");
+    assert_eq!(title, "◆ alarm 2");
+    let sounding = browser.text("alarms.lasting.map(({ number }) => number).join()");
+    assert_eq!(sounding, "2");
+    let listed = browser.value("byId('alarm-list').childElementCount");
+    assert_eq!(listed, 2);
 }
 
 /// Returns a snapshot of `relays` relays that move, with everything that the map can show.
@@ -317,10 +434,10 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
         });
         assert!(is_there, "no {role} {name}");
     }
-    let image = nodes
+    let canvas = nodes
         .iter()
-        .find(|node| node["role"]["value"] == "image" || node["role"]["value"] == "img");
-    let name = image.expect("the map")["name"]["value"]
+        .find(|node| node["role"]["value"] == "application");
+    let name = canvas.expect("the map")["name"]["value"]
         .as_str()
         .unwrap()
         .to_owned();
