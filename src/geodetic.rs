@@ -102,7 +102,7 @@ impl Sites {
     }
 }
 
-/// Reason why a relay rejects an uploaded mission: its Tx and Rx positions, or the relay's geofence.
+/// Reason why a relay rejects an uploaded mission: its Tx and Rx positions, its slots, or the geofence.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
@@ -119,6 +119,9 @@ pub enum LineError {
     Lateral,
     /// The mission's distance from transmitter to receiver exceeds the relay's own geofence.
     Length,
+    /// The mission has fitted slots (`fitted_gap` above 0), which need the method `Joint` and a known interferer. The
+    /// relay has another method or `Settings::listen`, or the mission's interferer is unknown.
+    Slots,
 }
 
 error_texts!(LineError {
@@ -127,6 +130,7 @@ error_texts!(LineError {
     Altitude => "the mission's altitudes must be within this relay's geofence",
     Lateral => "the mission's lateral range must be within this relay's geofence",
     Length => "the mission's distance must be within this relay's geofence",
+    Slots => "the mission's fitted slots (fitted_gap above 0) need the method joint and a known interferer, without listen",
 });
 
 #[cfg(test)]

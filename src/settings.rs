@@ -2,7 +2,7 @@
 
 use crate::channel_load::ChannelLoad;
 use crate::guard::config::GuardConfig;
-use crate::mission::{Mission, Profile};
+use crate::mission::{Interference, Mission, MissionConfig, Profile};
 use crate::optimiser::joint::MOST_SOLVED;
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
@@ -166,6 +166,14 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Returns true if a relay with these settings may fly a mission with `config`: its slots are equal, or fitted with
+    /// the method Joint against a known interferer.
+    pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
+        let is_known = matches!(config.interference, Interference::Source(_));
+        let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
+        !(cfg!(feature = "altitude") && config.fitted_gap > 0.0) || may_fit
+    }
+
     /// Default settings, as a constant for `const` functions.
     const DEFAULT: Self = Self {
         profile: None,
@@ -275,7 +283,8 @@ pub enum SetupError {
     /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
     /// traffic in both directions this method needs a known interferer.
     Reverse,
-    /// The mission has fitted slots (`fitted_gap` above 0). The method must then be Joint, and `listen` `None`.
+    /// The mission has fitted slots (`fitted_gap` above 0). The method must then be Joint, `listen` `None`, and the
+    /// interferer known.
     Fitted,
     /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,
@@ -303,7 +312,7 @@ error_texts!(SetupError {
     Step => "the fixed target step (linear SIR) must be above 0",
     Method => "the method must be Align in a mission with an interference field; in other missions Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust the cargo feature `adjust`",
     Reverse => "Joint needs a known interferer if the mission's reverse is above 0: listen must be None, or the method Align or Adjust",
-    Fitted => "fitted slots (the mission's fitted_gap above 0) need the method Joint and a known interferer: method must be Joint, and listen None",
+    Fitted => "fitted slots (the mission's fitted_gap above 0) need the method Joint and a known interferer: method must be Joint, listen None, and the interference a Source",
     Adjust => "Adjust::explore_m must be within 0 to 1e5, and the grid of Adjust::local at least 2 by 2",
     Measure => "measure.i_max_w must be within 1e-30 to 1e6, measure.samples within 100 to 1000000; measure needs the cargo feature `field`",
     Listen => "listen.every and listen.half_life must be above 0, listen.relative_error within 1e-3 to 1; listen needs the cargo feature `sensing` and a mission without an interference field",
@@ -345,8 +354,7 @@ pub(crate) fn check(
     if is_listening_joint && mission.config().reverse > 0.0 {
         return Err(SetupError::Reverse);
     }
-    let is_known_joint = settings.method == Method::Joint && settings.listen.is_none();
-    if mission.fitted_gap() > 0.0 && !is_known_joint {
+    if !settings.allow_slots_of(mission.config()) {
         return Err(SetupError::Fitted);
     }
     if let Method::Adjust(Adjust {

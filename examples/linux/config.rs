@@ -5,7 +5,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::Parser;
+use clap::{Parser, ValueEnum as _};
 use serde_json::json;
 use uav_relay::{Channel, Instant, Interference, Profile};
 use uav_relay_scenario::Scenario;
@@ -14,6 +14,7 @@ use uav_relay_scenario::endpoint::FORM;
 use uav_relay_scenario::mission;
 
 use crate::log::Log;
+use crate::mission::Method;
 use crate::site::degrees;
 
 const TOLERANCE: f64 = 1e-4;
@@ -27,6 +28,8 @@ pub struct FileOnlySettings {
     pub field: Option<Interference>,
     /// Profiles (altitude and power) of single relays, with the indices of these relays.
     pub profiles: Vec<(u16, Profile)>,
+    /// Indices of the relays whose altitude the file fixes. They keep it while the method chooses those of the others.
+    pub held: Vec<u16>,
     /// Options of the command line that override the file.
     pub overrides: Vec<Override>,
 }
@@ -262,7 +265,9 @@ pub fn read<T: Parser>(
     let file_only = mission_options(&scenario, &mut given)
         .map_err(|error| format!("--config {}: {error}", file.display()))?;
     let method = value_of(&line, "--method").or_else(|| deployment.network.method.clone());
-    if method.as_deref() == Some("joint") {
+    // A wrong name is refused with the other options.
+    let method = method.and_then(|name| Method::from_str(&name, false).ok());
+    if method == Some(Method::Joint) {
         fitted_slots(&scenario, &mut given)
             .map_err(|error| format!("--config {}: {error}", file.display()))?;
     }
@@ -366,6 +371,7 @@ fn mission_options(
         given.value("--listen-half-life", listen.half_life_s);
         given.value("--listen-error", listen.relative_error);
     }
+    let held = mission::fixed_altitude_relays(scenario, 1_000);
     let profiles = if scenario.relays.is_empty() {
         profiles
     } else {
@@ -377,6 +383,7 @@ fn mission_options(
         channel: Some(config.channel),
         field,
         profiles,
+        held,
         overrides: Vec::new(),
     })
 }

@@ -260,6 +260,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         wiring,
         sited: options.autopilot.is_some(),
         profile: own.map(|_| profile),
+        hold_altitude: file_only.held.contains(&index),
         hop_time: load.hop_time(options.baud, LATENCY),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),

@@ -33,6 +33,9 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
         lateral,
         interference,
         noise_w,
+        reverse,
+        rx_power_w,
+        fitted_gap,
         ..
     } = basis.config;
     let range = |Band { least_m, most_m }| format!("{least_m} to {most_m} m");
@@ -60,6 +63,19 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
             },
         ),
         ("noise", format!("{noise_w} W")),
+        (
+            "SIR needed toward the transmitter",
+            format!("{reverse} of that toward the receiver"),
+        ),
+        ("power of the receiver", format!("{rx_power_w} W")),
+        (
+            "slots",
+            if fitted_gap > 0.0 {
+                format!("fitted, with an SNR gap of {fitted_gap}")
+            } else {
+                "equal".to_owned()
+            },
+        ),
         ("minimum separation", format!("{min_separation_m} m")),
     ]
 }

@@ -21,6 +21,8 @@ pub(crate) struct Loaded {
     pub(crate) mission: Mission,
     pub(crate) method: Method,
     pub(crate) profiles: Vec<(u16, Profile)>,
+    /// Relays with a fixed altitude.
+    pub(crate) held: Vec<u16>,
 }
 
 struct Letter {
@@ -46,6 +48,7 @@ impl Chain {
             let settings = Settings {
                 method: loaded.method,
                 profile: own.map(|(_, profile)| *profile),
+                hold_altitude: loaded.held.contains(&index),
                 auth: Some(Auth {
                     key: Key::new([0; 32]),
                     epoch: 1,

@@ -198,6 +198,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
             mission: loaded,
             method: options.method.into(),
             profiles: file_only.profiles,
+            held: file_only.held,
         },
         sited,
         end: match options.end {

@@ -586,9 +586,11 @@ impl Mission {
         }
     }
 
-    /// SNR gap of fitted slots, linear; 0 for equal slots. A constant without the feature `altitude`.
+    /// SNR gap of fitted slots, linear; 0 for equal slots. A constant without the feature `altitude`. 0 while the interferer is
+    /// unknown, as [`Mission::reverse`] is.
     pub const fn fitted_gap(&self) -> f32 {
-        if cfg!(feature = "altitude") {
+        if cfg!(feature = "altitude") && !matches!(self.config.interference, Interference::Unknown)
+        {
             self.config.fitted_gap
         } else {
             0.0

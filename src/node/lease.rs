@@ -122,6 +122,11 @@ impl Lease {
         }
     }
 
+    /// Returns true from the lease's expiry until the next view.
+    pub(crate) const fn has_lapsed(&self) -> bool {
+        matches!(self.state, LeaseState::Lapsed)
+    }
+
     /// Returns true until the first lease of this view is granted to this relay.
     pub(crate) const fn is_pending(&self) -> bool {
         matches!(self.state, LeaseState::Pending)

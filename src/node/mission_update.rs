@@ -19,7 +19,7 @@
 //! | hello received, newer mission | reply with a hello, to be offered that mission |
 //! | offer received, newer mission | store it; `Event::Uploaded`; send a hello; offer it to the neighbour on the other side; request a view |
 //! | offer received, mission not newer | reply with a hello |
-//! | offer received, no valid line on earth or outside the relay's own geofence | count it; `Event::UploadRefused` once; state that mission as refused in hellos; reply with a hello |
+//! | offer received, no valid line on earth, outside the relay's own geofence, or fitted slots against the settings | count it; `Event::UploadRefused` once; state that mission as refused in hellos; reply with a hello |
 //! | hello received, stored mission refused | state the same in hellos, until the mission is flown or a newer one is stored; once send a hello to the other neighbour |
 //! | offer received, answers no recent hello | count it as stale; reply with a hello, which the next offer can answer |
 //! | proposal due, next relay has an older or unknown mission | offer the newer one first |
@@ -84,7 +84,7 @@ impl Offering {
 pub(crate) enum Offered {
     /// The mission is newer and has been stored.
     Stored,
-    /// The mission is rejected: it does not fit the positions of Tx and Rx, or the geofence. `is_new` is true at the
+    /// The mission is rejected: it does not fit the positions of Tx and Rx, the geofence or the settings. `is_new` is true at the
     /// first rejection of this mission.
     Refused { why: LineError, is_new: bool },
     /// The mission is ignored: it is not newer than the stored one, or is meant for other relays.
@@ -397,7 +397,7 @@ impl MissionUpdate {
         self.upload().copied().filter(|_| older)
     }
 
-    /// Checks that `upload` fits the loaded mission, the positions of Tx and Rx, and the geofence. A relay whose
+    /// Checks that `upload` fits the loaded mission, the settings, the positions of Tx and Rx, and the geofence. A relay whose
     /// interference is a field (a known distribution along x) accepts no upload at all.
     fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         let config = upload.config();
@@ -407,6 +407,9 @@ impl MissionUpdate {
             || member.mission.field().is_some()
         {
             return Err(UploadError::Base);
+        }
+        if !member.settings.allow_slots_of(config) {
+            return Err(UploadError::Line(LineError::Slots));
         }
         let is_other = config.distance_m.to_bits() != loaded.loaded_m.to_bits();
         loaded

@@ -46,8 +46,8 @@ pub enum UploadError {
     Mission(MissionError),
     /// The upload replaces another mission than the one that the relay loaded before flight.
     Base,
-    /// The mission does not fit the positions of Tx and Rx on earth, or the geofence. The positions may be invalid,
-    /// or have another distance than the mission.
+    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. The positions may
+    /// be invalid, or have another distance than the mission.
     Line(LineError),
     /// The relay already has the uploaded mission or a newer one.
     Old,

@@ -204,7 +204,7 @@ pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config,
         return Err(ConfigError::Reverse);
     }
     let is_known_joint = method == Method::Joint && listen.is_none();
-    if mission.fitted_gap() > 0.0 && !is_known_joint {
+    if mission.config().fitted_gap > 0.0 && !is_known_joint {
         return Err(ConfigError::Fitted);
     }
     Ok(Config {

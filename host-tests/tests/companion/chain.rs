@@ -25,6 +25,10 @@ pub(crate) fn simulated_by(method: Method, scenario: &Scenario, relays: u16) -> 
     let (mission, _) = mission::mission(scenario, relays, 1e-4).unwrap();
     let mut setup = Setup::new(mission);
     setup.settings.method = method;
+    simulated_with(setup)
+}
+
+pub(crate) fn simulated_with(setup: Setup) -> Vec<Place> {
     let outcome = chain::run(setup).unwrap();
     assert_eq!(outcome.ending, Ending::Settled);
     let ends = outcome.relays.iter().map(|relay| {

@@ -3,10 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use uav_relay::Method;
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Scenario, mission};
+use uav_relay_sim::simulator::setup::Setup;
 
-use crate::chain::simulated;
+use crate::chain::{simulated, simulated_by, simulated_with};
 use crate::files::Files;
 use crate::medium::{Medium, QUIET};
 use crate::process::Relay;
@@ -68,6 +70,36 @@ fn three_relays_with_one_file_settle_like_the_simulation() {
     let settled = relays.each_mut().map(Relay::settled);
     assert_eq!(settled[..], simulated(&scenario, 3));
     assert_ne!(settled[..], simulated(&Scenario::default(), 3));
+}
+
+/// Checks that relays fly a file's fitted slots with either name of the method `joint`, and keep its fixed altitudes.
+#[test]
+fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
+    let folder = Files::new();
+    let own = "[[relay]]\nindex = 2\naltitude_m = 30.0\n";
+    let text = format!("{SCENARIO}\n[link]\naccess = \"fitted\"\n{own}");
+    let file = folder.write("fitted.toml", text);
+    let scenario = Scenario::load(Path::new(&file)).unwrap();
+    let (mission, profiles) = mission::mission(&scenario, 2, 1e-4).unwrap();
+    let mut setup = Setup {
+        profiles,
+        held: mission::fixed_altitude_relays(&scenario, 2),
+        ..Setup::new(mission::with_access(&scenario, &mission).unwrap())
+    };
+    setup.settings.method = Method::Joint;
+    let expected = simulated_with(setup);
+    assert_eq!(f32::from_bits(expected[1][2]), 30.0);
+    assert_ne!(expected, simulated_by(Method::Joint, &scenario, 2));
+    for name in ["joint", "altitude"] {
+        let channel = Medium::new(2, QUIET);
+        let mut relays = [0, 1].map(|tty| {
+            let place = format!("--index {} --of 2 --shared {}", tty + 1, channel.tty(tty));
+            start(&file, &format!("{place} --method {name}"))
+        });
+        for (relay, place) in relays.iter_mut().zip(&expected) {
+            relay.settles_at(*place);
+        }
+    }
 }
 
 /// Checks by the mission digest that all programs read the same mission from a scenario file.

@@ -15,7 +15,9 @@ use core::task::Poll;
 
 use uav_relay::optimiser::joint::{Seat, Solver};
 
-use uav_relay::{Band, Listen, Method, Mission, MissionConfig, Placement, SetupError, SlotShares};
+use uav_relay::{
+    Band, Interference, Listen, Method, Mission, MissionConfig, Placement, SetupError, SlotShares,
+};
 use uav_relay_scenario::scene::Scene;
 use uav_relay_tools::plan::path::{Table, Times};
 use uav_relay_tools::plan::solved;
@@ -177,7 +179,8 @@ fn a_full_line_is_placed() {
     }
 }
 
-/// Checks that a mission with fitted slots is refused with other methods, and while listening.
+/// Checks that a mission with fitted slots is refused with other methods, while listening, and without a known
+/// interferer.
 #[test]
 fn fitted_slots_need_the_joint_method() {
     let config = MissionConfig {
@@ -185,20 +188,30 @@ fn fitted_slots_need_the_joint_method() {
         ..*Case::draw(1).mission().config()
     };
     let mission = Mission::try_new(config).unwrap();
-    let refused = |method, listen| {
+    let refused_in = |mission: &Mission, method, listen| {
         let settings = uav_relay::Settings {
             method,
             listen,
             ..Default::default()
         };
-        flown::relay(&mission, settings).err()
+        flown::relay(mission, settings).err()
     };
+    let refused = |method, listen| refused_in(&mission, method, listen);
     assert_eq!(refused(Method::Joint, None), None);
     assert_eq!(refused(Method::Align, None), Some(SetupError::Fitted));
     assert_eq!(
         refused(Method::Joint, Some(Listen::default())),
         Some(SetupError::Fitted)
     );
+    let unknown = Mission::try_new(MissionConfig {
+        interference: Interference::Unknown,
+        fitted_gap: 1.0,
+        ..config
+    })
+    .unwrap();
+    assert!(mission.fitted_gap() > 0.0 && unknown.fitted_gap() == 0.0);
+    let refused = refused_in(&unknown, Method::Joint, None);
+    assert_eq!(refused, Some(SetupError::Fitted));
     let text = SetupError::Fitted.to_string();
     assert!(text.contains("fitted") && text.contains("Joint"), "{text}");
 }

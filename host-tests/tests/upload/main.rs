@@ -1,6 +1,7 @@
 //! Upload of a mission in flight to all relays or none; `COUNT` and `SEED` select other schedules.
 
 mod chain;
+mod fitted;
 mod flights;
 mod hand;
 mod restarts;

@@ -32,6 +32,7 @@ use crate::node::sample::Sample;
 use crate::node::steering::Steering;
 use crate::node::view::change::ViewChange;
 use crate::node::view::record::{RecordError, ViewRecord};
+use crate::optimiser::joint::fitted::SlotShares;
 use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
@@ -229,6 +230,12 @@ impl Node {
     /// Returns the expiry of the lease; `None` without one.
     pub(crate) const fn lease(&self) -> Option<Instant> {
         self.layers.lease.until()
+    }
+
+    /// Returns the shares of this relay's slots; `None` without an agreement that is in force, and with equal slots.
+    pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
+        let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
+        self.layers.round.slot_shares().filter(|_| !void)
     }
 
     pub(crate) fn phase(&self) -> Phase {

@@ -174,6 +174,8 @@ impl Computation {
     /// Starts a new view, in which no pass along the chain has been received yet. `leads` is true at its leader.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.clear();
+        // They belong to the previous view's mission and hops.
+        self.set_slot_shares(None);
         self.after = None;
         self.chosen = None;
         self.seats = Seats::UNKNOWN;

@@ -69,6 +69,9 @@ const BEST_WIDTH: f32 = 1.0 / 16.0;
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Shares of the frame time that the hops next to a relay have, with fitted slots.
+///
+/// They are lengths of slots, and do not say when a slot begins. For that a radio also needs the shares of the hops
+/// before, the length of the frame, and a clock that all nodes share.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {

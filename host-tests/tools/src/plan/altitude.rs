@@ -12,11 +12,19 @@ use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
+use uav_relay_scenario::link::{Access, RateModel};
 use uav_relay_scenario::{Scenario, mission};
 
 const MOST: usize = Mission::MAX_RELAYS as usize;
 
 type Chain = Solver<MOST, { MOST / 10 }>;
+
+/// Returns true if the relays fit their slots on board, with the method joint. They refuse a table of rate steps.
+pub(super) fn fits(scenario: &Scenario) -> bool {
+    scenario.link.as_ref().is_some_and(|link| {
+        link.access == Access::Fitted && matches!(link.model, RateModel::Shannon { .. })
+    })
+}
 
 /// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
 ///

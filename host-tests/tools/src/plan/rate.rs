@@ -158,7 +158,7 @@ impl Rates {
             let plan = match &searched {
                 Some(searched) => searched.plan(relays),
                 // Without the proof that the positions are best.
-                None if reverse > 0.0 && is_single(scenario) => {
+                None if reverse > 0.0 && is_single(scenario) && !ask.free_altitude => {
                     source::best(scenario, relays, ask.tolerance)
                 }
                 None => super::plan(scenario, &one),
@@ -200,7 +200,9 @@ impl Rates {
         if let Some(best) = &mut best {
             let is_one_way = !(reverse > 0.0);
             best.best_is_proven &= match radio.link.access {
-                Access::Fitted => !fits,
+                Access::Fitted => !fits && !ask.free_altitude,
+                // The proof for both directions is for relays above the line.
+                _ if ask.free_altitude => is_one_way,
                 _ => is_one_way || carry_no_more(scenario, radio, *best, ask.tolerance),
             };
         }

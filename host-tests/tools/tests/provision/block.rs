@@ -8,6 +8,7 @@ use uav_relay::flight::course::Course;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, ChannelLoad, Instant, Local, Measure, Method, Relay, Settings, Wiring};
 use uav_relay_scenario::link::{Access, Link, RateModel};
+use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::{ListenSpec, Scenario};
 use uav_relay_tools::provision::block::{BlockError, Flight};
 use uav_relay_tools::provision::config::{Config, ConfigError, LEN, MAX_POINTS};
@@ -413,13 +414,20 @@ fn fitted_slots_are_stored_for_joint_only() {
         flight.with_access(scenario)
     };
     let block = flight(&scenario, Method::Joint).unwrap().block(3).unwrap();
-    let gap = 10_f64.powf(0.3) as f32;
+    let gap = narrow(10_f64.powf(0.3));
     assert_eq!(block[384..388], gap.to_le_bytes());
     flies(&reads(&block).unwrap());
     let equal = flight(&scenario, Method::Align).unwrap().block(3).unwrap();
     assert_eq!(equal[384..388], [0; 4]);
     let by_align = reads(&changed(block, 14, &[0]));
     assert_eq!(by_align, Err(ConfigError::Fitted));
+    // A relay that listens may have no known interferer.
+    let sensing = [5_000_000_u64.to_le_bytes(), 60_000_000_u64.to_le_bytes()].concat();
+    let sensing = [sensing, 0.03_f32.to_le_bytes().to_vec()].concat();
+    let listening = changed(block, 352, &sensing);
+    assert_eq!(reads(&listening), Err(ConfigError::Fitted));
+    let unknown = changed(listening, 44, &[0; 12]);
+    assert_eq!(reads(&unknown), Err(ConfigError::Fitted));
     let below = reads(&changed(block, 384, &0.5_f32.to_le_bytes()));
     assert_eq!(below, Err(ConfigError::Mission(MissionError::FittedGap)));
     let steps = Scenario {

@@ -236,3 +236,42 @@ fn several_interferers_and_fields_are_planned_both_ways() {
         }
     }
 }
+
+/// Checks that fitted slots with free altitudes are planned by the relays' method for every number of relays.
+///
+/// No number of relays is then proven to be the best one.
+#[test]
+fn fitted_slots_with_free_altitudes_are_planned_as_on_board() {
+    for reverse in [0.0, 0.5, 1.0] {
+        let file = scenario(5.0, &format!("access = \"fitted\"\nreverse = {reverse:?}"));
+        let least = |report: &Value| match &report["rate_bps"] {
+            Value::Array(rates) => number(&rates[0]).min(number(&rates[1]) / reverse),
+            rate => number(rate),
+        };
+        for uavs in [1, 2] {
+            let bandwidth = format!("--uavs {uavs} --bandwidth-hz 1e6 --rates");
+            let line = json(&file, &bandwidth);
+            let free = json(&file, &format!("{bandwidth} --altitude free"));
+            assert_eq!(free["how"], "the joint method for fitted slots");
+            assert!(least(&free) >= least(&line) * (1.0 - 1e-5), "{line} {free}");
+            assert_eq!(free["best_is_proven"], false, "{free}");
+        }
+    }
+}
+
+/// Checks that the list of rates with free altitudes has those of the plans, in both directions.
+#[test]
+fn rates_with_free_altitudes_are_those_of_the_plans() {
+    for access in ["slots", "fitted"] {
+        let file = scenario(5.0, &format!("access = \"{access}\"\nreverse = 1.0"));
+        let options = "--bandwidth-hz 1e6 --altitude free";
+        let listed = json(&file, &format!("--uavs 2 --rates {options}"));
+        let best = listed["best_uavs"].as_u64().unwrap();
+        let plan = json(&file, &format!("--uavs {best} {options}"));
+        let rates = plan["rate_bps"].as_array().unwrap().iter().map(number);
+        let worse = rates.fold(f64::INFINITY, f64::min);
+        let ratio = number(&listed["best_rate_bps"]) / worse;
+        assert!((ratio - 1.0).abs() < 1e-6, "{access} {listed} {plan}");
+        assert_eq!(listed["best_is_proven"], false, "{listed}");
+    }
+}
