@@ -119,8 +119,9 @@ pub enum LineError {
     Lateral,
     /// The mission's distance from transmitter to receiver exceeds the relay's own geofence.
     Length,
-    /// The mission has fitted slots (`fitted_gap` above 0), which need the method `Joint` and a known interferer. The
-    /// relay has another method or `Settings::listen`, or the mission's interferer is unknown.
+    /// The mission has fitted slots (`fitted_gap` above 0), which this relay cannot fly.
+    ///
+    /// They need the method `Joint`, no `Settings::listen`, and a known interferer.
     Slots,
 }
 

@@ -166,8 +166,9 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if a relay with these settings may fly a mission with `config`: its slots are equal, or fitted with
-    /// the method Joint against a known interferer.
+    /// Returns true if a relay with these settings may fly the slots of the mission `config`.
+    ///
+    /// They are equal, or fitted with the method `Joint` against a known interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;

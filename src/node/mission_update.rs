@@ -397,8 +397,10 @@ impl MissionUpdate {
         self.upload().copied().filter(|_| older)
     }
 
-    /// Checks that `upload` fits the loaded mission, the settings, the positions of Tx and Rx, and the geofence. A relay whose
-    /// interference is a field (a known distribution along x) accepts no upload at all.
+    /// Checks that `upload` fits the loaded mission, the settings, the sites and the geofence.
+    ///
+    /// The sites are the positions of Tx and Rx. A relay whose interference is a field (a known distribution along x)
+    /// accepts no upload at all.
     fn fits(&self, member: &Member, upload: &Upload) -> Result<(), UploadError> {
         let config = upload.config();
         let loaded = self.uploads().ok_or(UploadError::Base)?;

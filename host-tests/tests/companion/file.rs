@@ -72,7 +72,7 @@ fn three_relays_with_one_file_settle_like_the_simulation() {
     assert_ne!(settled[..], simulated(&Scenario::default(), 3));
 }
 
-/// Checks that relays fly a file's fitted slots with either name of the method `joint`, and keep its fixed altitudes.
+/// Checks that relays fly a file's fitted slots and fixed altitudes, with both names of `joint`.
 #[test]
 fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
     let folder = Files::new();

@@ -179,8 +179,7 @@ fn a_full_line_is_placed() {
     }
 }
 
-/// Checks that a mission with fitted slots is refused with other methods, while listening, and without a known
-/// interferer.
+/// Checks that fitted slots are refused with another method, `listen` or an unknown interferer.
 #[test]
 fn fitted_slots_need_the_joint_method() {
     let config = MissionConfig {

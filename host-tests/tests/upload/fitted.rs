@@ -1,4 +1,4 @@
-//! Fitted slots and uploads: refusals against the settings, and slot shares that end with their agreement.
+//! Fitted slots in uploads: refusals, and slot shares that end with their agreement.
 
 use uav_relay::ground::Progress;
 use uav_relay::{Event, LineError, Listen, Method, Phase, Relay, Settings, UploadError, Wiring};
@@ -29,7 +29,7 @@ fn shares(wires: &Wires) -> Vec<bool> {
     relays.map(|relay| relay.slot_shares().is_some()).collect()
 }
 
-/// Checks that relays refuse fitted slots which their settings, or the uploaded interference, do not allow.
+/// Checks that relays refuse fitted slots that their settings or the interference do not allow.
 ///
 /// The refusal is counted and reported as that of a mission outside the geofence, and a newer mission is flown.
 #[test]

@@ -232,7 +232,7 @@ impl Node {
         self.layers.lease.until()
     }
 
-    /// Returns the shares of this relay's slots; `None` without an agreement that is in force, and with equal slots.
+    /// Returns the shares of this relay's slots; `None` without a valid agreement, and with equal slots.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
         self.layers.round.slot_shares().filter(|_| !void)

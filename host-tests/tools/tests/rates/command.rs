@@ -237,7 +237,7 @@ fn several_interferers_and_fields_are_planned_both_ways() {
     }
 }
 
-/// Checks that fitted slots with free altitudes are planned by the relays' method for every number of relays.
+/// Checks that fitted slots with free altitudes are planned by the relays' own method.
 ///
 /// No number of relays is then proven to be the best one.
 #[test]
