@@ -170,7 +170,7 @@ local messages = {
         { name = "noise_w", kind = "f32", unit = "W", text = "noise power at every receiver; 0 for none" },
         { name = "reverse", kind = "f32", unit = "", text = "r, the relative SIR of the way back; 0 for one direction" },
         { name = "rx_power_w", kind = "f32", unit = "W", text = "power of Rx on the way back" },
-        { name = "fitted_gap", kind = "f32", unit = "", text = "SNR gap of fitted slots; 0 for equal slots" },
+        { name = "fitted_gap", kind = "f32", unit = "", text = "SNR gap of fitted slots, or 0" },
         { name = "tx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Tx, positive north", per = 10000000, base = "degrees" },
         { name = "tx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Tx, positive east", per = 10000000, base = "degrees" },
         { name = "tx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Tx above mean sea level" },
