@@ -13,9 +13,9 @@
 //! for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
 
 use super::PerTarget;
+use super::from_rx::FromRx;
 use super::ladder::{Ladder, TARGETS};
 use super::retreat::{HopInterference, Retreat, Step, least};
-use super::reverse::FromRx;
 use super::spacing::{Hop, RequiredPosition, receiver_reach};
 use crate::mission::{Mission, Profile, ROUNDING};
 use crate::place::Station;

@@ -35,45 +35,12 @@
 //!
 //! For the joint method `Hop::stretched` is the reach as a differentiable function.
 //!
-//! With receiver noise the reach has no closed form: a search finds it, starting from this one.
+//! With receiver noise the reach has no closed form: [`noisy_hop`](super::noisy_hop) searches it, starting from this one.
 //!
 //! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
-//!
-//! # Reach of a hop with receiver noise: a bounded search on intervals of known curvature
-//!
-//! In the notation above, with rho = gamma / A, s(d) = (d - u)^2 + a^2 the squared distance from the interferer,
-//! l(d) = d^2 + b^2 that from the sender, and nu = N eta / P the noise over the interferer's power received at 1 m, the
-//! interference P / (eta s) becomes P / (eta s) + N, and so
-//!
-//! ```text
-//! SINR = A s / (l (1 + nu s)) >= gamma   <=>   g(d) = q(s(d)) - rho l(d) >= 0,    q(s) = s / (1 + nu s)
-//! ```
-//!
-//! which times 1 + nu s is a quartic in d. Only its last root before `high` is needed, and the search finds it from above. One
-//! bound is the noise-free reach, since a target that is missed without noise is missed with it; the other is the SNR alone, rho
-//! nu l <= 1. Where SINR only falls with d, the smaller bound is within a factor of sqrt(2) of the root.
-//!
-//! **Curvature.** With w = 1 + nu s, v = 1 + nu a^2 and t = d - u
-//!
-//! ```text
-//! g'' / 2 = (v - 3 nu t^2) / w^3 - rho
-//! ```
-//!
-//! falls with |t| where it is above 0. So g is concave everywhere if rho v^2 >= 1; otherwise it is convex within T of the
-//! interferer, and concave before and beyond. At T, w is the root of rho w^3 + 3 w = 4 v. The left side rises, so there is one
-//! root, found from 4 v / 3 by Newton's method from above.
-//!
-//! **Search**, from the right, on at most three intervals, each of which starts where g < 0:
-//!
-//! - On a concave interval Newton's tangents from the right are above g, so no step passes the last root, and the first step that
-//!   does not fall or leaves the interval proves that there is none.
-//! - On the convex interval g has a root if and only if g >= 0 at its left end, and then exactly one. Newton's tangents from the
-//!   left are below g, so no step passes it; each step is at least a bisection step.
-//!
-//! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and rises with
-//! the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
 
-use super::reverse::{Back, before, closest};
+use super::noisy_hop::{HALVINGS, MOST_RATIO, NoisyHop, before, closest};
+use super::reverse::Back;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
@@ -89,10 +56,6 @@ pub enum RequiredPosition {
     /// Previous relay required at this x, m, which is short of its farthest x that meets the target.
     At(f32),
 }
-
-/// Maximum ratio of a hop's target SIR and gain. With a larger ratio no hop is short enough to meet the target; up to
-/// it, all numbers of the computation are finite.
-pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Hop toward Rx, prepared for the computation of its maximum length for many targets.
 ///
@@ -536,24 +499,6 @@ pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<
     (squared >= 0.0).then(|| sqrt(squared).min(1e9))
 }
 
-/// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual; near
-/// a double root each halves the error.
-const STEPS: u8 = 32;
-
-/// Maximum number of steps of a search by bisection, each of which at least halves the interval.
-const HALVINGS: u8 = 32;
-
-/// Number of Newton steps for the hop length at which the margin g changes its curvature. g is the margin of a hop
-/// with noise: 0 or above where the target is met. The worst case is exact to an f32 after four.
-const TURNS: u8 = 5;
-
-/// Rounding error of the margin of a hop with noise, relative to what the target requires. A target that is missed by
-/// at most this counts as met.
-const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
-
-/// Relative change of the hop length below which the search for the maximum length ends.
-const CLOSE: f32 = 5e-7;
-
 impl Hop {
     /// Returns true for a hop without noise, and with traffic toward Rx only.
     pub(super) fn is_simple(&self) -> bool {
@@ -598,160 +543,6 @@ impl Hop {
             base: self.base,
             noise: self.nu(),
         }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NoisyHop {
-    /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times inverse interference over squared
-    /// length.
-    pub(super) ratio: f32,
-    /// Difference rho - 1, where rho is the hop's target SIR over its gain. It is computed without cancellation.
-    pub(super) excess: f32,
-    /// Distance u from the sender to the interferer along x, m.
-    pub(super) ahead: f32,
-    /// Squared distance a^2 of the receiver from the interferer perpendicular to x, m^2.
-    pub(super) aside_squared: f32,
-    /// Squared distance b^2 of the receiver from the sender perpendicular to x, m^2.
-    pub(super) across_squared: f32,
-    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the
-    /// interferer, b from the receiver to the sender. It is computed without cancellation.
-    pub(super) base: f32,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2, above 0.
-    pub(super) noise: f32,
-}
-
-impl NoisyHop {
-    /// Returns the maximum hop length along x, m, at which the SNR alone meets the target, at most 1e9. `None` if
-    /// there is none.
-    pub(super) fn through_noise(&self) -> Option<f32> {
-        let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
-        (squared >= 0.0).then(|| sqrt(squared))
-    }
-
-    /// Returns true if the target is met with the receiver `d` metres from the sender along x.
-    pub(super) fn is_met(&self, d: f32) -> bool {
-        let s = square(d - self.ahead) + self.aside_squared;
-        s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
-    }
-
-    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error. g, m^2, is
-    /// at least 0 if the hop meets its target SIR. `d` is along x, m, at most the length at which the noise alone
-    /// prevents that.
-    fn value(&self, d: f32) -> (f32, f32, f32) {
-        let Self { ratio, ahead, .. } = *self;
-        let t = d - ahead;
-        let s = square(t) + self.aside_squared;
-        let l = square(d) + self.across_squared;
-        let nus = self.noise * s;
-        let inverse = 1.0 / (1.0 + nus);
-        // At most about 1 up to the limit by noise.
-        let needed = ratio * l;
-        let lost = needed * self.noise;
-        if self.excess.abs() < 0.5 && nus < 1.0 {
-            // For a target close to A, s and rho l cancel far from the interferer, so their difference is used.
-            let f = ahead * (ahead - 2.0 * d) + self.base - self.excess * l;
-            let slope = -(ahead + self.excess * d) - t * nus * (2.0 + nus) * square(inverse);
-            return ((f - lost * s) * inverse, slope, NOISE_ROUNDING * needed);
-        }
-        let g = (s * (1.0 - lost) - needed) * inverse;
-        (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
-    }
-
-    /// Returns the distance from the interferer, m, at which the margin g changes its curvature's sign. `None` if g
-    /// is concave everywhere. g, the hop's margin, is 0 or above where the target is met.
-    fn inflection(&self) -> Option<f32> {
-        let v = 1.0 + self.noise * self.aside_squared;
-        if self.ratio * square(v) >= 1.0 {
-            return None;
-        }
-        let mut w = v * (4.0 / 3.0);
-        for _ in 0..TURNS {
-            let part = self.ratio * square(w);
-            w = (2.0 * part * w + 4.0 * v) / (3.0 * part + 3.0);
-        }
-        Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
-    }
-
-    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
-    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually
-    /// five.
-    pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
-        let mut high = high;
-        if !(low <= high) {
-            return None;
-        }
-        if let Some(about) = self.inflection() {
-            let (left, right) = (self.ahead - about, self.ahead + about);
-            if high > right {
-                let there = self.concave(right.max(low), high);
-                if there.is_some() {
-                    return there;
-                }
-                high = right;
-            }
-            if high > left && high > low {
-                let start = left.max(low);
-                let (g, _, rounding) = self.value(start);
-                if g >= -rounding {
-                    return Some(self.convex(start, high));
-                }
-                high = start;
-            }
-            if !(high > low) {
-                return None;
-            }
-        }
-        self.concave(low, high)
-    }
-
-    /// Returns the largest length in [`low`, `high`], m, at which the hop's margin g is 0, or `None`. g is at least 0
-    /// where the hop meets its target. g is concave in the interval, and below 0 at `high`, but for rounding.
-    fn concave(&self, low: f32, high: f32) -> Option<f32> {
-        let mut d = high;
-        for _ in 0..STEPS {
-            let (g, half, rounding) = self.value(d);
-            if g >= -rounding {
-                return Some(d);
-            }
-            if !(half < 0.0) {
-                return None;
-            }
-            let next = d - 0.5 * g / half;
-            if !(next >= low) {
-                return None;
-            }
-            if d - next <= CLOSE * d.abs() {
-                return Some(next);
-            }
-            d = next;
-        }
-        None
-    }
-
-    /// Returns the length in [`low`, `high`], m, at which the hop's margin g is 0. g is at least 0 where the hop
-    /// meets its target. g is convex in the interval, not negative at `low`, and negative at `high`.
-    fn convex(&self, low: f32, high: f32) -> f32 {
-        let (mut low, mut high) = (low, high);
-        for _ in 0..HALVINGS {
-            let (g, half, _) = self.value(low);
-            let next = low - 0.5 * g / half;
-            // The root is no farther than `high`, and no nearer than `next`, but for rounding.
-            if next >= high {
-                return high;
-            }
-            if !(next > low) || next - low <= CLOSE * next.abs() {
-                break;
-            }
-            low = next;
-            let middle = 0.5 * (low + high);
-            if self.value(middle).0 >= 0.0 {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
     }
 }
 
