@@ -1,4 +1,4 @@
-//! Last hop in the direction from Rx to Tx: the largest x at which the last relay receives Rx well enough.
+//! Last hop of the way back: the largest x at which the last relay receives Rx well enough.
 //!
 //! Rx sends, and relay N receives at x. With d = D - x this is a first hop seen from Rx, with the interferer at D - X, the gain
 //! A_rx of Rx's power and the target r gamma, in the notation of [`reverse`](super::reverse). With e, C and H of [`spacing`](super::spacing)
