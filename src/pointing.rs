@@ -10,7 +10,7 @@ use micromath::F32;
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum error of an angle of a [`Bearing`], rad: 0.17 degrees.
+/// Maximum computation error of a [`Bearing`]'s azimuth and elevation, rad: 0.17 degrees.
 #[cfg(test)]
 const MAX_ERROR_RAD: f32 = 0.002_967;
 

@@ -94,14 +94,23 @@ impl Sender {
         }
     }
 
-    /// Returns the SIR at a relay at `to` that receives from this sender at x = `from_m`. Infinite if both are at one
+    /// Returns the linear SIR at a relay at `to`, while this sender is at x = `from_m`, m. Infinite if both are at one
     /// place.
     ///
-    /// With the interferer at (X, Y), the sender at (x0, y0, h0), its gain A, s = X - x0 and d = x - x0 it is A ((s -
-    /// d)^2 + (Y - y)^2 + h^2) / (d^2 + (y - y0)^2 + (h - h0)^2). With y = y0 = 0 this is the paper's `SIR_1` for h0
-    /// = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` / `p_MSI`)(eta / `mu_los`). For interference that
-    /// the mission gives as a distribution along x, it is the expected SIR, p Upsilon(x) / (eta d^2) and p Upsilon(x)
-    /// / (`mu_los` d^2).
+    /// Without noise, with the relay at (x, y, h), the interferer at (X, Y, 0), and the sender, of gain A, at (x0, y0,
+    /// h0):
+    ///
+    /// ```text
+    /// SIR = A ((X - x)^2 + (Y - y)^2 + h^2) / L^2
+    /// L^2 = (x - x0)^2 + (y - y0)^2 + (h - h0)^2
+    /// ```
+    ///
+    /// With y = y0 = 0 this is the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` /
+    /// `p_MSI`)(eta / `mu_los`).
+    ///
+    /// For interference that the mission gives as a distribution along x, the expected SIR is p Upsilon(x) / (eta L^2)
+    /// from Tx and p Upsilon(x) / (`mu_los` L^2) from a relay. L is the length of the hop, m, and p the sender's power,
+    /// W.
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.cross_section);

@@ -47,8 +47,8 @@ pub struct Stats {
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Ignored messages of another view, or of another mission than the one of this view. They belong to a pass along
-    /// the chain or to a view change.
+    /// Ignored messages of passes along the chain and of view changes, with a foreign view or mission. Their view or
+    /// mission is not the one that this relay uses.
     pub view: u32,
     /// New views that this relay has accepted.
     pub views: u32,

@@ -63,14 +63,16 @@ pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     ..*HIGH.config()
 });
 
-/// Mission of three relays at one altitude for both directions in fitted slots.
+/// Mission of three relays at one altitude, with data both ways in fitted slots. A fitted slot is a time slot as long
+/// as its hop needs.
 pub(crate) const FITTED: Mission = Mission::new(MissionConfig {
     band: Band::at(20.0),
     fitted_gap: 2.0,
     ..*BOTH.config()
 });
 
-/// Mission of three relays with ranges of altitudes for both directions in fitted slots.
+/// Mission of three relays at altitudes of 20 to 300 m, with data both ways in fitted slots. A fitted slot is a time
+/// slot as long as its hop needs.
 pub(crate) const FITTED_HIGH: Mission = Mission::new(MissionConfig {
     fitted_gap: 2.0,
     ..*BOTH.config()

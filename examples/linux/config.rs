@@ -28,7 +28,7 @@ pub struct FileOnlySettings {
     pub field: Option<Interference>,
     /// Profiles (altitude and power) of single relays, with the indices of these relays.
     pub profiles: Vec<(u16, Profile)>,
-    /// Indices of the relays whose altitude the file fixes. They keep it while the method chooses those of the others.
+    /// Indices of the relays whose altitude the file fixes. The method chooses only the altitudes of the other relays.
     pub held: Vec<u16>,
     /// Options of the command line that override the file.
     pub overrides: Vec<Override>,

@@ -232,8 +232,8 @@ fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String
 /// Returns the maximum turn of the line Tx to Rx, degrees, that keeps the relays' order along it. Position errors are
 /// up to 1 m.
 ///
-/// For the minimum separation s and the width w of the lateral range, the angle t solves s cos t - w sin t = min(2 m,
-/// s / 2).
+/// With the minimum separation s and the width w of the lateral range, the turn t solves s cos t - w sin t = a. Here a
+/// is the smaller of `ORDER_M`, two metres, and s / 2.
 fn most_turn_deg(config: &MissionConfig) -> f32 {
     let (separation_m, width_m) = (
         config.min_separation_m,

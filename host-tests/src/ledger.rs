@@ -95,7 +95,7 @@ pub fn left(outcome: &Outcome) -> Vec<u16> {
     living.map(|(index, _)| index).collect()
 }
 
-/// Runs a chain that consists of only the relays `left` of `setup`, without faults; returns its result.
+/// Runs a chain of only the surviving relays `left` of `setup`, without faults; returns its result.
 ///
 /// `config` is the mission of the chain.
 ///
@@ -119,7 +119,8 @@ pub fn undisturbed(setup: &Setup, left: &[u16], config: MissionConfig) -> Outcom
     outcome
 }
 
-/// Checks that the relays `left` end as in an undisturbed chain of only these relays, to the bit.
+/// Checks that the surviving relays `left` end with the setpoints of an undisturbed chain. The undisturbed chain
+/// consists of only these relays, without faults. Setpoints and target SIR must be bit-identical.
 ///
 /// `version` and `config` are those of the mission that the relays must have at the end.
 ///

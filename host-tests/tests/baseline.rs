@@ -68,8 +68,8 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the largest value that the weakest signal can have with relays at grid points, W. `points` is the number
-/// of grid steps. `chosen` has the positions of the first relays; the other `left` relays follow at the same or later
+/// Returns the largest value that the weakest signal can have with relays at grid points, W. `points` is the number of
+/// grid steps. `chosen` has the positions of the first relays; the remaining `left` relays follow at the same or later
 /// points.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {

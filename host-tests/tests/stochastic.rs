@@ -206,7 +206,7 @@ fn silent_places_equal_those_by_messages() {
     }
 }
 
-/// Checks that relays in a field of interference keep the least separation. The separation limits the target SIR.
+/// Checks that 60 relays in a uniform interference field keep the minimum separation of 12 m.
 #[test]
 fn relays_keep_their_separation() {
     let mut link = StochasticLink {

@@ -51,11 +51,11 @@ pub(super) struct Association {
     foreign_messages: u8,
     /// True if a message to the neighbour is pending.
     pub(super) due: bool,
-    /// True while the neighbour requests an open chain. In an open chain all relays are the minimum separation apart
-    /// along x.
+    /// True while the neighbour requests an open chain. In an open chain all relays are at least the minimum separation
+    /// apart along x.
     pub(super) open_requested: bool,
-    /// True while the messages to the neighbour request an open chain. In an open chain all relays are the minimum
-    /// separation apart along x.
+    /// True while the messages to the neighbour request an open chain. In an open chain all relays are at least the
+    /// minimum separation apart along x.
     open_sent: bool,
     /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without one.
     halt_reminders_left: u8,
@@ -251,15 +251,15 @@ impl Association {
     }
 
     /// Stores the neighbour's request for an open chain, or its end, from a message of this association. In an open
-    /// chain all relays are the separation apart along x. A reply is due if the message shows that the neighbour has
-    /// not received this relay's last request.
+    /// chain all relays are at least the minimum separation apart along x. A reply is due if the message shows that the
+    /// neighbour has not received this relay's last request.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.open_requested = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
     /// Requests an open chain from the neighbour if `opens` is true, or else withdraws the request. In an open chain
-    /// all relays are the separation apart along x. A message is due after a change.
+    /// all relays are at least the minimum separation apart along x. A message is due after a change.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
@@ -553,8 +553,8 @@ impl Fence {
     pub const ARRIVED: u8 = 1;
     /// Flag of the relay downstream: it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
-    /// Flag: request to open the chain, so that neighbours are the separation apart along x. The sender, or a relay
-    /// beyond it, needs that to change its lateral offset or altitude.
+    /// Flag: request to open the chain: neighbours at least the minimum separation apart along x. The sender, or a
+    /// relay beyond it, needs that to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
     /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies it from that flag in the
     /// last message that it has received from the destination.
@@ -608,7 +608,7 @@ pub enum HoldReason {
     /// Hold reason: the neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
     Order,
     /// Hold reason: the agreed positions of this relay and the neighbour are too close along x. Lateral offsets and
-    /// altitudes do not keep the two the separation apart.
+    /// altitudes do not keep the two at the minimum separation.
     Close,
     /// Hold reason: a lost relay may still hover between this relay and its agreed position.
     Lost,

@@ -171,8 +171,8 @@ impl GuardConfig {
 
     /// Returns the x to which relay `node` flies while the chain is open, m; `x_m` is its agreed x.
     ///
-    /// Open means that all relays keep their order, and are the separation apart along x, if all relays of the
-    /// mission then fit into the geofence.
+    /// Open means that all relays keep their order, and are at least the minimum separation apart along x, if all
+    /// relays of the mission then fit into the geofence.
     #[inline(never)] // called from several places
     pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.geofence.least_x_m;
@@ -184,7 +184,7 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
-    /// Returns the distance along x that two relays need to be the separation apart in space, m. `one` and `other`
+    /// Returns the distance along x at which two relays are the minimum separation apart in space, m. `one` and `other`
     /// are their lateral offsets and altitudes.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;

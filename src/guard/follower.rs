@@ -30,9 +30,10 @@ pub(super) struct FenceFollower {
     target_m: f32,
     /// Lateral offset and altitude of the setpoint of the neighbour upstream.
     across: CrossSection,
-    /// True once this relay is known to be beyond a fence (limit of x) from the neighbour upstream.
+    /// True once this relay is known to be past a fence of the neighbour upstream, at a larger x.
     clear: bool,
-    /// True if the neighbour upstream was informed that this relay is beyond the newest fence (limit of x).
+    /// True once the upstream neighbour was informed that this relay is past the newest fence. The fence is a limit of
+    /// x which that neighbour, its owner, has set; past the fence means at a larger x.
     owner_informed: bool,
 }
 
@@ -208,9 +209,9 @@ impl FenceFollower {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. This relay's
-    /// two neighbours must stay the separation apart: the requested distance plus `downstream_m`, the distance to the
-    /// neighbour downstream, must be at least the separation.
+    /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. This relay's two
+    /// neighbours must stay at least the separation apart: the requested distance plus `downstream_m`, the distance to
+    /// the neighbour downstream, must be at least the separation.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -253,8 +254,8 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Records that this relay is beyond the newest fence (limit of x), if its known position shows that. A message
-    /// is due then, because the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those
+    /// Records that this relay is past the newest fence (at a larger x), if its known position shows that. A message is
+    /// due then, because the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those
     /// downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {

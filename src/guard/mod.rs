@@ -1,10 +1,10 @@
 //! Motion guard: keeps relays apart while they fly to new agreed positions. Messages may be lost or late.
 //!
-//! Relays are in order along x. Normally neighbours are the separation apart *along x*; then all relays are, independently of their
-//! positions across the line. Two relays whose agreed positions are beside or above each other come closer along x once both have
-//! arrived across the line; their distance across the line then counts. Two relays with one between them always stay the
-//! separation apart along x, so no relay needs more information than its neighbours'. Positions that do not allow that are
-//! approached as far as possible, and [`Guard::hold_reason`] reports it.
+//! Relays are in order along x. Normally neighbours are at least the minimum separation apart *along x*; then all relays are,
+//! independently of their positions across the line. Two relays whose agreed positions are beside or above each other come closer
+//! along x once both have arrived across the line; their distance across the line then counts. Two relays with one between them
+//! always stay at least the separation apart along x, so no relay needs more information than its neighbours'. Positions that do
+//! not allow that are approached as far as possible, and [`Guard::hold_reason`] reports it.
 //!
 //! Between two neighbours there is a *fence*, a plane across x. The relay upstream of it, its *owner*, stays a *step* before it;
 //! the relay downstream, the *follower*, stays at it or beyond.
@@ -21,7 +21,7 @@
 //!
 //! *Own interval*: from the lowest to the highest x at which the relay may be, wherever it stops on its way. *In order*: the
 //! follower is beyond the owner along x. Reports have an error of up to `hover_m`. Two relays whose reports are within twice that
-//! along x are in order only if they are the separation apart across the line, so that they may pass each other.
+//! along x are in order only if they are at least the separation apart across the line, so that they may pass each other.
 //!
 //! | | rule | purpose |
 //! | --- | --- | --- |
@@ -49,19 +49,19 @@
 //! # Why the order along x suffices
 //!
 //! Let all neighbours be in order. A pair of neighbours closer than the separation only moves apart: the owner's setpoint does
-//! not rise (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays the separation apart. So no
-//! gap between neighbours ever falls below the smaller of the separation and the gap at the start, nor does a sum of gaps, which
-//! is the distance along x of any two relays. Until both gaps of a relay are the separation, it does not move across the line. So
-//! no two relays come nearer in space than the smaller of the separation and their distance at the start, minus the errors of
-//! their positions. `cargo test --test guard anywhere` tests it.
+//! not rise (rule 4) and the follower's does not fall (rules 1 and 7). From then on the pair stays at least the separation apart.
+//! So no gap between neighbours ever falls below the smaller of the separation and the gap at the start, nor does a sum of gaps,
+//! which is the distance along x of any two relays. Until both gaps of a relay are the separation, it does not move across the
+//! line. So no two relays come nearer in space than the smaller of the separation and their distance at the start, minus the
+//! errors of their positions. `cargo test --test guard anywhere` tests it.
 //!
 //! # Why all relays arrive
 //!
-//! Let the agreed positions be the separation apart; then so are the fences' goals. A fence that has to be lowered waits for its
-//! owner to come down, and that relay waits only for the fence upstream, if that has to be lowered too. The first of them waits
-//! for none, and so all come down, one after the other. In the same way all that have to be raised are, from the receiver's end.
-//! Then every relay finds its position between its fences. Fences move along with the flight, so that takes one flight's time and
-//! a few messages per relay at worst.
+//! Let the agreed positions be at least the separation apart; then so are the fences' goals. A fence that has to be lowered waits
+//! for its owner to come down, and that relay waits only for the fence upstream, if that has to be lowered too. The first of them
+//! waits for none, and so all come down, one after the other. In the same way all that have to be raised are, from the receiver's
+//! end. Then every relay finds its position between its fences. Fences move along with the flight, so that takes one flight's
+//! time and a few messages per relay at worst.
 //!
 //! If neighbours are to be closer along x, the same is true for the positions in an open chain, so each relay can move across the
 //! line, and none needs that again before the next agreement. Then the steps take their final values, and all arrive.
@@ -360,9 +360,9 @@ impl Guard {
             .end_near(Side::Downstream, |near_m| high_m <= near_m);
     }
 
-    /// Requests an open chain, if needed: all relays the separation apart along x. This relay or a neighbour may need
-    /// it; a neighbour's request is forwarded to the neighbour on the opposite side. `clear` is true if this relay
-    /// may change its lateral offset and altitude.
+    /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. This relay or a
+    /// neighbour may need it; a neighbour's request is forwarded to the neighbour on the opposite side. `clear` is true
+    /// if this relay may change its lateral offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();

@@ -142,7 +142,8 @@ pub(super) struct Own {
     cross_section_changed_at: Instant,
     /// True once the relay has arrived at the setpoint's lateral offset and altitude.
     pub(super) arrived: bool,
-    /// True while neighbours or this relay request an open chain: all relays the separation apart along x.
+    /// True while this relay or a neighbour requests an open chain. In an open chain all relays are at least the
+    /// minimum separation apart along x.
     pub(super) open: bool,
     /// True while this relay holds its position, because the order of relays along x is wrong or unknown.
     pub(super) halted: bool,
@@ -300,7 +301,7 @@ impl Own {
     }
 
     /// Returns the x to which `node` should fly now, m: `target_m`, or its x in an open chain. In an open chain all
-    /// relays are the separation apart.
+    /// relays are at least the minimum separation apart along x.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
             self.config.open_chain_x(node, target_m)

@@ -34,7 +34,7 @@ pub(super) struct FenceOwner {
     arrived: bool,
     /// True if the neighbour downstream has received the newest fence (limit of x).
     is_acknowledged: bool,
-    /// True once the neighbour downstream has reported that it is beyond a fence (limit of x).
+    /// True once the neighbour downstream has reported that it is past a fence (at a larger x).
     clear: bool,
 }
 
@@ -123,17 +123,17 @@ impl FenceOwner {
         self.association.peer_number != 0
     }
 
-    /// Returns true if the neighbour downstream is known to be beyond this relay along x. Also true if that neighbour
-    /// does not fly to setpoints, or the chain ends here.
+    /// Returns true if the neighbour downstream is known to be at a larger x than this relay. Also true if that
+    /// neighbour does not fly to setpoints, or the chain ends here.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour()
                 || self.has_reply() && self.is_beyond(own))
     }
 
-    /// Returns true if the neighbour downstream was reported at a smaller x than this relay. That is the wrong order.
-    /// The report counts with or without an association (session). Also true while a lost relay may be on the wrong
-    /// side.
+    /// Returns true if the neighbour downstream is in the wrong order: at a smaller x than this relay. The neighbour's
+    /// last report counts, with or without an association (session). Also true while a lost relay downstream may be at
+    /// a smaller x.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         if self.keep_out.is_disordered() {
             true
@@ -144,12 +144,12 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if the neighbour downstream is known to be beyond this relay along x.
+    /// Returns true if the neighbour downstream is known to be at a larger x than this relay.
     ///
     /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence (limit of x), two
     /// relays whose reports are closer than the errors along x are in order only if they may pass each other: lateral
-    /// offset and altitude then keep them the separation apart. A pair that was in order may have moved by the errors
-    /// once more since then, each time that one of them halts or is rebooted.
+    /// offset and altitude then keep them at least the separation apart. A pair that was in order may have moved by the
+    /// errors once more since then, each time that one of them halts or is rebooted.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;
@@ -278,8 +278,8 @@ impl FenceOwner {
     }
 
     /// Returns true if this relay and its neighbour downstream may still be as close as at the start. That may be
-    /// closer than the separation. The neighbour has answered, but has not reported yet that it is beyond a fence
-    /// (limit of x).
+    /// closer than the separation. The neighbour has answered, but has not reported yet that it is past a fence (at a
+    /// larger x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }

@@ -178,7 +178,7 @@ impl Circulation {
         self.repeat_reply(now, path);
     }
 
-    /// Completes the message at its initiator, which sends no reply and has no further message to start.
+    /// Completes the message at its initiator, which sends no reply and starts no other message.
     pub(crate) const fn close(&mut self) {
         self.stop(Stage::Completed);
     }

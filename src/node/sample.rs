@@ -14,7 +14,7 @@ use crate::sir::square;
 /// rejected, and the code is unreachable.
 const FIELD: bool = cfg!(feature = "field");
 
-/// Measurement of a relay or of a ground station, which the firmware passes to the relay.
+/// Measurement of a relay or of a ground station, which the firmware gives to the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Sample {
@@ -36,14 +36,14 @@ pub enum Sample {
         /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
     },
-    /// Mean interference power measured at Tx, on the ground. The firmware passes it to one of the first four relays,
+    /// Mean interference power measured at Tx, on the ground. The firmware gives it to one of the first four relays,
     /// usually relay 1.
     Transmitter {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power measured at Rx, on the ground. The firmware passes it to one of the last four relays;
-    /// the last relay of the view uses it.
+    /// Mean interference power measured at Rx, on the ground. The firmware gives it to one of the last four relays; the
+    /// last relay of the view uses it.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
@@ -65,7 +65,7 @@ impl Sample {
     }
 }
 
-/// Average of the interference at the setpoint, over the samples that the firmware passes.
+/// Average of the interference samples that the firmware has measured at the setpoint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Meter {
     estimator: Option<(Estimator, u32)>,

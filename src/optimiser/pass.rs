@@ -31,19 +31,19 @@ const HOLDS: u8 = 4;
 /// call, which is at least one.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Previous relay in a pass along the chain, as described in its message.
+/// Relay from which a pass along the chain arrives, as its message describes it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
-    /// Lateral offset, altitude and power of the previous relay.
+    /// Lateral offset, altitude and power of that relay.
     pub relay: Station,
-    /// Upsilon, the mean inverse interference power, measured at the previous relay, 1/W. `None` to use the mission's
+    /// Upsilon, the mean inverse interference power, measured at that relay, 1/W. `None` to use the mission's
     /// interference field. Only passes toward Tx use it.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a previous relay with this altitude and power, at y = 0 and without measured interference.
+    /// Returns a sending relay with this altitude and power, above the line Tx-Rx. It has no measured interference.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -58,7 +58,7 @@ impl Behind {
 pub struct Link<'a> {
     /// Mission of the chain.
     pub mission: &'a Mission,
-    /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
+    /// Relay from which the pass arrives; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
     pub index: u16,

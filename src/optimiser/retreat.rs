@@ -421,8 +421,9 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference that a receiver has measured, or for `None` the mission's field. `measured_per_w` is
-    /// Upsilon, the mean inverse interference power, 1/W. Both include the receiver noise.
+    /// Returns the interference at a receiver: as measured by it, else by the mission's field. `measured_per_w` is
+    /// Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field include the receiver
+    /// noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),

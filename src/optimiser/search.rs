@@ -356,10 +356,11 @@ struct StandTrials {
 }
 
 impl Search {
-    /// Returns the target that was to be committed but was refused by a relay; `None` if there is none.
+    /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses if it cannot take its required position. `verdict`, the result of the pass, then commits
-    /// nothing, although its slacks call for a commit.
+    /// A relay refuses a target if it cannot take the position that the next relay requires of it: it deletes the
+    /// commit from `verdict`, the result of the pass. This function finds by the slacks which target had been
+    /// committed.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();

@@ -203,8 +203,9 @@ impl Relay {
 
     /// Handles timers that have expired by `now`, and does one step of a long computation.
     ///
-    /// The step is bounded: 256 positions of relays while the leader predicts the result, the hops of 10 to 40 relays
-    /// in the joint method, 624 positions in Algorithm 2. Without a computation the call takes almost no time.
+    /// The step is bounded. The leader's prediction computes at most 12 hops, each for 16 target SIRs; the joint method
+    /// the hops of 10 to 40 relays; Algorithm 2 tries at most 624 positions of this relay. Without a computation the
+    /// call takes almost no time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -519,7 +520,9 @@ impl Relay {
         self.node.phase()
     }
 
-    /// Returns true while this relay is passive, because another node has its number and a larger claim.
+    /// Returns true while this relay is passive, because another node with its number has precedence. Each node draws a
+    /// random claim number at its start. Of two nodes with one node number, the larger epoch has precedence, then the
+    /// larger claim number.
     ///
     /// A passive relay has no setpoint and takes no part in the protocol. It becomes active once the other node has
     /// been silent for twice `Settings::dead_after`, or when [`clear_duplicate_index`](Self::clear_duplicate_index)

@@ -28,8 +28,8 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected error when the variance is estimated. It counts as much as four measured
-/// positions.
+/// Weight of the expected measurement error in the estimated variance, in measured positions. The operator states the
+/// expected error. The variance is that of the relative error of one measured position.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. With less, they do not

@@ -16,9 +16,9 @@
 //! | this relay's own nonce | proof that the node is present |
 //! | a request, and none of the above | reply only |
 //!
-//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a proven
-//! node; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by another pending
-//! message, if there is one.
+//! Exactly one handshake answers a request that starts a session, that has not this relay's nonce, or that comes from a node
+//! with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by
+//! another pending message, if there is one.
 //!
 //! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It is no proof,
 //! because it does not contain this relay's new nonce: it is no sign of life, it causes nothing but a handshake, and an old nonce
@@ -48,8 +48,8 @@ struct Peer {
     node: u16,
     /// True if a handshake to this node is due.
     handshake: bool,
-    /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only while
-    /// the node is unproven.
+    /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only until
+    /// the node has proved its presence.
     requests_reply: bool,
     /// True if the node has repeated this relay's nonce. That proves that the node is present, and that both nodes
     /// know each other's nonce.
@@ -176,7 +176,7 @@ impl Session {
         }
     }
 
-    /// Schedules a handshake to node `to`. The node counts as unproven until it replies.
+    /// Schedules a handshake to node `to`. The node's presence counts as not proved until it replies.
     pub(crate) fn greet(&mut self, to: u16) {
         self.insert(to);
         if let Some(peer) = self.touch(to) {
@@ -415,8 +415,8 @@ impl Session {
     }
 
     /// Creates a table entry for `node` if there is none. If the table is full, it replaces an entry that is not
-    /// pinned: an unproven one if possible, else the least recently used one. After four billion entries it creates
-    /// no more, because a nonce must not be used twice.
+    /// pinned: that of a node without proof of presence if possible, else the least recently used one. After four
+    /// billion entries it creates no more, because a nonce must not be used twice.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;

@@ -74,11 +74,12 @@ pub struct Signed {
 /// Test vector: the compact form of a sweep message's list of target SIRs, and the targets.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Target SIR from which the list starts: the bits of its f32 in hexadecimal.
+    /// Target SIR with index 7 of 0 to 15, or the only one: the bits of its f32 in hexadecimal. The other targets
+    /// follow from it in both directions.
     pub anchor: String,
-    /// Code of the relative gap between the first targets of the list, 0 for a single target.
+    /// Code of the relative gap between the anchor and the next targets, 0 for a single target.
     pub gap: u8,
-    /// Code of the factor by which each gap between targets exceeds the one before.
+    /// Code of the factor by which each gap exceeds the adjacent gap that is nearer to the anchor.
     pub growth: u8,
     /// Target SIRs that the compact form stands for: the bits of each f32 in hexadecimal.
     pub targets: Vec<String>,

@@ -193,7 +193,7 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     }
 }
 
-/// Reads an interferer between Tx and Rx or far away, on the line between them or beside it.
+/// Reads an interferer: its x is between Tx and Rx, at Rx, or outside; its y is 0 or beside the line.
 ///
 /// `distance_m` is the distance from Tx to Rx, m.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {

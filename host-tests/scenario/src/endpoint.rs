@@ -112,9 +112,9 @@ pub enum EndpointError {
     NoPort,
     /// The local port after `@` is not within 1 to 65535.
     NoLocal,
-    /// The address states no local port, and the default for the autopilot's port would be above 65535.
+    /// The address states no local port, and the default, PORT + 1000, exceeds 65535.
     NoDefault {
-        /// UDP port of the autopilot, for which there is no default local port.
+        /// PORT of the address: the autopilot's UDP port.
         port: u16,
     },
 }

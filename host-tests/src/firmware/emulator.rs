@@ -71,8 +71,7 @@ pub type Sockets = [UnixStream; 4];
 impl Emulator {
     /// Starts a drone with the firmware `image`, its configuration `block`, and flash contents `kept`.
     ///
-    /// The clock of the drone runs at the speed `life`. The files of the drone are in the new folder `name` in
-    /// `folder`.
+    /// `life` selects the speed of the drone's clock. The files of the drone are in the new folder `name` in `folder`.
     ///
     /// # Errors
     /// [`MISSING`] if QEMU is not installed; otherwise the fault, with QEMU's own messages.

@@ -89,8 +89,8 @@ fn the_best_places_near_an_interferer_in_noise_are_found() {
 
 /// Checks that relays stay at Tx if an interferer lies between them and a weak Rx.
 ///
-/// A chain whose last relay passes the interferer has less than 0.3 of the SIR of a chain with all relays at Tx. The
-/// SIR counts the worse direction of each hop.
+/// The SIR of the chain is that of its worst hop in the worse direction. A chain with its last relay above Rx, beyond
+/// the interferer, has less than 0.3 of the SIR of a chain with all relays at Tx.
 #[test]
 fn relays_stay_at_tx_where_an_interferer_is_between_them_and_a_weak_rx() {
     let chain = Chain {

@@ -173,8 +173,8 @@ fn with_a_separation_a_proven_number_is_the_fewest() {
     assert!(proven > 500 && none > 100);
 }
 
-/// Checks the highest target SIR of any number of relays: it is met, and a slightly higher one is not. The second
-/// claim holds only without a least separation.
+/// Checks the highest target SIR that [`Most`] reports over all numbers of relays. A chain meets this target. Without a
+/// minimum separation, no number of relays meets a target higher by 0.1 %.
 #[test]
 fn no_number_of_relays_exceeds_the_reported_maximum() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(603));

@@ -20,7 +20,7 @@ fn undisturbed(setup: &Setup) -> Vec<f32> {
 
 /// Checks that a relay that was switched off for a while gets its position back.
 ///
-/// Meanwhile its neighbours have moved closer, but only as far as the silent relay's drone permits.
+/// While the relay is silent its drone still hovers. The neighbours move closer, but keep clear of the drone.
 #[test]
 fn a_relay_returning_between_two_others_gets_its_position() {
     for silent in 1..=8 {

@@ -19,7 +19,7 @@ fn paper(relays: u16) -> Setup {
     Setup::on_shared_channel(mission(relays))
 }
 
-/// Runs `setup`. Checks that the relays `left` end at the positions of a chain of only these relays.
+/// Runs `setup`. Checks that the surviving relays `left` end at the positions of a chain of only these relays.
 fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
     let outcome = run(setup.clone()).unwrap();
     assert_eq!(outcome.ending, Ending::Settled, "{name}");
@@ -27,7 +27,7 @@ fn settles(setup: &Setup, left: &[u16], name: &str) -> Outcome {
     outcome
 }
 
-/// Checks that the relays `left` have the positions of a chain of only these relays.
+/// Checks that the surviving relays `left` have the positions of a chain of only these relays.
 ///
 /// Returns the difference as an error.
 fn judge(setup: &Setup, outcome: &Outcome, left: &[u16]) -> Result<(), String> {

@@ -24,7 +24,7 @@ const FIRST: u16 = 64;
 /// reboot. A leader's next number is above its last one by at most this difference.
 const NEAR: u16 = 32;
 
-/// Returns the number that messages along the chain add to the mission digest in a membership view.
+/// Returns the mark of a membership view: passes carry the mission digest plus this mark.
 ///
 /// It is the lower half of the view's 32-bit name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {

@@ -149,7 +149,8 @@ impl Wires {
 
     /// Removes and returns a frame in transit on `line`, one direction of a link.
     ///
-    /// The frame is `behind` frames after the next one. If there are not as many, it is the last frame.
+    /// The frame overtakes `behind` frames in transit; with 0 it is the next frame to arrive. If there are not as many,
+    /// it is the last frame.
     pub(crate) fn take(&mut self, line: usize, behind: u8) -> Option<Flying> {
         let flying = &mut self.lines[line].flying;
         let last = flying.len().checked_sub(1)?;

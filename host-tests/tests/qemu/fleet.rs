@@ -32,12 +32,16 @@ const START: Duration = Duration::from_secs(30);
 /// Time added to the timeout for each drone, since all drones share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
-/// Firmware image: for wires, for a radio, the smallest (Algorithm 1 only), or with asynchronous ports.
+/// Firmware image of an emulated drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Image {
+    /// Image with a UART to each neighbour.
     Wires,
+    /// Image with one UART, to a radio on a shared channel.
     Radio,
+    /// Image with a UART to each neighbour, and with Algorithm 1 only.
     Smallest,
+    /// Image with asynchronous ports.
     Asynchronous,
 }
 

@@ -183,7 +183,8 @@ impl Vehicle {
         self.granted && now >= self.elsewhere_until
     }
 
-    /// Reads a status text for the operator. If the text asks for another mode, the pilot chooses one for a while.
+    /// Reads a status text for the operator. If the text asks the pilot to choose another mode, the vehicle leaves
+    /// OFFBOARD or GUIDED for 1.5 s.
     fn read_status_text(&mut self, text: String) {
         if self.granted && text == "relay: waits, choose another mode first" {
             self.elsewhere_until = self.now() + ELSEWHERE;

@@ -165,7 +165,7 @@ mod as_nb {
     }
 }
 
-/// End of a medium as a port of `embedded_io`. It panics where a real port would block.
+/// Port of `embedded_io` at one end of a simulated medium. It panics where a real port would block.
 pub(crate) struct IoEnd {
     pub(crate) end: End,
     pub(crate) trouble: ReadErrors,

@@ -99,7 +99,7 @@ fn judge(
     ledger::judge(setup, outcome, &left(outcome), version, config)
 }
 
-/// Runs `setup`. Checks that all relays that are left use mission `version` with `config` in the end.
+/// Runs `setup`. Checks that all surviving relays use mission `version` with `config` in the end.
 fn flies(setup: &Setup, version: u16, config: MissionConfig, name: &str) -> Outcome {
     let outcome = run(setup.clone()).unwrap();
     judge(setup, &outcome, version, config).unwrap_or_else(|what| panic!("{name}: {what}"));

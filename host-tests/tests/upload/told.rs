@@ -232,8 +232,9 @@ fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     }
 }
 
-/// Checks that a single relay's refusal reaches the ground station. A newer upload must clear the refusal. Only one
-/// relay, at any place in the chain, refuses, because only this relay has a geofence.
+/// Checks that the ground station learns that one relay of the chain refuses the uploaded mission. This relay, at any
+/// place in the chain, refuses because only it has a geofence. A newer mission that fits its geofence must clear the
+/// refusal.
 #[test]
 fn a_refusal_of_a_far_relay_reaches_the_ground() {
     let base = at_120(5, Band::at(120.0));

@@ -440,7 +440,8 @@ impl Air {
         self.kind.copied.filter(|_| at == all).unwrap_or(at)
     }
 
-    /// Returns the observed states of all relays except the copied one and its copy.
+    /// Returns the observed states of all relays but the duplicated one and its duplicate. The duplicate is a second
+    /// drone with the same node number.
     fn uncopied(&self) -> Vec<ObservedState> {
         let drones = (0..self.drones.len()).filter(|at| Some(self.place(*at)) != self.kind.copied);
         drones.map(|at| self.seen[at]).collect()

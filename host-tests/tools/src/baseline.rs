@@ -18,7 +18,7 @@ pub const DRAWS: u32 = 1000;
 /// Mean results of many chains whose relays are at random positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
-    /// Mean SIR of the worst hop, linear.
+    /// Mean over the random chains of the worst hop's SIR, linear.
     pub sir: f64,
     /// Standard error of the mean SIR, linear.
     pub error: f64,

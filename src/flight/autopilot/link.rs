@@ -880,7 +880,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Switches to the line between the Tx and Rx positions of the relay's mission, if these have changed.
+    /// Replaces this link's line from Tx to Rx by that of the relay's mission, if the two differ.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

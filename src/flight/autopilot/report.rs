@@ -22,9 +22,9 @@ const SPACING: Duration = Duration::from_millis(10_000);
 /// Maximum number of different lines of text sent within [`SPACING`].
 const RECENT: usize = 16;
 
-/// Capacity of the queue of the link's own lines of text to the operator.
+/// Maximum number of queued text lines to the operator that this link itself has written.
 const LINES: usize = 6;
-/// Capacity of the queue of the firmware's lines of text to the operator.
+/// Maximum number of queued text lines to the operator that the firmware has written.
 const TEXTS: usize = 3;
 
 /// Interval at which the numbers (SIR and position) are sent to the operator.

@@ -72,8 +72,8 @@ fn a_start_outside_the_geofence_goes_no_farther_out() {
 }
 
 /// Checks that relays too close along x to tell their order count as in order only if they may pass. Their reported x
-/// differ by less than the errors of the reports. They may pass each other if lateral offset and altitude keep them
-/// the separation apart.
+/// differ by less than the errors of the reports. They may pass each other if lateral offset and altitude keep them at
+/// least the separation apart.
 #[test]
 fn relays_within_the_error_are_in_order_if_they_may_pass() {
     for (up_m, may_pass) in [(0.0, false), (9.9, false), (10.1, true)] {

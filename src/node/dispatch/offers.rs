@@ -82,8 +82,8 @@ impl Node {
         Some((to, Message::Hello(hello)))
     }
 
-    /// Returns true if `offer_number` is the number of a recent hello of this relay. Otherwise counts the offer as
-    /// stale.
+    /// Returns true if an offer with the number `offer_number` answers a recent hello of this relay. Each hello has a
+    /// number, which the offer repeats. Any other offer is counted as stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers

@@ -1,9 +1,9 @@
 //! Damping of flapping links: how long a node must be heard before it is selected or reported as heard.
 //!
-//! Each side counts the losses of the links to its four nearest nodes. A link with more than two losses is held down: its node is
-//! neither selected nor reported as heard until it has been heard without a gap for `dead_after`, and for twice as long after
-//! every further loss, up to six times `dead_after`. Hellos omit links that are held down, so that no other relay makes room for
-//! a node that could not be linked.
+//! Each side counts how often it has lost the links to its four nearest nodes. A loss is that of the link, not of a frame. A link
+//! with more than two losses is held down: its node is neither selected nor reported as heard until it has been heard without a
+//! gap for `dead_after`, and for twice as long after every further loss, up to six times `dead_after`. Hellos omit links that are
+//! held down, so that no other relay makes room for a node that could not be linked.
 //!
 //! A gap is a silence of more than `dead_after`. While the side has no neighbour and hears nobody, it is one of more than eight
 //! times `dead_after`: such a side asks every `dead_after` only, so a few lost frames make a silence of several times that.
@@ -64,7 +64,7 @@ impl Heard {
     }
 }
 
-/// Losses of the link to one node. A link with many recent losses counts as flapping, and is not used for a while.
+/// State of the link to one node. A link that was lost often recently is flapping, and is not used for a while.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     /// Time at which the link was lost last.
@@ -92,7 +92,7 @@ impl Link {
         }
     }
 
-    /// Returns the number of losses of the link; 0 if the last loss was long ago.
+    /// Returns how many times the link was lost; 0 if the last loss was long ago.
     #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
@@ -180,7 +180,7 @@ impl Damping {
         }
     }
 
-    /// Records a frame from the node `distance` relays away, and detects losses by the silence before it.
+    /// Records a frame of the node `distance` relays away. A long silence before it is a loss of the link.
     /// `searching_since` is the start of the search, `None` if this side has a neighbour. During a search, a link
     /// counts as lost if its node has answered and then was silent for longer than `gap`.
     pub(super) fn record_hello(
@@ -310,8 +310,8 @@ mod tests {
         (Damping::new(now), now, Settings::default())
     }
 
-    /// Simulates a loss of the link to the nearest node for 40 s. The nodes at the distances `heard` answer the
-    /// search meanwhile.
+    /// Simulates a loss of the link to the nearest node for 40 s. Meanwhile this side searches for a neighbour, and the
+    /// nodes `heard` answer. They are given by their distances, in relays.
     fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
         let search = *now;
         side.record_loss(1, true, search, settings);

@@ -9,15 +9,16 @@ pub(crate) const CANDIDATES: u16 = 4;
 /// Minimum interval between two reports about the same node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Numbers of times in a row that an event has occurred, for each of the four nearest nodes.
+/// Counts of consecutive events, one for each of the four nearest nodes. An event is, for example, a handshake signed
+/// with another key.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
 impl ConsecutiveCounts {
     pub(super) const NONE: Self = Self([0; CANDIDATES as usize]);
 
-    /// Counts an event of the node `distance` relays away; resets the count if `occurred` is false. Returns true if
-    /// the count reaches `most` now.
+    /// Counts an event at the node `distance` relays away; resets the count if `occurred` is false. Returns true at the
+    /// `most`-th event in a row.
     pub(super) fn count(&mut self, distance: u16, occurred: bool, most: u8) -> bool {
         let at = usize::from(distance).wrapping_sub(1);
         let Some(times) = self.0.get_mut(at) else {

@@ -8,9 +8,9 @@
 //! | `NoPeer` | - | - | selected unless its link is held down: at once if it has selected this relay, else after `probe_after` | hello to the four nearest nodes every `dead_after`, every half of `probe_after` once one was heard |
 //!
 //! A span is `dead_after` less `probe_after`, or the longest plausible run of lost frames on this channel if that is longer. A
-//! selected node is `Pairing` until its hello names this relay and reports hearing it, or any other message arrives from it: then
-//! it is `Linked`. A hello of the linked node that names this relay but does not report hearing it changes nothing, because a run
-//! of lost frames is measured by silence. A node that has selected another one is not selected.
+//! selected neighbour is `Pairing` until its hello names this relay and reports hearing it, or any other message arrives from it:
+//! then it is `Linked`. A hello of the linked node that names this relay but does not report hearing it changes nothing, because
+//! a run of lost frames is measured by silence. A node that has selected another one is not selected.
 //!
 //! *Better* is a nearer node that is heard by the node beyond it. A farther node is better if it leads to more relays than the
 //! neighbour, or to all relays that the last view had beyond the neighbour: then the link on the neighbour's other side is
@@ -55,26 +55,26 @@ pub(crate) struct Neighbour {
     /// Node number of the selected neighbour, 0 for none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// Time before which a newly selected node causes no request for a new view. Another relay, on the far side of
-    /// that node, may be about to select the node, too, and one view change for both is enough.
+    /// End of the grace period after the selection of a neighbour; until then no new view is requested. The relay on
+    /// the neighbour's other side may be about to select the neighbour, too. One view change for both is enough.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
     /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
     dropped: u16,
-    /// Previous neighbour, which a nearer node has replaced as the selected node; 0 for none.
+    /// Previous neighbour, which a nearer node has replaced; 0 for none.
     replaced: u16,
     /// Start of the last search for a neighbour.
     searches_since: Instant,
-    /// Distance to the selected node, in relays along the chain: 1 for the next node number.
+    /// Distance to the selected neighbour, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
     /// Nodes on this side that have recently reported that they receive this relay.
     pub(super) two_way: Hearing,
     /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
     /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame from a node on this side that is not selected; `None` before any.
+    /// Time of the last frame on this side from a node other than the neighbour; `None` before any.
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
@@ -93,7 +93,7 @@ pub(crate) struct Neighbour {
     patience: Duration,
     jitter: Jitter,
     pub(super) heartbeat: PendingHeartbeat,
-    /// Newest mission that the selected node has reported to have stored; `None` before its first report.
+    /// Newest mission that the neighbour has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
     /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` on a side that
     /// needs neither.
@@ -182,12 +182,12 @@ impl Neighbour {
         now < self.grace
     }
 
-    /// Returns true if the selected node has been received and is not lost.
+    /// Returns true if the selected neighbour has been received and is not lost.
     pub(crate) const fn is_present(&self) -> bool {
         self.liveness.is_present()
     }
 
-    /// Returns true if the selected node is lost, and nothing has been received from it since.
+    /// Returns true if the selected neighbour is lost, and nothing has been received from it since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.liveness.is_silent()
     }
@@ -206,8 +206,8 @@ impl Neighbour {
         back
     }
 
-    /// Returns true if this relay and the selected node have selected each other. The node's last report shows its
-    /// selection.
+    /// Returns true if this relay and the selected neighbour have selected each other. The neighbour's last report
+    /// shows its selection.
     pub(crate) fn is_mutual(&self) -> bool {
         self.state == NeighbourState::Linked
     }
@@ -228,7 +228,7 @@ impl Neighbour {
         true
     }
 
-    /// Returns true if the selected node must be reported as found now, and marks it as reported.
+    /// Returns true if the selected neighbour must be reported as found now, and marks it as reported.
     pub(crate) const fn should_report_found(&mut self) -> bool {
         let before = self.reported_found;
         self.reported_found |= mask(self.distance);
@@ -379,7 +379,7 @@ impl Neighbour {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the selected node and searches again, because the relays that can be reached have no quorum.
+    /// Drops the neighbour and searches again, because the relays that can be reached have no quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -468,11 +468,11 @@ pub(crate) struct Candidate {
     pub(crate) downstream: bool,
     /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
-    /// True if the candidate is nearer than the selected node.
+    /// True if the candidate is nearer than the selected neighbour.
     pub(crate) nearer: bool,
-    /// True if the candidate can be inserted between this relay and the selected node, by its own report.
+    /// True if the candidate can be inserted between this relay and the neighbour, by its own report.
     pub(crate) ready: bool,
-    /// True if more relays can be reached through the candidate than through the selected node.
+    /// True if more relays can be reached through the candidate than through the selected neighbour.
     pub(crate) longer: bool,
 }
 
@@ -483,8 +483,8 @@ impl Candidate {
         self.distance.saturating_sub(2)
     }
 
-    /// Returns true if the candidate should replace the selected node. A nearer candidate must be `ready`, a farther
-    /// one must lead to more relays.
+    /// Returns true if the candidate should replace the selected neighbour. A nearer candidate must be `ready`, a
+    /// farther one must lead to more relays.
     pub(super) const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }

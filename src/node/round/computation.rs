@@ -367,7 +367,8 @@ pub(crate) enum LeaderTask {
     Predicting(Planner),
     /// Solution of the whole chain by the joint method. Every relay computes it for itself.
     Solving(ChainSolver),
-    /// Search for the highest feasible target SIR, by sweeps with fixed lateral offsets and altitudes.
+    /// Search for the highest target SIR that the chain meets, by sweeps (messages along the chain). Lateral offsets
+    /// and altitudes are fixed meanwhile.
     Searching {
         search: Search,
         /// True if the method of the settings ends with this search, and no other algorithm follows.

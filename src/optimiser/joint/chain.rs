@@ -53,9 +53,10 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// Returns c of the hop to relay `index`: its target SIR over its gain. c determines the hop's maximum length.
-    /// With noise c includes the factor 1 + noise / interference at the sender's position `from`, because the
-    /// position of the relay is not chosen yet.
+    /// Returns the target SIR over the sender's gain for the hop to relay `index`; c in the formulas. The gain is the
+    /// sender's power relative to the interferer's. c determines the hop's maximum length. With noise c includes the
+    /// factor 1 + noise / interference at the sender's position `from`, because the position of relay `index` is not
+    /// chosen yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -76,8 +77,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 
     /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
-    /// first and after the last of those relays it is constant if `level` is true, and otherwise goes down to the
-    /// lowest altitude at Tx and Rx.
+    /// first and after the last of those relays the altitude is constant if `level` is true. Otherwise it falls to the
+    /// band's lowest altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.mission.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));

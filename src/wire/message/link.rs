@@ -133,15 +133,15 @@ impl Hello {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node; of two nodes with one number, the larger claim wins. It is drawn at
+    /// Random claim number of the claiming node; of two nodes with one node number, the larger one wins. It is drawn at
     /// the node's start, and raised at most once while the node is active.
     pub number: u32,
-    /// Last claim number that the claiming node received from another node with its number; 0 for none.
+    /// Last claim number received from another node with the claiming node's node number; 0 for none.
     pub other_number: u32,
-    /// True if the claiming node is passive because another node uses its number.
+    /// True if the claiming node is passive because another node uses its node number.
     pub passive: bool,
-    /// True for an echo: the sender returns a claim of a node that has the destination's number. If two nodes have
-    /// that number, both receive the echo, and so the claim of the other one.
+    /// True for an echo: the sender returns a claim of a node that has the destination's node number. If two nodes have
+    /// that node number, both receive the echo, and so the claim of the other one.
     pub echo: bool,
 }
 

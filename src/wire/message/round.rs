@@ -32,8 +32,8 @@ pub struct Sweep {
     pub relay: Station,
     /// True if relays use the lateral offsets and altitudes of the joint method. False for the configured ones.
     pub chosen: bool,
-    /// Upsilon = E[1/I] measured by the sender at its position, 1/W. `None` if receivers must use the field, the
-    /// mission's known distribution of interference along x.
+    /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if
+    /// receivers must use the field, the mission's known distribution of interference along x.
     pub measured_per_w: Option<f32>,
     /// Farthest x in the direction of the pass at which the sender meets each target SIR, m. The list begins with the
     /// lowest target, and ends at the first one that cannot be met.

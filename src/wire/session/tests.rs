@@ -221,7 +221,8 @@ fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     assert_eq!(check(&mut own, &still), Checked::Fresh { first: false });
 }
 
-/// Checks that replayed handshakes of many nodes replace only entries of unproven nodes.
+/// Checks that replayed handshakes of many nodes evict no known node from the session table. They replace only entries
+/// of nodes that have not proved their presence.
 #[test]
 fn recorded_handshakes_do_not_replace_known_nodes() {
     let mut handshakes = Vec::new();

@@ -103,9 +103,10 @@ impl Hostile {
         all.max().unwrap_or(Instant::ZERO)
     }
 
-    /// Checks that the options fit together and to a chain of `uavs` relays.
+    /// Checks that the options are consistent with each other and with a chain of `uavs` relays.
     ///
-    /// `is_loop` is true if `--closed-loop` is given, which excludes failures, attacks, uploads and drones.
+    /// `is_loop` is true if `--closed-loop` is given. Options for failures, attacks, uploads or simulated drones are
+    /// then errors.
     pub fn agree(&self, uavs: u16, is_loop: bool) -> Result<(), Failure> {
         for (name, ones) in [("--kill", &self.kill), ("--boot", &self.boot)] {
             if let Some(one) = ones.iter().find(|one| !(1..=uavs).contains(&one.index)) {

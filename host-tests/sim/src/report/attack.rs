@@ -42,9 +42,9 @@ pub struct AttackReport {
     /// Number of positions that relays accepted for target SIRs that do not occur without the attack. It shows that
     /// the attack misled the relays.
     pub misled: u64,
-    /// Number of views (memberships of the chain) that relays accepted.
+    /// Number of different views (memberships of the chain) that the relays accepted.
     pub formed: u64,
-    /// Number of views (memberships of the chain) that relays accept without the attack.
+    /// Number of different views (memberships of the chain) that the relays accept without the attack.
     pub formed_without: u64,
     /// Number of setpoints outside of the mission's limits. Nonzero is a bug.
     pub unsafe_setpoints: u64,

@@ -389,7 +389,7 @@ fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
         .all(|(place, (_, relay))| relay.index == place && usize::from(relay.relays) == part.len())
 }
 
-/// Returns a report about each relay that has left the chain. `left` has the relays that remain in it.
+/// Returns a report about each relay that has left the chain. `left` lists the relays that remain in it.
 pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostReport> {
     (1..)
         .zip(&outcome.relays)

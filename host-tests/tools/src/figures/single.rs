@@ -132,16 +132,16 @@ const NEAR: f64 = 0.5;
 /// Interpretation of the paper's "average gain": the quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// Average gain as the mean, over the altitudes, of the gains in linear SIR.
+    /// Average gain: the gain in linear SIR at each altitude, averaged over the altitudes.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Average gain as the gain of the mean linear SIR over the altitudes.
+    /// Average gain: the gain in linear SIR after the SIRs are averaged over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
-    /// Average gain as the gain of the mean SIR in dB over the altitudes.
+    /// Average gain: the gain after the SIRs in dB are averaged over the altitudes.
     #[serde(rename = "gain of mean dB")]
     Decibels,
-    /// Average gain as the gain of the mean log2(1 + SIR) over the altitudes.
+    /// Average gain: the gain after log2(1 + SIR) is averaged over the altitudes.
     #[serde(rename = "gain of mean log2(1 + SIR)")]
     Rates,
 }

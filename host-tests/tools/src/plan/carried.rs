@@ -143,7 +143,7 @@ impl<'a> Carried<'a> {
 
     /// Returns `plan`, marked as proven if it is proven that no positions carry more data.
     ///
-    /// There is no such proof for time slots as long as each hop needs.
+    /// A plan in fitted slots, each as long as its hop needs, is never marked: there is no proof for it.
     #[must_use]
     pub fn proven(&self, plan: Plan) -> Plan {
         let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);

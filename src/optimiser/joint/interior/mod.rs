@@ -137,13 +137,13 @@ impl Spot {
         }
     }
 
-    /// Returns how far x, y and h are above their lower limits.
-    fn below(&self) -> Triple {
+    /// Returns the distances of x, y and h from their lower limits.
+    fn room_below(&self) -> Triple {
         minus(self.at, self.low)
     }
 
-    /// Returns how far x, y and h are below their upper limits.
-    fn above(&self) -> Triple {
+    /// Returns the distances of x, y and h from their upper limits.
+    fn room_above(&self) -> Triple {
         minus(self.high, self.at)
     }
 
@@ -441,7 +441,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             self.least = self.least.min(a).min(b);
             self.hop(relays, k).level = both;
             let mut inside = 1.0;
-            for (a, b) in spot.below().iter().zip(&spot.above()) {
+            for (a, b) in spot.room_below().iter().zip(&spot.room_above()) {
                 if *a > 0.0 && *b > 0.0 {
                     inside *= a * b;
                 }
@@ -592,8 +592,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         (hop, weights)
     }
 
-    /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the rows of the relay after
-    /// them, or `None` if a pivot is not positive. `factors` receives the results of the last six eliminated relays.
+    /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the system's rows for the next
+    /// relay, or `None` if a pivot is not positive. `factors` receives the factors of the last six eliminated relays.
     #[inline(never)]
     fn eliminate(
         &mut self,
@@ -708,7 +708,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Shortens the Newton steps of all relays, so that the relay at `spot` stays within its limits. `step` is that
     /// relay's whole step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
-        let spans = (spot.below(), spot.above());
+        let spans = (spot.room_below(), spot.room_above());
         for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
             let room = if *step < 0.0 { below } else { above };
             let most = NEAR_BOX * room / step.abs();

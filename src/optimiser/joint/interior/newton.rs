@@ -153,7 +153,7 @@ impl Front {
 
     /// Adds the derivatives of the barrier that keeps the relay at `spot` between its limits.
     fn enclose(&mut self, mu: f32, spot: &Spot) {
-        let ([a, b, c], [d, e, f]) = (spot.below(), spot.above());
+        let ([a, b, c], [d, e, f]) = (spot.room_below(), spot.room_above());
         let [xx, _, _, yy, _, hh] = &mut self.bend;
         let [x, y, h] = &mut self.slope;
         barrier(mu, a, d, x, xx);

@@ -254,8 +254,9 @@ pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the current trial move: relay, kind of move, and number of halvings. Kinds 0 to 3 are down, up, left
-    /// and right; 4 and 5 take the lateral offset and altitude of the relay two ahead or two back.
+    /// Returns the current trial move: relay, kind of move, and number of halvings of its length. Kinds 0 to 3 move the
+    /// relay down, up, left or right. Kinds 4 and 5 copy the lateral offset and altitude of the relay with an index
+    /// larger, or smaller, by 2.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);

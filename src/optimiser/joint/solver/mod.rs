@@ -80,7 +80,7 @@ enum Work {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search raises the target during the improvement of a chain, while its relays stay.
+    /// The search raises the target as far as the chain meets it without further moves of its relays.
     Raise,
     /// The work computes the chain's slack (spare length at Rx) again, after the slack's cap was lowered.
     Tighten,
