@@ -90,10 +90,11 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was rejected, and this relay keeps its present one. The new mission's distance does not fit
-    /// its Tx and Rx positions on earth, or the mission exceeds this relay's own geofence, or it has fitted slots that
-    /// the settings do not allow. The ground station is informed. Raised once for each such mission. Upload one whose
-    /// Tx and Rx positions are as far apart as its distance, within the geofence, and with slots for the relays' method.
+    /// A newer mission was rejected, and this relay keeps its present one. The new mission's distance does not fit its
+    /// Tx and Rx positions on earth, or the mission exceeds this relay's own geofence, or it has fitted slots (as long
+    /// as each hop needs) that the settings do not allow. The ground station is informed. Raised once for each such
+    /// mission. Upload one whose Tx and Rx positions are as far apart as its distance, within the geofence, and with
+    /// slots for the relays' method.
     UploadRefused {
         /// Reason for which the mission was rejected.
         why: LineError,

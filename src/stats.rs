@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Stats {
-    /// Frames passed to the link, including retransmissions.
+    /// Frames given to the link for transmission, including retransmissions.
     pub sent: u32,
     /// Retransmissions of proposals, and of messages that travel along the chain, after a missing reply.
     pub repeats: u32,

@@ -25,7 +25,7 @@ impl Answerer {
         }
     }
 
-    /// Processes a received `byte`. If it completes a frame, the answer is passed to `send`.
+    /// Processes a received `byte`. If it completes a frame, calls `send` with the answer.
     pub fn hear(&mut self, byte: u8, mut send: impl FnMut(&[u8])) {
         let decoded = match self.deframer.push(byte) {
             None => return,

@@ -314,7 +314,8 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// Adds the SNR gap of the file's fitted slots, if it has any, to the options `given`.
+/// Adds the SNR gap of the file's fitted slots, if it has any, to the options `given`. A fitted slot is a time slot as
+/// long as its hop needs.
 fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), String> {
     let error = |refusal: mission::Refusal| refusal.to_string();
     let (mission, _) = mission::mission(scenario, 1, TOLERANCE).map_err(error)?;

@@ -28,7 +28,7 @@ pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 /// Permitted range of `--reverse`: SIR needed toward the transmitter / SIR needed toward the receiver.
 pub const REVERSE: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--fitted-gap` above 0: SNR gap of fitted slots, linear.
+/// Permitted range of `--fitted-gap` above 0: linear SNR gap, for time slots as long as each hop needs.
 pub const FITTED_GAP: [f32; 2] = [1.0, 1e3];
 
 fn fitted_gap(text: &str) -> Result<f32, String> {

@@ -37,7 +37,7 @@ struct CaptureState {
     is_reported: AtomicBool,
 }
 
-/// Capture of one port, which passes the port's traffic to the writer thread of the capture file.
+/// Capture of one port, which gives the port's traffic to the writer thread of the capture file.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,

@@ -19,7 +19,7 @@ local messages = {
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "own", kind = "bool", unit = "", text = "true if the sender or a relay after it has a profile of its own: another power than the mission's common one, or a fixed altitude where relays choose theirs" },
         { name = "commit", kind = "option", of = { kind = "u8" }, unit = "", text = "index of the target for which every relay now takes its position" },
-        { name = "slack_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m", text = "slack of target 0, 1, ...: distance by which the chain overshoots Rx, in a field Tx" },
+        { name = "slack_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m", text = "slack of target 0, 1, ...: distance by which the chain overshoots Rx (in a field: Tx)" },
         { name = "required_x_m", kind = "option", of = { kind = "f32" }, unit = "m from Tx", text = "required position of the receiver if a target is committed; none: its own reach for that target" },
     } },
     [0x02] = { name = "Busy", fields = {

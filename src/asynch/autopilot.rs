@@ -25,9 +25,9 @@ const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
 ///
-/// One task runs the port, others pass events to the link or wait for its events. The link passes the drone's position and control
-/// state to the relay, and the setpoint to the autopilot. All tasks belong to the executor that runs the relay's ports, as with
-/// [`AsyncRelay`].
+/// One task runs the port, others give events to the link or wait for its events. The link gives the drone's position
+/// and control state to the relay, and the setpoint to the autopilot. All tasks belong to the executor that runs the
+/// relay's ports, as with [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
     /// Signal that wakes the future which exchanges data with the relay. It is raised after received bytes and events

@@ -105,7 +105,7 @@ impl<R, W, D> AsyncLink<R, W, D> {
     }
 }
 
-/// Reads bytes from a port and passes them to the relay, forever.
+/// Reads bytes from a port and gives them to the relay, forever.
 async fn receive<R: Read>(
     rx: &mut R,
     port: Port,

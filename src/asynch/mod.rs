@@ -23,8 +23,8 @@
 //!
 //! # Cancellation
 //! `run` may be dropped at any `await`, and called again with the same links.
-//! - *Received bytes*: none are lost in `run`, because they are passed to the relay before the next `await`. Whether a dropped
-//!   `read` loses bytes depends on the reader; Embassy's buffered UARTs do not.
+//! - *Received bytes*: none are lost in `run`, because the relay gets them before the next `await`. Whether a dropped `read`
+//!   loses bytes depends on the reader; Embassy's buffered UARTs do not.
 //! - *Frames*: the frame being written is lost, and the next one starts with a delimiter, so that no receiver joins the two.
 //!   Queued frames are still sent. The relay retransmits what matters.
 //! - *Pin*: it keeps its level until the next `run` sets it.

@@ -363,9 +363,9 @@ impl KeepOut {
         });
     }
 
-    /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Those beyond are
-    /// behind `node`, and so no obstacles for this relay. The obstacles are lost relays, or drones that do not fly to
-    /// setpoints.
+    /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Nodes beyond `node` are
+    /// no obstacles for this relay, because `node` is between. The obstacles are lost relays, or drones that do not fly
+    /// to setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,

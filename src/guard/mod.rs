@@ -293,7 +293,8 @@ impl Guard {
     /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` before there is an agreed
     /// position and a report.
     ///
-    /// `now` is the time at which the setpoint is passed on: the relay flies toward it within [`GuardConfig::lag`].
+    /// `now` is the time at which the autopilot gets the setpoint: the drone flies toward it within
+    /// [`GuardConfig::lag`].
     pub fn steer(&mut self, now: Instant) -> Option<Placement> {
         let target = self.own.target?;
         let Some(before) = self.own.setpoint else {

@@ -63,7 +63,7 @@ impl Member {
     }
 }
 
-/// State of the relay that is passed to every protocol layer.
+/// State of the relay that every protocol layer receives as an argument.
 #[derive(Clone, Copy)]
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
@@ -94,7 +94,8 @@ impl<'a> Context<'a> {
     }
 
     /// Returns true if every relay solves the whole chain by the joint method. The settings must select this method,
-    /// and the mission must leave the lateral offset or the altitude free, or have fitted slots.
+    /// and the mission must leave the lateral offset or the altitude free, or have fitted slots (as long as each hop
+    /// needs).
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();

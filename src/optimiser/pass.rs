@@ -73,7 +73,8 @@ pub struct Link<'a> {
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
     /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// x that this relay takes for every target that its hop meets there, m. Only for fitted slots; else `None`.
+    /// x that this relay takes for every target that its hop meets there, m. Only for fitted slots (time slots as long
+    /// as each hop needs); else `None`.
     pub fixed_m: Option<f32>,
 }
 

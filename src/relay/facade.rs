@@ -450,8 +450,8 @@ impl Relay {
 
     /// Returns false if the drone and a neighbour that flies to setpoints are in the wrong order along x.
     ///
-    /// The pilot must then first fly the drone to its own side of that neighbour. `Autopilot::exchange` passes the
-    /// value on.
+    /// The pilot must then first fly the drone to its own side of that neighbour. `Autopilot::exchange` gives this
+    /// value to the autopilot link.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -722,8 +722,8 @@ impl Relay {
     /// Reports that the other node with this relay's node number is gone. See
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim above that of the other
-    /// node. Takes constant time.
+    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above that of the
+    /// other node. Takes constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }

@@ -318,8 +318,8 @@ impl AtomicSlot for AtomicU16 {
     }
 }
 
-/// Indices of a ring buffer: its first item, and the end behind its last item. The ring is empty if they are equal,
-/// so one cell is never used.
+/// Indices of a ring buffer: its first item, and the cell after its last item. The ring is empty if they are equal, so
+/// one cell is never used.
 #[derive(Debug)]
 pub(super) struct RingIndices {
     first: AtomicUsize,

@@ -37,8 +37,8 @@
 //! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 without a field |
 //! | 116 | f32 | largest measurable interference, W; 0 without samples |
 //! | 120 | u32 | samples at each position; 0 without measurement |
-//! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 behind the last one |
-//! | 128 + 8 k | f32 | Upsilon of point k, 1/W; 0 behind the last one |
+//! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 after the last point |
+//! | 128 + 8 k | f32 | Upsilon of point k, 1/W; 0 after the last point |
 //! | 252 | u32 | smallest epoch for signing, 1 to 4294967294; 0 without a key |
 //! | 256 | 32 bytes | the network's signing key; all 0 without one |
 //! | 288 | i32 | latitude of the transmitter, 1e-7 degrees; this and the next five are 0 without an autopilot |

@@ -165,7 +165,7 @@ pub enum ConfigError {
     Interferer,
     /// Number of points of the interference's distribution along x exceeds the capacity of a block.
     Points,
-    /// Error: bytes behind the last point of the interference's distribution along x are not 0.
+    /// Error: bytes after the last point of the interference's distribution along x are not 0.
     Unused,
     /// Error: a signing key without an epoch, an epoch without a key, or an epoch of 4294967295.
     Secret,

@@ -31,7 +31,7 @@ pub trait Flash {
     /// Returns the number of words in use in a sector: up to the last word that is not [`BLANK`].
     fn used(&mut self, sector: usize) -> usize;
 
-    /// Returns the word number `word` of a sector; [`BLANK`] behind the sector's end.
+    /// Returns the word number `word` of a sector; [`BLANK`] after the sector's end.
     fn read(&mut self, sector: usize, word: usize) -> u32;
 
     /// Erases a sector.
@@ -107,7 +107,7 @@ impl<F: Flash> Journal<F> {
 
     /// Returns the payload of the newest record, if any. `WORDS` must be the payload's length, words.
     ///
-    /// Work: linear in the words of the sectors, and a CRC for the newest record and each one behind it.
+    /// Work: linear in the words of the sectors, and a CRC for the newest record and each one stored after it.
     pub fn newest<const WORDS: usize>(&mut self) -> Option<[u32; WORDS]> {
         let mut payload = [BLANK; WORDS];
         self.read_newest(&mut payload)?;

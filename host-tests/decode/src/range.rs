@@ -19,7 +19,7 @@ pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
 
 /// Returns true if the value is within the field's range in `FORMAT.md`.
 ///
-/// The text of a range may also state, behind a semicolon, a rule between several fields. Such rules are not checked
+/// The text of a range may also state, after a semicolon, a rule between several fields. Such rules are not checked
 /// here.
 fn is_within(field: &Field, value: &Value<'_>) -> bool {
     let all = |values: &[Value<'_>]| values.iter().all(|value| is_within(field, value));

@@ -161,7 +161,7 @@ impl Chain {
         }
     }
 
-    /// Moves the oldest frame in transit to relay `at` behind all others.
+    /// Delays the oldest frame in transit to relay `at`, so that all others overtake it.
     fn delay_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()

@@ -233,14 +233,14 @@ struct Scene {
 }
 
 impl Scene {
-    /// Creates a test scene with a single relay. If `tells` is true, the firmware passes the relay's events to the
+    /// Creates a test scene with a single relay. If `tells` is true, the firmware gives the relay's events to the
     /// autopilot link.
     fn new(tells: bool) -> Self {
         Self::of(1, tells)
     }
 
-    /// Creates a test scene with relay 1 of `relays`. If `tells` is true, the firmware passes the events of relay 1
-    /// to the autopilot link.
+    /// Creates a test scene with relay 1 of `relays`. If `tells` is true, the firmware gives the events of relay 1 to
+    /// the autopilot link.
     fn of(relays: u16, tells: bool) -> Self {
         let time = Time::default();
         let pool = LocalPool::new();
@@ -400,8 +400,8 @@ fn a_stuck_writer_does_not_stop_the_readers() {
 
 /// Checks that a relay forgets its lost neighbour on an operator's command.
 ///
-/// The operator sends the command because the neighbour's drone is gone. The firmware passes the relay's events to
-/// the autopilot link.
+/// The operator sends the command because the neighbour's drone is gone. The firmware gives the relay's events to the
+/// autopilot link.
 #[test]
 fn an_operator_clears_a_lost_relay() {
     let mut scene = Scene::of(2, true);

@@ -171,7 +171,7 @@ fn the_yaw_points_an_antenna_to_the_neighbour() {
     }
 }
 
-/// Checks that the autopilot link passes the radio's noise sample to the relay. The test's relay does not measure
+/// Checks that the autopilot link gives the radio's noise sample to the relay. The test's relay does not measure
 /// interference, so that it counts the sample as rejected.
 #[test]
 fn exchange_passes_the_radios_noise_to_the_relay() {

@@ -51,7 +51,7 @@ impl Bench {
     }
 }
 
-/// Returns the text behind `EVENT: ` in each log line about one event, where EVENT is the name `event`.
+/// Returns the text after `EVENT: ` in each log line about one event, where EVENT is the name `event`.
 fn lines_of_event(lines: &[String], event: &str) -> Vec<String> {
     let event = format!("  transmitter  {event}: ");
     let lines = lines.iter();

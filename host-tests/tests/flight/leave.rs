@@ -11,7 +11,8 @@ const LEAVES: WithoutQuorum = WithoutQuorum::Leave {
     up_m: 25.0,
 };
 
-/// Returns the relays' lateral offsets and altitudes, m: during a cut behind relay 3 and long after it.
+/// Returns the relays' lateral offsets and altitudes, m, during and long after a cut of the chain. The cut is
+/// downstream of relay 3.
 ///
 /// Relays without a quorum leave the line, sideways and upward. With `room`, the motion guard permits the positions
 /// to which they leave.

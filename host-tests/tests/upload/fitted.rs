@@ -8,7 +8,7 @@ use super::*;
 
 const ENDS: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns `base` with fitted slots.
+/// Returns `base` with fitted slots: time slots as long as each hop needs.
 fn fitted(base: &Mission) -> MissionConfig {
     MissionConfig {
         fitted_gap: 2.0,

@@ -49,8 +49,8 @@ fn fourth(differs: bool) -> Bench {
 
 /// Returns the message `name`: a collection of relays' profiles (altitude and power), or its result.
 ///
-/// The profiles are those of the relays `indices`. The collection has pass number `number`, and begins behind relay
-/// `after`.
+/// The profiles are those of the relays `indices`. The collection has pass number `number`, and begins with the relay
+/// after relay `after`.
 fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> WireMessage {
     let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
     let seats: Vec<_> = indices.iter().map(seat).collect();

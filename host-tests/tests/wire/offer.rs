@@ -21,7 +21,7 @@ const RELAYS: usize = 5;
 const NOISE: usize = 83;
 /// Offset of the return direction's fields in an offer's body, bytes. They are `reverse` and the power of Rx.
 const BACK: usize = 87;
-/// Offset of the SNR gap of fitted slots, bytes.
+/// Offset in an offer's body of the SNR gap of fitted slots, bytes.
 const GAP: usize = 95;
 const SITES_AT: usize = 99;
 

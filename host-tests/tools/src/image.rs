@@ -166,7 +166,7 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
 /// Joins the pieces of an image into one, with erased bytes in the gaps.
 ///
 /// # Errors
-/// The pieces overlap, or one begins more than [`LARGEST`] bytes behind the first.
+/// The pieces overlap, or one begins more than [`LARGEST`] bytes after the start of the first.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
     let first = pieces
         .first()

@@ -43,7 +43,7 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without one.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays have landed; `None` once this is passed to the relay.
+    /// Side whose lost relays have landed; `None` once the relay knows.
     cleared: Option<Side>,
 }
 
@@ -102,7 +102,7 @@ impl Clearance {
     }
 
     /// Returns true while an operator's command that reports landed relays is being processed. That ends when the
-    /// command is answered and its effect is passed to the relay.
+    /// command is answered and the relay knows that the lost relays have landed.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }

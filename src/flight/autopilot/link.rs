@@ -48,7 +48,7 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change to its report of the fence breach behind the change.
+/// Maximum time from an ArduCopter's mode change to its report of the fence breach that caused it.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
 /// Time for which a reason not to control the drone must last before the operator is told.
@@ -721,7 +721,7 @@ impl Autopilot {
         OffLine::new(at, &self.axis)
     }
 
-    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. The caller passes them to
+    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. The caller gives them to
     /// `Relay::handle_sample`. The measurement is the newest one that was taken in the air. `None` if there is no new
     /// one since the last call, or without the feature `sensing`.
     pub fn poll_sample(&mut self) -> Option<Sample> {

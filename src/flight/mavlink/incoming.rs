@@ -1,6 +1,6 @@
-//! Received messages and the parser of their byte stream. Senders are the autopilot and ground stations behind it.
+//! Received messages and the parser of their byte stream. Senders are the autopilot, and ground stations through it.
 //!
-//! After an invalid frame the parser continues with the byte after its first one, so no valid frame behind it is lost. A frame
+//! After an invalid frame the parser continues with the byte after its first one, so no valid frame after it is lost. A frame
 //! must have the id of a known message, so few false starts occur in noise and in other messages.
 
 use super::frame::{

@@ -334,8 +334,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that is passed to a protocol layer. It borrows only `member`, so that the layers can be
-    /// borrowed mutably at the same time.
+    /// Returns the state that a protocol layer receives as an argument. It borrows only `member`, so that the layers
+    /// can be borrowed mutably at the same time.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {

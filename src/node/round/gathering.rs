@@ -1,7 +1,8 @@
 //! Collection of the relays' profiles for the joint method.
 //!
 //! A roster has room for a few relays. A relay whose profile differs from the mission's common one appends it while there is
-//! room, and the result of the pass informs all relays. After a full roster the next pass continues behind its last relay.
+//! room, and the result of the pass informs all relays. After a full roster the next pass continues with the relay after the
+//! roster's last one.
 //!
 //! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
 

@@ -220,8 +220,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep with the data of the previous node. `behind` describes the previous relay, `None` if the
-    /// previous node is Tx or Rx; `from` has its farthest x for each target, m.
+    /// Starts a sweep with the data of its sender, the node before this relay on the pass. `behind` describes that
+    /// relay, `None` if the node is Tx or Rx; `from` has its farthest x for each target, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -344,8 +344,8 @@ impl SweepPass {
     }
 }
 
-/// Returns a checksum of the previous relay's data in a sweep. `behind` is `None` if the previous node is Tx or Rx,
-/// not a relay. The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
+/// Returns a checksum of the data of a sweep's sender. `behind` is `None` if the pass starts at this relay, next to Tx
+/// or Rx. The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
 pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     let values = behind.map_or([0.0; 3], |behind| {
         let Station {

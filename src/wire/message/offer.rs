@@ -57,7 +57,7 @@ struct OfferBody {
     noise_w: f32,
     /// Required SIR from Rx to Tx, relative to that from Tx to Rx, and transmit power of Rx in W.
     back: [f32; 2],
-    /// SNR gap of fitted slots; 0 for equal slots.
+    /// SNR gap of fitted time slots, each as long as its hop needs; 0 for equal slots.
     fitted_gap: f32,
     /// Positions of Tx and Rx, encoded by [`Sites::to_bytes`]; all 0 if the upload has none.
     sites: SitesBody,

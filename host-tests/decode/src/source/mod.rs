@@ -49,10 +49,10 @@ pub enum SourceError<E> {
     Taken(E),
 }
 
-/// Passes all items of `input`, a capture or a byte stream, to `take`.
+/// Calls `take` with each item of `input`, a capture or a byte stream.
 ///
 /// # Errors
-/// [`SourceError`]; the items before it have been passed on.
+/// [`SourceError`]; `take` has got the items before the error.
 pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,

@@ -1,4 +1,4 @@
-//! Reference parser by the definition of frames. The earliest valid frame, then the search continues behind it.
+//! Reference parser by the definition of frames. The earliest valid frame, then the search continues after it.
 
 use uav_relay::flight::mavlink::frame;
 

@@ -1,7 +1,7 @@
 //! Half-duplex radio channel: senders receive nothing, and overlapping frames are lost.
 //!
 //! Frames that overlap are lost at the nodes that are in range of both senders. The medium has no clock: each call appends its
-//! future events to an [`Agenda`], and the caller passes them to [`Medium::happen`] when due.
+//! future events to an [`Agenda`], and the caller gives them to [`Medium::happen`] when due.
 
 use std::collections::VecDeque;
 
@@ -23,7 +23,7 @@ pub enum AirEvent {
     End(usize),
 }
 
-/// Future events of radios, with the times at which the caller must pass them to [`Medium::happen`].
+/// Future events of radios, with the times at which the caller must give them to [`Medium::happen`].
 pub type Agenda = Vec<(Instant, AirEvent)>;
 
 /// Frame whose transmission has ended, with its receivers.

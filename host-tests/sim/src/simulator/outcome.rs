@@ -132,7 +132,7 @@ pub struct RelayEnd {
     /// Upper bound, linear, on the SIR of the worst hop that any chain at the relays' altitudes can reach. `None`
     /// except at the leader.
     pub bound: Option<f32>,
-    /// Shares of the frame time that the relay's slots have; `None` without fitted slots.
+    /// Shares of the frame time for the relay's fitted slots; `None` with equal slots.
     pub slot_shares: Option<SlotShares>,
     /// Altitude and power of the relay.
     pub profile: Profile,
@@ -282,7 +282,7 @@ pub struct Shot {
 /// Transmission of a frame, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Transmission {
-    /// Time when the relay passed the frame to its port for transmission.
+    /// Time at which the relay gave the frame to its port for transmission.
     pub at: Instant,
     /// Number of the sending relay, from 1.
     pub relay: u16,

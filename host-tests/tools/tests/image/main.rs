@@ -34,7 +34,7 @@ fn elf(segments: &[(u32, u32, &[u8])]) -> Vec<u8> {
     file
 }
 
-/// Returns the pieces of an image: a vector table, code 70 KiB behind its start, and data for RAM.
+/// Returns the pieces of an image: a vector table, code 70 KiB after its start, and data for RAM.
 fn example() -> Vec<Piece> {
     let code: Vec<u8> = (0..70_000_u32).map(|at| (at % 251) as u8).collect();
     let file = elf(&[

@@ -237,7 +237,8 @@ const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
     0
 };
 
-/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0.
+/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is a time slot as long as
+/// its hop needs.
 const FITTED: usize = if cfg!(feature = "altitude") { 1 } else { 0 };
 
 /// Joint solver of a chain: that for one direction, for both directions, or for fitted slots.

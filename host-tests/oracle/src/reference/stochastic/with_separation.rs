@@ -31,9 +31,8 @@ impl StochasticLink {
     /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart.
     ///
     /// It follows the sets of all possible positions of each relay, from Rx back to Tx. These sets are intervals: as
-    /// the receiver of a hop moves along an interval, so do the possible positions of its sender. Nothing is left
-    /// out, so that relays that need to stay behind their farthest position are considered. 0 if no chain is
-    /// possible.
+    /// the receiver of a hop moves along an interval, so do the possible positions of its sender. No chain is left out,
+    /// not even one in which relays stop short of their farthest position. 0 if no chain is possible.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;

@@ -164,8 +164,8 @@ impl Chain {
 
     /// Simulates an operator who confirms to a relay that the drones of lost neighbours have landed.
     ///
-    /// The relay then no longer keeps away from these drones. The operator waits until two relays have controlled
-    /// their drones for [`LANDS_AFTER`]: this relay, and the next relay with a flying drone behind the lost ones.
+    /// The relay then no longer keeps away from these drones. The operator waits until two relays have controlled their
+    /// drones for [`LANDS_AFTER`]: this relay, and the nearest relay with a flying drone beyond the lost ones.
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {
