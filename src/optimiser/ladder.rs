@@ -28,7 +28,7 @@ pub struct Ladder {
     /// `growth` / 16 times the next one toward the middle.
     growth: u8,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of that x for the sake of the next relay.
+    /// of that x for the sake of the next relay on the pass.
     plain: bool,
 }
 
@@ -50,8 +50,8 @@ impl Ladder {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In other
-    /// passes a relay may stay short of that x for the sake of the next relay.
+    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In other passes
+    /// a relay may stay short of that x for the sake of the next relay on the pass.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }

@@ -62,19 +62,19 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Hops from the previous node to a relay and on to the next node, for any position of the relay.
+/// Hops of a relay: from the node toward Tx to it, and from it to the node toward Rx. The relay may be anywhere.
 ///
-/// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from
-/// the previous node are A q / l, with the gain A, and backward `returned` / l. Those of the hop to the next node are
+/// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from the
+/// node toward Tx are A q / l, with the gain A, and backward `returned` / l. Those of the hop to the node toward Rx are
 /// `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the required ratio of
 /// backward to forward SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the hop from the previous node. Its SIR is A times inverse interference over squared length.
+    /// Gain A of the hop from the node toward Tx. Its SIR is A times inverse interference over squared length.
     gain: f32,
-    /// SIR of the relay's signal at the next node, times the squared length of the hop, m^2.
+    /// SIR of the relay's signal at the next node toward Rx, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
@@ -85,11 +85,11 @@ pub struct Hops {
 /// Gains of both hops for traffic from Rx to Tx; infinite for a mission of one direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR of the relay's signal at the previous node, times the squared length of the hop, over r, m^2. r is the
+    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, over r, m^2. r is the
     /// required ratio of backward to forward SIR.
     returned: f32,
-    /// Gain of the backward hop from the next node to the relay, over r. The hop's SIR is the gain times inverse
-    /// interference over squared length; r is the required ratio of backward to forward SIR.
+    /// Gain of the backward hop from the next node toward Rx to the relay, over r. The hop's SIR is the gain times
+    /// inverse interference over squared length; r is the required ratio of backward to forward SIR.
     gain: f32,
 }
 

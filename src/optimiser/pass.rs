@@ -68,7 +68,7 @@ pub struct Link<'a> {
     /// interference field.
     pub measured_per_w: Option<f32>,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of that x for the sake of the next relay.
+    /// of that x for the sake of the next relay on the pass.
     pub plain: bool,
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
     /// computes it; `None` with other methods. Not used in an interference field.
@@ -95,9 +95,9 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 impl<'a> Link<'a> {
     /// Appends this relay's reaches for the rising `targets` to `reaches`, after those already there.
     ///
-    /// A reach is the farthest x in the direction of the pass that meets a target. `from` has the reaches of the
-    /// previous relay, m. The list ends before the first target that cannot be met. Bounded by a reach per target; in
-    /// a field by three for each of its points.
+    /// A reach is the farthest x in the direction of the pass that meets a target. `from` has the reaches of the relay
+    /// from which the pass arrives, m. The list ends before the first target that cannot be met. Bounded by a reach per
+    /// target; in a field by three for each of its points.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -304,8 +304,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the previous one. The previous relay may
-    /// be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the one before it on the pass. That relay
+    /// may be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -346,11 +346,12 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the previous relay must take to meet `target` if this relay is at x = `place`.
+    /// Returns the x that the relay before this one on the pass must take to meet `target`. This relay is at x =
+    /// `place`.
     ///
-    /// `from_m` is the farthest x of the previous relay. `None` if the previous relay has no such position. The
-    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two
-    /// reaches, in an interference field by three for each of its points.
+    /// `from_m` is the farthest x of the relay before it on the pass. `None` if that relay has no such position. The
+    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two reaches,
+    /// in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -414,7 +415,7 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
 }
 
 /// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are that
-/// relay's farthest x for each target, and `from` those of the previous relay, m.
+/// relay's farthest x for each target, and `from` those of the relay before it on the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();

@@ -204,7 +204,7 @@ impl Relay {
     /// Handles timers that have expired by `now`, and does one step of a long computation.
     ///
     /// The step is bounded. The leader's prediction computes at most 12 hops, each for 16 target SIRs; the joint method
-    /// the hops of 10 to 40 relays; Algorithm 2 tries at most 624 positions of this relay. Without a computation the
+    /// the hops of at most 40 relays; Algorithm 2 tries at most 624 positions of this relay. Without a computation the
     /// call takes almost no time.
     ///
     /// ```

@@ -36,7 +36,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         self.mission.config().distance_m
     }
 
-    /// Returns the sender of the hop to relay `index`: Tx, or the previous relay at `from`.
+    /// Returns the sender of the hop to relay `index`: Tx, or relay `index` - 1 at `from`.
     pub(super) fn sender(&self, index: u16, from: Placement) -> Sender {
         if index <= 1 {
             return Sender::transmitter(self.mission);

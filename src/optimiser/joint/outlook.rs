@@ -158,17 +158,17 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 /// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
 ///
 /// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on that of
-/// the previous relay.
+/// the sending relay, the next one toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
     /// True to take the larger of two solutions for the relay's third coordinate. A hop of maximum length can end at
     /// two positions with the same first two coordinates.
     pub(super) rising: bool,
-    /// Move of the relay in its two free coordinates if the previous relay has not moved, m.
+    /// Move of the relay in its two free coordinates if the relay that sends to it has not moved, m.
     pub(super) step: [f32; 2],
-    /// Additional move of the relay in each free coordinate for a move of the previous relay. It is in m per m that
-    /// the previous relay moves in x, y and h.
+    /// Additional move of the relay in each free coordinate for a move of the sending relay. It is in m per m that the
+    /// sending relay moves in x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
@@ -178,8 +178,8 @@ const FLATTEST: f32 = 1e-6;
 
 impl Policy {
     /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. Its move is within
-    /// [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh, hh),
-    /// which are made concave. `across` has its mixed derivatives by the previous relay's position.
+    /// [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh, hh), which
+    /// are made concave. `across` has its mixed derivatives by the sending relay's position.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],

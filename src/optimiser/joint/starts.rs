@@ -141,8 +141,8 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the lateral offset and altitude of the next relay on a spiral, after a relay at `from`. `c` is target
-    /// SIR over gain, which determines the length of the hop; `room` has the allowed ranges.
+    /// Returns the lateral offset and altitude of a relay on a spiral. The relay that sends to it is at `from`. `c` is
+    /// target SIR over gain, which determines the length of the hop; `room` has the allowed ranges.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -244,7 +244,7 @@ impl Start {
         }
     }
 
-    /// Returns a relay's lateral offset and altitude in this initial chain. The previous relay is at x = `x_m`.
+    /// Returns a relay's lateral offset and altitude in this initial chain. The relay that sends to it is at x = `x_m`.
     /// `distance_m` is the distance from Tx to Rx, and `room` has the allowed ranges.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {

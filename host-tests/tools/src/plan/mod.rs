@@ -223,7 +223,7 @@ impl From<Refusal> for NoPlan {
 }
 
 impl Plan {
-    /// Returns the SIR of the worst hop, linear. In a plan for both directions an SIR toward Tx counts divided by
+    /// Returns the SIR of the worst hop, linear. In a plan for both directions an SIR toward Tx is first divided by
     /// `reverse`, the fraction that suffices there.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);

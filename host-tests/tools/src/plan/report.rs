@@ -222,7 +222,7 @@ pub struct WayBack {
     /// Fraction of the SIR to Rx that suffices toward Tx; absent if relays are placed for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
-    /// SIR of the worst hop of both directions, linear; an SIR toward Tx counts divided by `reverse`.
+    /// SIR of the worst hop of both directions, linear; an SIR toward Tx is first divided by `reverse`.
     ///
     /// Absent if the relays are placed for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -284,10 +284,10 @@ pub struct PlanReport {
     /// Best SIR found, dB; present only if the request cannot be met and the SIR is above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
-    /// SIR of the plan's worst hop, linear. For both directions an SIR toward Tx counts divided by `reverse`.
+    /// SIR of the plan's worst hop, linear. For both directions an SIR toward Tx is first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// SIR of the plan's worst hop, dB. For both directions an SIR toward Tx counts divided by `reverse`.
+    /// SIR of the plan's worst hop, dB. For both directions an SIR toward Tx is first divided by `reverse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.

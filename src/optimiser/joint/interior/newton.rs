@@ -43,9 +43,9 @@ pub(super) struct Front {
     taken: Triple,
 }
 
-/// Row of an eliminated relay's equations, after forward substitution with its Cholesky factor. The first three
-/// values are the coefficients of the next relay's steps in x, y and h. The last two are right sides: for a constant
-/// target, and per unit that the target changes.
+/// Row of an eliminated relay's equations, after forward substitution with its Cholesky factor. The first three values
+/// are the coefficients of the steps in x, y and h of the next relay toward Rx. The last two are right sides: for a
+/// constant target, and per unit that the target changes.
 type Row = [f32; 5];
 
 /// Equations of one relay after its elimination, from which its Newton step follows.
