@@ -17,7 +17,7 @@ use uav_relay_sim::simulator::outcome::Outcome;
 use uav_relay_sim::simulator::setup::Setup;
 
 /// Returns a chain of `relays` relays at an altitude of 220 m, as reference model and simulation setup. The
-/// interferer is at (500, 150) m, altitudes may be 20 m to 300 m, and the least separation is 4 m.
+/// interferer is at (500, 150) m, altitudes may be 20 m to 300 m, and the minimum separation is 4 m.
 fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     let mut link = Link {
         y_i: 150.0,
@@ -163,7 +163,7 @@ fn grid_search_moves_as_the_reference_program() {
 }
 
 /// Checks that the fine search of one relay finds a position as good as the best of a dense grid. Both searches keep
-/// the least separation from the neighbours.
+/// the minimum separation from the neighbours.
 #[test]
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));
@@ -274,7 +274,7 @@ fn adjusting_ends_in_a_local_optimum() {
     }
 }
 
-/// Checks that both local searches keep the least separation, even if a smaller one gave more SIR.
+/// Checks that both local searches keep the minimum separation, even if a smaller one gave more SIR.
 #[test]
 fn relays_keep_their_separation_where_it_costs_sir() {
     for local in [

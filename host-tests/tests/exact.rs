@@ -281,7 +281,7 @@ fn near_optimal_in_uneven_fields() {
 
 /// Checks that relays with different altitudes and powers in uneven interference come near the optimum.
 ///
-/// Half of the scenes have a least separation.
+/// Half of the scenes have a minimum separation.
 #[test]
 fn near_optimal_in_uneven_fields_by_unlike_relays() {
     let mut rng = generator(905);

@@ -35,7 +35,7 @@ fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     all().unwrap().iter().filter(wanted).filter_map(placed)
 }
 
-/// Returns the link with its relays at the given altitudes, without a least separation.
+/// Returns the link with its relays at the given altitudes, without a minimum separation.
 fn flown(link: &Link, altitudes: &[f64]) -> Link {
     let relays = link.relays.iter().zip(altitudes);
     let relays = relays.map(|(relay, &altitude_m)| Relay {
@@ -234,7 +234,7 @@ fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
 }
 
 /// Checks that no common altitude, and no choice among three altitudes, exceeds a recorded optimum. The scenes have
-/// no least separation.
+/// no minimum separation.
 #[test]
 fn no_common_altitude_and_no_assignment_of_levels_is_better() {
     let (mut common, mut levelled, mut gained) = (0, 0, 0);

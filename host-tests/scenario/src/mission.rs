@@ -19,7 +19,7 @@ use crate::{Interference, Scenario, Source};
 pub enum Refusal {
     /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
-    /// The distance from Tx to Rx is too short for that number of relays at their least separation.
+    /// The distance from Tx to Rx is too short for that number of relays at their minimum separation.
     NoRoom {
         /// Number of relays.
         relays: u16,

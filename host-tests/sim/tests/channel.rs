@@ -17,7 +17,7 @@ use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Returns the mission of the paper's scenario for `relays` relays, with a least separation of 0.1 m.
+/// Returns the mission of the paper's scenario for `relays` relays, with a minimum separation of 0.1 m.
 fn close(relays: u16) -> Mission {
     let scenario = Scenario {
         min_separation_m: 0.1,

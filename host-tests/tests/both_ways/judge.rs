@@ -158,7 +158,7 @@ impl Chain {
     /// Returns the x of the first search's grid, m. It is dense near the interferer and both ends.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
-        // The least separation is a whole number of steps.
+        // The minimum separation is a whole number of steps.
         let step = self.apart_m / (self.apart_m * GRID as f64 / d).ceil().max(1.0);
         let step = if step > 0.0 { step } else { d / GRID as f64 };
         let even = (0..).map(|i| step * f64::from(i)).take_while(|x| *x <= d);

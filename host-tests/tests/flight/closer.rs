@@ -15,7 +15,7 @@ fn places(outcome: &Outcome) -> Vec<Placement> {
     places.collect()
 }
 
-/// Checks that drones reach agreed positions that are closer along x than the least separation.
+/// Checks that drones reach agreed positions that are closer along x than the minimum separation.
 ///
 /// In space they keep the separation, by their altitudes or lateral offsets. Such positions come from the scenes
 /// among 200 random ones in which the joint method agrees on them.

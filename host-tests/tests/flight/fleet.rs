@@ -18,7 +18,7 @@ const GUST_MPS: f64 = 0.3;
 /// Position error configured in the motion guard, m: noise, gusts and overshoot.
 const HOVER_M: f64 = 1.5;
 
-/// Permitted shortfall of the least separation, m: bias and hovering error of both drones.
+/// Permitted shortfall of the minimum separation, m: bias and hovering error of both drones.
 const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
 /// Time of the last random event, s.

@@ -189,7 +189,7 @@ pub(crate) fn around(
     }
 }
 
-/// Returns random positions in order along x, with the least separation or more between neighbours.
+/// Returns random positions in order along x, with the minimum separation or more between neighbours.
 pub(crate) fn places(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.geofence.most_x_m);
     let step = f64::from(config.separation_m) + 5e-7 * distance;
@@ -216,9 +216,9 @@ pub(crate) fn places(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) 
         .collect()
 }
 
-/// Moves half of the neighbours closer along x, but keeps their least separation in space.
+/// Moves half of the neighbours closer along x, but keeps their minimum separation in space.
 ///
-/// Relays that are not neighbours keep the least separation along x, unless `wild`.
+/// Relays that are not neighbours keep the minimum separation along x, unless `wild`.
 pub(crate) fn closer(
     rng: &mut ChaCha8Rng,
     config: &GuardConfig,

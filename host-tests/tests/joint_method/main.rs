@@ -256,7 +256,7 @@ fn random_chains_come_near_the_joint_optimum() {
     assert!(best <= 1.0 + 1e-5, "{best}");
 }
 
-/// Checks that 95 % of random chains with a wide least separation are within 0.1 % of the optimum.
+/// Checks that 95 % of random chains with a wide minimum separation are within 0.1 % of the optimum.
 ///
 /// The optimum may need relays that are not as far along the line as the target SIR permits. The joint method does
 /// not consider such positions.

@@ -21,7 +21,7 @@ use super::reference::Reference;
 /// Number of samples that a relay averages at one position.
 pub(crate) const SAMPLES: u32 = 100;
 
-/// Range from which the least separation is drawn in half of the chains with free altitudes. The unit is the distance
+/// Range from which the minimum separation is drawn in half of the chains with free altitudes. The unit is the distance
 /// of neighbours in an evenly spaced chain.
 const TIGHT: (f64, f64) = (0.05, 0.95);
 

@@ -62,7 +62,7 @@ fn for_one_source_the_optimum_is_that_of_the_reference() {
 
 /// Checks that the optimum of one to four relays is that of a brute-force search.
 ///
-/// In a third of the scenes the relays have different powers; half of the scenes have a least separation.
+/// In a third of the scenes the relays have different powers; half of the scenes have a minimum separation.
 #[test]
 fn brute_force_finds_the_same() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(77));

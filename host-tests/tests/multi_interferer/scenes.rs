@@ -12,7 +12,7 @@
 //! | relay power | log-uniform 0.1 W to 10 W; in a third of the scenes 0.3 to 3 times that for each relay |
 //! | Tx power | log-uniform 0.3 to 100 times a relay's |
 //! | channel | 2 GHz, 0.1 dB and 0.1 to 21 dB of excess loss, eta a uniform mixture |
-//! | least separation | 0 in half; else log-uniform 0.03 to 1 times D / N |
+//! | minimum separation | 0 in half; else log-uniform 0.03 to 1 times D / N |
 //!
 //! Aloof sources are 0.3 D to D beside the line, with powers of 50 to 100 times a relay's. Such similar sources are the case for
 //! which the paper replaces them by one hypothetical interferer.

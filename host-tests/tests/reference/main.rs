@@ -278,7 +278,7 @@ fn the_printed_bound_and_the_turning_points_match_the_file() {
             case.rtol,
             &case.id,
         );
-        // Hop 2 at the least separation is worst abreast of the interferer.
+        // Hop 2 at the minimum separation is worst abreast of the interferer.
         close(
             link.sir_relay(2, x - d, x).unwrap(),
             terms[1],

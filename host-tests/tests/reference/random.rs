@@ -84,7 +84,7 @@ fn reaches_agree_with_a_scan() {
 
 /// Checks that the optimum of one and two relays is that of brute force.
 ///
-/// The cases are with and without a least separation. At different altitudes, the optimum may not be the chain in
+/// The cases are with and without a minimum separation. At different altitudes, the optimum may not be the chain in
 /// which each relay goes as far along as possible, so that the reference follows all possible positions of each
 /// relay.
 #[test]

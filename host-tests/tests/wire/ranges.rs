@@ -28,7 +28,7 @@ fn is_accepted(body: &[u8]) -> bool {
     }
 }
 
-/// Checks that an offer is refused if its relays do not fit on the line with its least separation. The test tries f32
+/// Checks that an offer is refused if its relays do not fit on the line with its minimum separation. The test tries f32
 /// separations around the limit.
 #[test]
 fn an_offer_needs_space_for_its_relays() {

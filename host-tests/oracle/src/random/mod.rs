@@ -12,7 +12,7 @@
 //! | channel | 75 % the paper's (2 GHz); else `mu_los` = 1, `mu_nlos` = log-uniform 1 to 1000 |
 //! | eta | a third each: `mu_los`, `mu_nlos`, a uniform mixture |
 //! | relays | alike, or each with its own power (0.1 to 10 times) and / or altitude (0.5 to 2 times, bounded as h), by style |
-//! | least separation | 0 |
+//! | minimum separation | 0 |
 //!
 //! X = D with Y = 0 (2.5 %) puts the interferer on Rx: the SIR of every chain is 0 and there is no optimum.
 

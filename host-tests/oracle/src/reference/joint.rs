@@ -1,7 +1,7 @@
 //! The joint problem: positions in a corridor along Tx-Rx that maximise the worst hop's SIR.
 //!
 //! 0 <= `x_1` <= ... <= `x_N` <= D, every relay within one [`Corridor`] (except relays with a fixed cross-section position), and
-//! neighbours at least the link's least separation apart. Here chains are evaluated and checked; their optima are recorded, see
+//! neighbours at least the link's minimum separation apart. Here chains are evaluated and checked; their optima are recorded, see
 //! [`crate::recorded`].
 //!
 //! The SIR is computed from received powers at the positions: never more than can be flown.

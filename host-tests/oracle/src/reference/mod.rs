@@ -14,12 +14,12 @@
 //! most two turning points, a valley and then a hill; for u < 0 each of its terms falls, so there is at most one.
 //!
 //! No relay is behind its predecessor (0 <= `x_1` <= ... <= `x_N` <= D). Only `Link::optimum_apart` and the brute-force search keep
-//! the least separation.
+//! the minimum separation.
 //!
 //! - `Link::feasible` extends the chain greedily, as the on-board protocol does. It is exact when all altitudes are equal.
 //! - `Link::placement` keeps the whole set of positions each node can reach. It is exact for any altitudes, which the greedy
 //!   chain is not: close to the interferer a climb may be impossible that was possible earlier.
-//! - `Link::optimum_apart` does the same with the least separation.
+//! - `Link::optimum_apart` does the same with the minimum separation.
 //!
 //! [`mod@joint`] evaluates chains that also choose altitudes and lateral positions.
 //!

@@ -3,7 +3,7 @@
 //! A node's set is a sorted list of closed intervals. A position can be reached if the hop from the *nearest* reachable position
 //! at or before it meets the target: a nearer sender is received more strongly, and the interference at the receiver does not
 //! depend on it. So the next set has two kinds of pieces: positions inside an interval of the last set (sender straight below or
-//! above), and positions in the gap after an interval (sender at the interval's end). A least separation shifts both pieces by
+//! above), and positions in the gap after an interval (sender at the interval's end). A minimum separation shifts both pieces by
 //! the least advance along x.
 
 use super::hop::{Hop, bisect};

@@ -15,7 +15,7 @@ const FLOWN: f64 = 1e-4;
 
 /// Returns the paper's multi-hop scenario, with the parameters of its fourth and fifth sub-table.
 ///
-/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no least separation, because
+/// D = 1 km, Tx 80 W, interferer 80 W at (500, 400) m, relays of 1 W at 20 m. There is no minimum separation, because
 /// Algorithms 1 and 4 as printed have none. A separation of 4 m would not change any of the optima.
 pub fn multi_hop() -> Scenario {
     Scenario {

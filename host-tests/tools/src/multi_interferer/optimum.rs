@@ -8,7 +8,7 @@ const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
-/// Relative allowance for rounding on the least separation.
+/// Relative allowance for rounding on the minimum separation.
 ///
 /// Without it a thousand relays that just fit on the line could be rejected.
 const ROUNDING: f64 = 1e-12;
@@ -23,14 +23,14 @@ pub struct Chain {
     pub places: Vec<(f64, f64)>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
     pub sir: f64,
-    /// SIR of the best chain without a least separation, linear.
+    /// SIR of the best chain without a minimum separation, linear.
     ///
     /// It equals `sir` where the separation does not restrict the chain.
     pub free_sir: f64,
 }
 
 impl Chain {
-    /// Returns true if the least separation between relays costs more than a millionth of the SIR.
+    /// Returns true if the minimum separation between relays costs more than a millionth of the SIR.
     pub fn separation_binds(&self) -> bool {
         self.sir < self.free_sir * (1.0 - 1e-6)
     }
@@ -42,11 +42,11 @@ impl Chain {
 /// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
 /// `host-tests/tests/multi_interferer`).
 ///
-/// If the least separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a
+/// If the minimum separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a
 /// position when another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the
 /// relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
 ///
-/// Work: about 50 targets, twice with a least separation. For each target: some thousand points of the line per
+/// Work: about 50 targets, twice with a minimum separation. For each target: some thousand points of the line per
 /// change of power along the chain, and a few intervals per relay.
 pub fn optimum(scene: &Scene) -> Option<Chain> {
     let altitude_m = scene.relays.first()?.altitude_m;
@@ -75,7 +75,7 @@ pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     })
 }
 
-/// Returns the SIR of the best chain at `altitude_m` that keeps the least separation, linear.
+/// Returns the SIR of the best chain at `altitude_m` that keeps the minimum separation, linear.
 ///
 /// `tolerance` is relative. `None` without relays or interferers, if the relays do not fit on the line, and if no
 /// chain has an SIR above 0.
@@ -217,7 +217,7 @@ pub(super) fn golden(
 // Exact sets of positions from which each relay's part of the chain can reach Rx. They belong to one target SIR and altitude.
 //
 // For a receiver at y the SIR of a hop depends only on its length, so the sender may be anywhere in [y - d(y), y - s]: d(y) the
-// hop range at the target, s the least separation. Backwards from Rx, the feasible positions of relay k are the union of these
+// hop range at the target, s the minimum separation. Backwards from Rx, the feasible positions of relay k are the union of these
 // intervals over those of relay k + 1. Over an interval of y with d(y) >= s this union is again an interval, from the least y -
 // d(y) on, so each set is a few intervals. With s = 0 it is one, [l_k, D]. A lower target only widens the sets, so the best
 // target can be bisected.

@@ -52,7 +52,7 @@ struct Turn<'a> {
 
 /// Improves the chain `start` by moving one relay at a time within the limits `room`.
 ///
-/// The result is never worse than `start`. Order and least separation are kept if the start has them; a relay with a
+/// The result is never worse than `start`. Order and minimum separation are kept if the start has them; a relay with a
 /// fixed altitude moves along x and sideways only. At most 200 rounds, fewer when three in a row gain less than a
 /// millionth each. A round is 2 N moves, a move about 50 SIRs at one altitude, 2 400 in a band and as many again with
 /// lateral room. `None` unless the start has one position per relay and at least one relay.
@@ -179,7 +179,7 @@ impl Turn<'_> {
 
     /// Returns the smallest and largest x, m, that the order and separation of the relays permit.
     ///
-    /// The relay stays between its two neighbours, at the least separation from each.
+    /// The relay stays between its two neighbours, at the minimum separation from each.
     ///
     /// `h` is the relay's altitude and `y` its lateral position, m. The first result is above the second if no x is
     /// allowed.

@@ -4,7 +4,7 @@
 //! range of each relay is divided into cells. A hop between two cells is dropped if it misses the target even at their smallest
 //! distance and with the smallest interference in the receiver's cell, in either direction. A cell that no chain of such hops from
 //! Tx to Rx passes is dropped, and the others are divided further. If a relay has no cell left, the target is excluded. The order
-//! of the relays and their least separation are ignored, so the bound also holds without them.
+//! of the relays and their minimum separation are ignored, so the bound also holds without them.
 //!
 //! ```text
 //! F <= P(sender) g(d) / (I(cell of the receiver) + N),    B <= P(receiver) g(d) / (I(cell of the sender) + N)

@@ -365,9 +365,9 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the least separation of the relays does not cost any SIR, or if there is none.
+/// Returns true if the minimum separation of the relays does not cost any SIR, or if there is none.
 ///
-/// `is_as_good` gets the scenario without a least separation. It returns `Some(true)` if the best SIR without the
+/// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR without the
 /// separation is not higher than with it, and `None` if it finds no chain.
 fn is_free(scenario: &Scenario, is_as_good: impl Fn(&Scenario) -> Option<bool>) -> bool {
     let free = Scenario {

@@ -22,7 +22,7 @@ use uav_relay_scenario::scene::{Relay, Scene};
 
 /// Number of equal intervals of the grid of x on which the search begins.
 ///
-/// If the least separation of the relays exceeds half of this spacing, the spacing is the separation or a fraction of
+/// If the minimum separation of the relays exceeds half of this spacing, the spacing is the separation or a fraction of
 /// it.
 const EVEN: f64 = 700.0;
 
@@ -204,7 +204,7 @@ impl<'a> Times<'a> {
 
     /// Returns the time of a chain for one bit, s Hz, with the relays at `x`, m.
     ///
-    /// It is infinite if the chain carries nothing, or if relays are closer than the least separation. Rounding of
+    /// It is infinite if the chain carries nothing, or if relays are closer than the minimum separation. Rounding of
     /// the positions is allowed for.
     pub fn total(&self, x: &[f64]) -> f64 {
         self.along(x, false)
@@ -226,7 +226,7 @@ impl<'a> Times<'a> {
     /// Returns the grid of x, m, on which the search begins, ascending. It is denser near Tx, Rx and the interferers.
     fn grid(&self) -> Vec<f64> {
         let d = self.scene.distance_m;
-        // Relays that gather keep exactly their least separation: it is a whole number of steps.
+        // Relays that gather keep exactly their minimum separation: it is a whole number of steps.
         let apart = self.scene.min_separation_m;
         let parts = (apart * EVEN / d).ceil();
         let step = if apart * EVEN > 0.5 * d {
@@ -310,7 +310,7 @@ pub(super) struct Hop {
     pub(super) factor: f64,
     levels_m: [f64; 2],
     pub(super) climb_squared: f64,
-    /// Least distance of the two nodes along the line, m, due to the least separation of relays.
+    /// Least distance of the two nodes along the line, m, due to the minimum separation of relays.
     pub(super) least_m: f64,
 }
 

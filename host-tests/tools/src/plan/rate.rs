@@ -260,7 +260,7 @@ struct MostRate {
     receiver_bps: f64,
     /// Upper bound on the rate of the hop from Tx, bit/s.
     first_bps: f64,
-    /// Upper bound on the rate of a hop between relays, bit/s. Relays keep their least separation.
+    /// Upper bound on the rate of a hop between relays, bit/s. Relays keep their minimum separation.
     relay_bps: f64,
     /// Number of directions of the data: 1.0 for Tx to Rx only, 2.0 for both.
     ways: f64,
@@ -297,7 +297,7 @@ impl MostRate {
 
 /// Returns upper bounds on the SIR, linear, of the first hop and of a hop between relays.
 ///
-/// The bounds assume the strongest signal (hops as short as the least separation permits) and the weakest
+/// The bounds assume the strongest signal (hops as short as the minimum separation permits) and the weakest
 /// interference (each interferer received from the end of the line that is farther from it). Infinite if the
 /// interference is known only along the line.
 fn most_between(scenario: &Scenario) -> [f64; 2] {

@@ -55,7 +55,7 @@ struct Reaches {
     hop: Hop,
     /// Smallest x of the sender, m, at which the receiver has the SINR of a rate step. There is a row for each rate
     /// step of the radio, with a value for each x of the receiver on the grid. Infinite if the sender would have to
-    /// be closer to the receiver than the least separation.
+    /// be closer to the receiver than the minimum separation.
     nearest: Vec<Vec<f64>>,
     /// Lower bounds on the hop's time for one bit, s Hz (time in s for a bandwidth of 1 Hz). There is a row for each
     /// cell of the sender, with a value for each cell of the receiver.

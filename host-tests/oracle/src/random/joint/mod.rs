@@ -12,7 +12,7 @@
 //! | Tx power | 80 % log-uniform 0.3 to 10 times a relay's; else 10 to 100 times |
 //! | interferer power | log-uniform 1 to 300 times a relay's |
 //! | channel | 50 % the paper's (2 GHz) with eta = `mu_los`; else `mu_los` = 1, `mu_nlos` log-uniform 1 to 100, eta log-uniform from 1 to the lesser of 10 and `mu_nlos` |
-//! | least separation | half 0; else log-uniform 0.01 to 0.1 times D / (N + 1), or 0.03 to 0.3 where asked for |
+//! | minimum separation | half 0; else log-uniform 0.01 to 0.1 times D / (N + 1), or 0.03 to 0.3 where asked for |
 //!
 //! Weighted toward scenarios in which altitudes of their own help: Tx is seldom so loud that hop 1 does not matter, and the
 //! interferer is often close to the axis. In about a third the best chain is more than 1 % better than the best common altitude.
@@ -24,7 +24,7 @@
 //! | Y | the above with either sign |
 //! | sides | a third: none; else left and right apart: 15 % none; else log-uniform 0.005 D to 0.4 D |
 //! | band | with sides, 15 %: the lowest altitude alone |
-//! | least separation | half as in [`ROOMY`], half as in [`CROWDED`] |
+//! | minimum separation | half as in [`ROOMY`], half as in [`CROWDED`] |
 //!
 //! [`with_own`] lets relays differ:
 //!

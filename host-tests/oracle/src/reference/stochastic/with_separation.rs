@@ -1,4 +1,4 @@
-//! The best chain of relays that differ, in any field and with any least separation.
+//! The best chain of relays that differ, in any field and with any minimum separation.
 
 use super::link::StochasticLink;
 
