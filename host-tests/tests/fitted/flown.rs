@@ -3,9 +3,9 @@
 use uav_relay::{
     Identity, Instant, Method, Mission, Placement, Relay, Settings, SetupError, SlotShares,
 };
-use uav_relay_scenario::mission;
+use uav_relay_scenario::{RelayOverride, mission};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::route::{DataLink, TrueHops};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::traffic::{TrafficSpec, traffic};
@@ -128,6 +128,65 @@ fn the_remaining_relays_share_the_frame_after_a_loss() {
             .all(|relay| relay.killed.is_some() || relay.relays == case.relays - 1)
     );
     check_shares(&outcome, case.mission().config().reverse, "relay 3 lost");
+}
+
+/// Checks that a restarted relay has no slots until the chain agrees again, and that the slots then fill the frame.
+#[test]
+fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
+    let case = Case::draw(1);
+    let relays = usize::from(case.relays);
+    for (index, at_ms) in [(1, 20_000), (3, 20_000), (case.relays, 20_001)] {
+        let mut setup = Setup {
+            profiles: setup(&case).profiles,
+            boots: vec![(index, Instant::from_millis(at_ms))],
+            ..Setup::on_shared_channel(case.mission())
+        };
+        setup.settings.method = Method::Joint;
+        let outcome = run(setup).unwrap();
+        let booted = TimelineEvent::Booted;
+        assert!(outcome.moments.iter().any(|moment| moment.what == booted));
+        assert_eq!(outcome.relays.len(), relays);
+        check_shares(
+            &outcome,
+            case.mission().config().reverse,
+            "a relay restarted",
+        );
+    }
+}
+
+/// Checks that relays agree with the common power before the leader knows of another one, and then with all powers.
+///
+/// If the leader itself has another power, it gathers the powers first.
+#[test]
+fn the_first_agreement_is_for_the_common_power() {
+    let case = Case {
+        relays: 6,
+        ..Case::draw(1)
+    };
+    for (other, agreements) in [(None, 1), (Some(3), 2), (Some(6), 2), (Some(1), 1)] {
+        let mut case = case.clone();
+        case.scenario.relays.clear();
+        if let Some(index) = other {
+            let own = RelayOverride {
+                altitude_m: None,
+                power_w: Some(3.0),
+            };
+            case.scenario.relays.insert(index, own);
+        }
+        let mission = case.mission();
+        assert_eq!(mission.leader(), 1);
+        let outcome = run(setup(&case)).unwrap();
+        for relay in 2..=6 {
+            let of =
+                |moment: &&Moment| moment.relay == relay && moment.what == TimelineEvent::Converged;
+            let found = outcome.moments.iter().filter(of).count();
+            assert_eq!(found, agreements, "{other:?} {relay}");
+        }
+        let solved = fitted(&mission, case.seats(&mission));
+        for (relay, (_, shares)) in outcome.relays.iter().zip(&solved) {
+            assert_eq!(relay.slot_shares, Some(*shares), "{other:?}");
+        }
+    }
 }
 
 /// Checks that the agreed fitted slots deliver the predicted rate, also in both directions.

@@ -16,7 +16,7 @@ pub(crate) fn number(name: &str, default: u64) -> u64 {
 }
 
 /// Random test case: scenario, data link with fitted slots, and number of relays.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) scenario: Scenario,
     pub(crate) radio: Radio,

@@ -73,7 +73,8 @@ const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 /// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
 /// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio
-/// the length of the frame and a clock that all nodes share are still necessary.
+/// the length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about
+/// 6e-8, so a shorter slot may be empty.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
