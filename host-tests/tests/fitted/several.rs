@@ -17,7 +17,7 @@ fn draw(seed: u64) -> Case {
     case.relays = rng.random_range(1..=8);
     case.scenario.relays.clear();
     case.scenario.altitude_max_m = 300.0;
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         (case.scenario.lateral_min_m, case.scenario.lateral_max_m) = (-200.0, 200.0);
     }
     let sources = (0..rng.random_range(2..=4)).map(|_| Source {
