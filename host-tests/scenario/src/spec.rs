@@ -298,7 +298,7 @@ impl Scenario {
         own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))
     }
 
-    /// Returns true if the scenario has fitted slots: relays with the method `joint` then maximise the data rate.
+    /// Returns true if the scenario has fitted slots. Relays with the method `joint` then maximise the data rate.
     pub fn has_fitted_slots(&self) -> bool {
         let link = self.link.as_ref();
         link.is_some_and(|link| link.access == Access::Fitted)

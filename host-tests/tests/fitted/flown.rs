@@ -34,7 +34,7 @@ fn setup(case: &Case) -> Setup {
     setup
 }
 
-/// Checks that the relays have the slots of one frame, in order: without overlap or gap, and each with one begin and end.
+/// Checks that the relays have the slots of one frame, in order and without overlap or gap.
 fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     let flying = outcome.relays.iter().filter(|relay| relay.killed.is_none());
     let shares: Vec<_> = flying.map(|relay| relay.slot_shares.unwrap()).collect();
@@ -130,7 +130,7 @@ fn the_remaining_relays_share_the_frame_after_a_loss() {
     check_shares(&outcome, case.mission().config().reverse, "relay 3 lost");
 }
 
-/// Checks that a restarted relay has no slots until the chain agrees again, and that the slots then fill the frame.
+/// Checks that after the restart of a relay the slots of the next agreement fill the frame.
 #[test]
 fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
     let case = Case::draw(1);
@@ -154,7 +154,7 @@ fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
     }
 }
 
-/// Checks that relays agree with the common power before the leader knows of another one, and then with all powers.
+/// Checks that relays agree first with the common power, and then with all powers.
 ///
 /// If the leader itself has another power, it gathers the powers first.
 #[test]

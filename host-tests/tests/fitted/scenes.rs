@@ -102,7 +102,7 @@ impl Case {
         }
     }
 
-    /// Returns the times of the hops for one bit to Rx and `reverse` bits back, by the true SINRs, in 1 / bandwidth. The
+    /// Returns the times of the hops for one bit to Rx and `reverse` bits back, in 1 / bandwidth. The
     /// second list is empty in one direction.
     pub(crate) fn times(&self, places: &[Placement]) -> [Vec<f64>; 2] {
         let scene = Scene::new(&self.scenario, self.relays).unwrap();

@@ -29,7 +29,7 @@ fn draw(seed: u64) -> Case {
     case
 }
 
-/// Checks that plans against several interferers are compared by their true rates, and not by their SIRs.
+/// Checks that plans against several interferers are compared by their true rates, not by SIRs.
 ///
 /// No plan carries less than 0.99 of the positions for the hypothetical interferer, or of those of the largest SIR.
 /// `plan --out` accepts the positions of the relays if they carry at least 0.99 of the plan's rate.

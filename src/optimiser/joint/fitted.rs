@@ -68,7 +68,7 @@ const BEST_WIDTH: f32 = 1.0 / 16.0;
 /// from the interferer, the second one of the altitude band above the common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Slots of the hops next to a relay, with fitted slots: begin and end of each, as shares of the frame, 0 to 1.
+/// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
 ///
 /// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
@@ -486,7 +486,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of the slot toward Rx of hop `hop`, 0..=N + 1, and the begin of its slot back. 0 and 1 for hop 0.
+    /// Returns the end of the slot to Rx of hop `hop`, 0..=N + 1, and the begin of its slot back. 0 and 1 for hop 0.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {

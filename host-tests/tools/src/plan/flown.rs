@@ -25,7 +25,8 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// Returns the loss by the relays' positions, as a fraction of the best SIR; of the best data rate in fitted slots.
+    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots it is that of the
+    /// best data rate.
     pub fn loss(&self) -> f64 {
         let [own, best] = self.rates.unwrap_or([self.plan.sir(), self.best_sir]);
         (1.0 - own / best).max(0.0)
@@ -36,7 +37,7 @@ impl Flown {
         self.loss() > LOSS
     }
 
-    /// Returns a line for the user: how much SIR or data rate the relays' positions lose, why, and what to do.
+    /// Returns a line for the user: the loss by the relays' positions, its cause, and what to do.
     pub fn describe(&self) -> String {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {

@@ -265,7 +265,7 @@ impl Plan {
     }
 }
 
-/// Returns the data link, with a bandwidth of 1 Hz, of relays that fit their slots by the method joint; else `None`.
+/// Returns the data link of relays that fit their slots, with a bandwidth of 1 Hz; else `None`.
 fn fitted_radio(scenario: &Scenario, free_altitude: bool) -> Option<Radio> {
     let fits = free_altitude && scenario.has_fitted_slots();
     let link = scenario.link.clone().filter(|_| fits)?;
@@ -275,7 +275,7 @@ fn fitted_radio(scenario: &Scenario, free_altitude: bool) -> Option<Radio> {
     })
 }
 
-/// Returns the value that relays maximise against the interferers of `scene`: the SIR of the worst hop, linear.
+/// Returns the value that relays maximise in `scene`: the SIR of the worst hop, linear.
 ///
 /// With a `radio` it is the data rate to Rx in fitted slots, bit/s.
 fn merit(radio: Option<&Radio>, scene: &Scene, places: &[impl Copy + Into<Place>]) -> f64 {

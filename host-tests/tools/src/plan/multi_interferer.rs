@@ -178,7 +178,7 @@ impl Planner<'_> {
         self.variants().iter().filter_map(best).collect()
     }
 
-    /// Returns the chain with the largest data rate in fitted slots that is found from several start chains.
+    /// Returns the chain with the largest data rate that is found from several start chains.
     fn by_rate(&self, radio: &Radio, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
         let mut starts = self.of_variants(scene);
         starts.extend(start.map(places));
@@ -244,7 +244,7 @@ impl Candidates {
         one.max(all)
     }
 
-    /// Returns the chain for the hypothetical interferer if its SIR or rate suffices, else the best chain found.
+    /// Returns the chain for the hypothetical interferer if it suffices, else the best chain found.
     ///
     /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 %
     /// below the SIR of the best chain against all interferers.

@@ -74,7 +74,7 @@ impl Rate {
         Some([there, plan.sirs_back(scenario)])
     }
 
-    /// Returns the time slots of the hops in `plan`; empty unless they are fitted, or if the chain carries nothing.
+    /// Returns the fitted time slots of the hops in `plan`; empty without them, or without data.
     pub fn hop_slots(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Vec<HopSlots> {
         if radio.link.access != Access::Fitted {
             return Vec::new();

@@ -237,7 +237,7 @@ fn several_interferers_and_fields_are_planned_both_ways() {
     }
 }
 
-/// Checks that the slots of every hop are in the plan with fitted slots, in order, and as long as the hop needs.
+/// Checks that a plan has the fitted slots of every hop, in order, and as long as the hop needs.
 #[test]
 fn fitted_slots_of_every_hop_are_in_the_plan() {
     for (reverse, options) in [
@@ -292,7 +292,7 @@ fn fitted_slots_of_every_hop_are_in_the_plan() {
     assert_eq!(equal["hop_slots"], Value::Null);
 }
 
-/// Checks that `--out` accepts plans against several interferers whose rate the relays carry, and refuses others.
+/// Checks that `--out` judges fitted slots against several interferers by the data rate.
 #[test]
 fn plans_in_fitted_slots_against_several_interferers_are_written_by_their_rate() {
     let folder = tempfile::tempdir().unwrap();
@@ -323,7 +323,7 @@ fn plans_in_fitted_slots_against_several_interferers_are_written_by_their_rate()
     assert!(!out.exists());
 }
 
-/// Checks that requests are refused for which relays with the method joint do not fly the planned positions.
+/// Checks that requests are refused if relays would not fly the planned positions.
 #[test]
 fn wrong_requests_for_fitted_slots_and_free_altitudes_are_named() {
     let link = "access = \"fitted\"\nbandwidth_hz = 1e6";
