@@ -72,6 +72,9 @@ pub(crate) fn joint() {
         (&FITTED, 8, "_fitted"),
         (&FITTED, 50, "_fitted"),
         (&FITTED_HIGH, 8, "_fitted_high"),
+        (&FITTED_HIGH, 20, "_fitted_high"),
+        (&FITTED_HIGH, 50, "_fitted_high"),
+        (&FITTED_HIGH, 100, "_fitted_high"),
     ] {
         let (total, longest_call, calls) = solve_instructions(of, relays);
         hprintln!("solved_{}{} {}", relays, suffix, total);

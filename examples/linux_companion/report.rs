@@ -8,10 +8,11 @@ use uav_relay::Geofence;
 use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 
 use uav_relay::{
-    Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, Stats, Upload,
+    Event, Identity, Instant, LineError, Mission, Placement, Relay, Side, SlotShares, Stats, Upload,
 };
 
 use crate::movement::Movement;
+use crate::status;
 use uav_relay_linux::counters::counted;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::Between;
@@ -120,7 +121,12 @@ impl Report {
                     step.log(now, &self.log);
                 }
             }
-            Event::Converged => self.converged(now, relay.target().unwrap_or_default()),
+            Event::Converged => {
+                self.converged(now, relay.target().unwrap_or_default());
+                if let Some(slots) = relay.slot_shares() {
+                    self.log_slots(now, slots);
+                }
+            }
             Event::Infeasible => tell(
                 "infeasible",
                 "no positions give every hop one of the tried target SIRs, so all relays keep their positions; check the mission's interferer, distance and minimum separation",
@@ -327,6 +333,25 @@ impl Report {
             let text = "the relays spread along the line to measure the interferer";
             self.log.event(now, "converged", fields, text);
         }
+    }
+
+    /// Logs begin and end of the relay's fitted slots, as shares of the frame.
+    fn log_slots(&self, now: Instant, slots: SlotShares) {
+        let said = |name: &str, [begin, end]: [f32; 2]| {
+            format!("{name} {:.6} to {:.6}", Exact(begin), Exact(end))
+        };
+        let there = [said("from Tx", slots.from_tx), said("to Rx", slots.to_rx)];
+        let back = [said("from Rx", slots.from_rx), said("to Tx", slots.to_tx)];
+        let [begin, end] = slots.to_tx;
+        let used = there
+            .into_iter()
+            .chain(back.into_iter().filter(|_| end > begin));
+        let used = used.collect::<Vec<_>>().join(", ");
+        let text = format_args!(
+            "shares of the frame: {used}; the chain carries {:.6} bit/s/Hz",
+            Exact(slots.bits_per_hz)
+        );
+        self.log.event(now, "slots", status::slots(slots), text);
     }
 
     fn log_estimate(&self, now: Instant, numbered: NumberedEstimate) {

@@ -1,7 +1,7 @@
 //! State and counters of a relay as one JSON object.
 
 use serde_json::{Value, json};
-use uav_relay::{Placement, Relay, Side};
+use uav_relay::{Placement, Relay, Side, SlotShares};
 use uav_relay_linux::counters::counted;
 
 use crate::hold_reasons;
@@ -9,6 +9,14 @@ use crate::lost::Lost;
 
 pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
+}
+
+/// Returns begin and end of the relay's fitted slots as JSON, as shares of the frame.
+pub(crate) fn slots(of: SlotShares) -> Value {
+    json!({
+        "from_tx": of.from_tx, "to_rx": of.to_rx, "from_rx": of.from_rx, "to_tx": of.to_tx,
+        "bits_per_hz": of.bits_per_hz,
+    })
 }
 
 /// Returns the relay's state as JSON. `index` is the relay's number before flight.
@@ -29,6 +37,7 @@ pub(crate) fn of_relay(
         "version": relay.version(),
         "setpoint": relay.setpoint().map(at),
         "target_sir": relay.target(),
+        "slots": relay.slot_shares().map(slots),
         "transmitter_w": relay.level_w(Side::Upstream),
         "receiver_w": relay.level_w(Side::Downstream),
         "is_passive": relay.is_passive(),

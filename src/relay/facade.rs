@@ -487,14 +487,14 @@ impl Relay {
         self.node.round().target().filter(|_| known)
     }
 
-    /// Returns the shares of the frame time that this relay's slots have at the agreed positions.
+    /// Returns begin and end of this relay's slots at the agreed positions, as shares of the frame.
     ///
     /// `None` unless the mission has fitted slots (`fitted_gap` above 0). Also `None` from the acceptance of a view
     /// (another mission or other relays) to the agreement in it, after the lease has expired, and without a quorum.
     ///
-    /// The shares of all hops add up to 1. They change when the verdict of an agreement reaches this relay: from the
-    /// last relay to the leader, hop by hop. Until the verdict has passed all relays, some have the new shares, and
-    /// the others the old ones or none. [`Event::Converged`] reports that this relay has agreed.
+    /// The slots of all hops fill the frame. They change when the verdict of an agreement reaches this relay: from the
+    /// last relay to the leader, hop by hop. Until the verdict has passed all relays, some have the new slots, and the
+    /// others the old ones or none. [`Event::Converged`] reports that this relay has agreed.
     pub fn slot_shares(&self) -> Option<SlotShares> {
         self.node.slot_shares()
     }

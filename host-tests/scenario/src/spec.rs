@@ -6,7 +6,7 @@ use serde::Deserialize;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Listen};
 
-use super::link::Link;
+use super::link::{Access, Link};
 use super::number::{factor, narrow, watts};
 
 /// Parameters of a flight in a scenario file, in SI units.
@@ -296,6 +296,12 @@ impl Scenario {
     pub fn bandwidth_hz(&self) -> Option<f64> {
         let own = self.link.as_ref().and_then(|link| link.bandwidth_hz);
         own.or_else(|| Some(self.noise.bandwidth_hz).filter(|hz| *hz > 0.0))
+    }
+
+    /// Returns true if the scenario has fitted slots. Relays with the method `joint` then maximise the data rate.
+    pub fn has_fitted_slots(&self) -> bool {
+        let link = self.link.as_ref();
+        link.is_some_and(|link| link.access == Access::Fitted)
     }
 
     /// Returns true if the scenario gives the interference. It may be missing if the relays locate the interferer.

@@ -6,10 +6,11 @@ use std::path::Path;
 use uav_relay::Method;
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::{Scenario, mission};
+use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::setup::Setup;
 
 use crate::chain::{simulated, simulated_by, simulated_with};
-use crate::files::Files;
+use crate::files::{Files, status_of};
 use crate::medium::{Medium, QUIET};
 use crate::process::Relay;
 
@@ -87,6 +88,7 @@ fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
         ..Setup::new(mission::with_access(&scenario, &mission).unwrap())
     };
     setup.settings.method = Method::Joint;
+    let agreed = run(setup.clone()).unwrap();
     let expected = simulated_with(setup);
     assert_eq!(f32::from_bits(expected[1][2]), 30.0);
     assert_ne!(expected, simulated_by(Method::Joint, &scenario, 2));
@@ -94,10 +96,31 @@ fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
         let channel = Medium::new(2, QUIET);
         let mut relays = [0, 1].map(|tty| {
             let place = format!("--index {} --of 2 --shared {}", tty + 1, channel.tty(tty));
-            start(&file, &format!("{place} --method {name}"))
+            let socket = folder.text(&format!("status{tty}"));
+            start(
+                &file,
+                &format!("{place} --method {name} --status-socket {socket}"),
+            )
         });
-        for (relay, place) in relays.iter_mut().zip(&expected) {
+        for (tty, (relay, place)) in relays.iter_mut().zip(&expected).enumerate() {
             relay.settles_at(*place);
+            let slots = agreed.relays[tty].slot_shares.unwrap();
+            let line = relay.line("slots: ");
+            for bound in [slots.from_tx, slots.to_rx].as_flattened() {
+                let exact = format!("{bound:.6} (0x{:08x})", bound.to_bits());
+                assert!(line.contains(&exact), "{exact} {line}");
+            }
+            assert!(!line.contains("from Rx"), "one direction: {line}");
+            let status = status_of(folder.path(&format!("status{tty}")));
+            for (key, slot) in [
+                ("from_tx", slots.from_tx),
+                ("to_rx", slots.to_rx),
+                ("to_tx", [1.0; 2]),
+            ] {
+                let shown = status["relay"]["slots"][key].clone();
+                let shown: [f32; 2] = serde_json::from_value(shown).unwrap();
+                assert_eq!(shown, slot, "{status}");
+            }
         }
     }
 }

@@ -130,8 +130,11 @@ impl Relay {
         loop {
             let line = self.line(" (0x");
             let mut agreed = bits(&line);
-            if !line.contains("converged: ") {
+            if line.contains("setpoint: ") {
                 place = agreed;
+                continue;
+            }
+            if !line.contains("converged: ") {
                 continue;
             }
             agreed.splice(0..0, place.iter().copied());

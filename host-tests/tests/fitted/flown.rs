@@ -1,9 +1,11 @@
 //! Chains that agree on fitted slots by messages, and carry data in them.
 
-use uav_relay::{Identity, Instant, Method, Mission, Placement, Relay, Settings, SetupError};
-use uav_relay_scenario::mission;
+use uav_relay::{
+    Identity, Instant, Method, Mission, Placement, Relay, Settings, SetupError, SlotShares,
+};
+use uav_relay_scenario::{RelayOverride, mission};
 use uav_relay_sim::simulator::chain::run;
-use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::outcome::{Ending, Moment, Outcome, TimelineEvent};
 use uav_relay_sim::simulator::route::{DataLink, TrueHops};
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_sim::simulator::traffic::{TrafficSpec, traffic};
@@ -32,23 +34,52 @@ fn setup(case: &Case) -> Setup {
     setup
 }
 
-/// Checks that the relays have the shares of one frame: each slot has one share, and all add up to 1.
-fn check_shares(outcome: &Outcome, what: &str) {
+/// Checks that the relays have the slots of one frame, in order and without overlap or gap.
+fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     let flying = outcome.relays.iter().filter(|relay| relay.killed.is_none());
     let shares: Vec<_> = flying.map(|relay| relay.slot_shares.unwrap()).collect();
     for pair in shares.windows(2) {
-        assert_eq!(pair[0].to_rx.to_bits(), pair[1].from_tx.to_bits(), "{what}");
-        assert_eq!(pair[0].from_rx.to_bits(), pair[1].to_tx.to_bits(), "{what}");
+        assert_eq!(pair[0].to_rx, pair[1].from_tx, "{what}");
+        assert_eq!(pair[0].from_rx, pair[1].to_tx, "{what}");
         assert_eq!(pair[0].bits_per_hz.to_bits(), pair[1].bits_per_hz.to_bits());
     }
+    // Tx knows its slots from the first relay, Rx from the last one.
     let last = shares[shares.len() - 1];
-    let sum: f64 = shares
-        .iter()
-        .flat_map(|share| [share.from_tx, share.to_tx])
-        .chain([last.to_rx, last.from_rx])
-        .map(f64::from)
-        .sum();
-    assert!((sum - 1.0).abs() < 1e-5, "{what}: {sum}");
+    let there = shares.iter().map(|own| own.from_tx).chain([last.to_rx]);
+    let back = shares.iter().rev().map(|own| own.to_tx);
+    let slots: Vec<_> = there.chain([last.from_rx]).chain(back).collect();
+    assert_eq!(slots.len(), 2 * (shares.len() + 1), "{what}");
+    let mut at = 0.0;
+    for (number, [begin, end]) in slots.iter().enumerate() {
+        assert_eq!(*begin, at, "{what}: slot {number} of {slots:?}");
+        let is_used = number <= shares.len() || reverse > 0.0;
+        assert_eq!(end > begin, is_used, "{what}: slot {number} of {slots:?}");
+        at = *end;
+    }
+    assert_eq!(at, 1.0, "{what}: {slots:?}");
+}
+
+/// Checks the lengths of the slots against the times of the hops by the true SINRs.
+fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
+    let places: Vec<Placement> = solved.iter().map(|(at, _)| *at).collect();
+    let time = case.time(&places);
+    let [there, back] = case.times(&places);
+    for (index, (_, own)) in solved.iter().enumerate() {
+        for (slot, times, hop) in [
+            (own.from_tx, &there, index),
+            (own.to_rx, &there, index + 1),
+            (own.to_tx, &back, index),
+            (own.from_rx, &back, index + 1),
+        ] {
+            let share = times.get(hop).map_or(0.0, |hop| hop / time);
+            let [begin, end] = slot.map(f64::from);
+            let off = (end - begin - share).abs();
+            assert!(
+                off < 1e-4 * share + 3e-6,
+                "{what}: {slot:?} {share} {index}"
+            );
+        }
+    }
 }
 
 /// Checks that simulated relays agree on the solver's positions and on the shares of one frame.
@@ -69,10 +100,11 @@ fn a_chain_agrees_on_fitted_places_and_shares() {
             .map(|relay| relay.setpoint.unwrap())
             .collect();
         assert_eq!(flown, places, "{what}");
-        check_shares(&outcome, &what);
+        check_shares(&outcome, mission.config().reverse, &what);
         for (relay, (_, shares)) in outcome.relays.iter().zip(&solved) {
             assert_eq!(relay.slot_shares, Some(*shares), "{what}");
         }
+        check_lengths(&case, &solved, &what);
     }
 }
 
@@ -95,7 +127,66 @@ fn the_remaining_relays_share_the_frame_after_a_loss() {
             .iter()
             .all(|relay| relay.killed.is_some() || relay.relays == case.relays - 1)
     );
-    check_shares(&outcome, "relay 3 lost");
+    check_shares(&outcome, case.mission().config().reverse, "relay 3 lost");
+}
+
+/// Checks that after the restart of a relay the slots of the next agreement fill the frame.
+#[test]
+fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
+    let case = Case::draw(1);
+    let relays = usize::from(case.relays);
+    for (index, at_ms) in [(1, 20_000), (3, 20_000), (case.relays, 20_001)] {
+        let mut setup = Setup {
+            profiles: setup(&case).profiles,
+            boots: vec![(index, Instant::from_millis(at_ms))],
+            ..Setup::on_shared_channel(case.mission())
+        };
+        setup.settings.method = Method::Joint;
+        let outcome = run(setup).unwrap();
+        let booted = TimelineEvent::Booted;
+        assert!(outcome.moments.iter().any(|moment| moment.what == booted));
+        assert_eq!(outcome.relays.len(), relays);
+        check_shares(
+            &outcome,
+            case.mission().config().reverse,
+            "a relay restarted",
+        );
+    }
+}
+
+/// Checks that relays agree first with the common power, and then with all powers.
+///
+/// If the leader itself has another power, it gathers the powers first.
+#[test]
+fn the_first_agreement_is_for_the_common_power() {
+    let case = Case {
+        relays: 6,
+        ..Case::draw(1)
+    };
+    for (other, agreements) in [(None, 1), (Some(3), 2), (Some(6), 2), (Some(1), 1)] {
+        let mut case = case.clone();
+        case.scenario.relays.clear();
+        if let Some(index) = other {
+            let own = RelayOverride {
+                altitude_m: None,
+                power_w: Some(3.0),
+            };
+            case.scenario.relays.insert(index, own);
+        }
+        let mission = case.mission();
+        assert_eq!(mission.leader(), 1);
+        let outcome = run(setup(&case)).unwrap();
+        for relay in 2..=6 {
+            let of =
+                |moment: &&Moment| moment.relay == relay && moment.what == TimelineEvent::Converged;
+            let found = outcome.moments.iter().filter(of).count();
+            assert_eq!(found, agreements, "{other:?} {relay}");
+        }
+        let solved = fitted(&mission, case.seats(&mission));
+        for (relay, (_, shares)) in outcome.relays.iter().zip(&solved) {
+            assert_eq!(relay.slot_shares, Some(*shares), "{other:?}");
+        }
+    }
 }
 
 /// Checks that the agreed fitted slots deliver the predicted rate, also in both directions.

@@ -10,6 +10,7 @@
 
 mod flown;
 mod scenes;
+mod several;
 
 use core::task::Poll;
 

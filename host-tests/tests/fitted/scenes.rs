@@ -16,7 +16,7 @@ pub(crate) fn number(name: &str, default: u64) -> u64 {
 }
 
 /// Random test case: scenario, data link with fitted slots, and number of relays.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Case {
     pub(crate) scenario: Scenario,
     pub(crate) radio: Radio,
@@ -102,20 +102,27 @@ impl Case {
         }
     }
 
-    /// Returns the time of one bit through relays at `places` by the true SINRs, in 1 / bandwidth.
-    pub(crate) fn time(&self, places: &[Placement]) -> f64 {
+    /// Returns the times of the hops for one bit to Rx and `reverse` bits back, in 1 / bandwidth. The
+    /// second list is empty in one direction.
+    pub(crate) fn times(&self, places: &[Placement]) -> [Vec<f64>; 2] {
         let scene = Scene::new(&self.scenario, self.relays).unwrap();
         let places: Vec<Place> = places.iter().map(|at| (*at).into()).collect();
-        let time = |sirs: Vec<f64>| -> f64 {
+        let reverse = self.scenario.reverse;
+        let time = |sirs: Vec<f64>, bits: f64| -> Vec<f64> {
+            let model = &self.radio.link.model;
             sirs.iter()
-                .map(|sir| 1.0 / self.radio.link.model.bits_per_hz(*sir))
-                .sum()
+                .map(|sir| bits / model.bits_per_hz(*sir))
+                .collect()
         };
-        let there = time(scene.hop_sirs(&places));
-        if self.scenario.reverse > 0.0 {
-            there + self.scenario.reverse * time(scene.hop_sirs_back(&places))
-        } else {
-            there
+        let there = time(scene.hop_sirs(&places), 1.0);
+        if reverse > 0.0 {
+            return [there, time(scene.hop_sirs_back(&places), reverse)];
         }
+        [there, Vec::new()]
+    }
+
+    /// Returns the time of one bit through relays at `places` by the true SINRs, in 1 / bandwidth.
+    pub(crate) fn time(&self, places: &[Placement]) -> f64 {
+        self.times(places).iter().flatten().sum()
     }
 }

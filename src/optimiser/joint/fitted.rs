@@ -68,21 +68,26 @@ const BEST_WIDTH: f32 = 1.0 / 16.0;
 /// from the interferer, the second one of the altitude band above the common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Shares of the frame time that the hops next to a relay have, with fitted slots.
+/// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
 ///
-/// They are lengths of slots, and do not say when a slot begins. For that a radio also needs the shares of the hops
-/// before, the length of the frame, and a clock that all nodes share.
+/// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
+/// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
+/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio
+/// the length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about
+/// 6e-8, so a shorter slot may be empty.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
-    /// Share of the slot in which this relay sends to the next node toward Rx.
-    pub to_rx: f32,
-    /// Share of the slot in which this relay sends to the next node toward Tx. 0 in a mission of one direction.
-    pub to_tx: f32,
-    /// Share of the slot in which this relay receives from the next node toward Tx.
-    pub from_tx: f32,
-    /// Share of the slot in which this relay receives from the next node toward Rx. 0 in a mission of one direction.
-    pub from_rx: f32,
+    /// Begin and end of the slot in which this relay sends to the next node toward Rx.
+    pub to_rx: [f32; 2],
+    /// Begin and end of the slot in which this relay sends to the next node toward Tx. Empty, 1 and 1, in a mission
+    /// of one direction.
+    pub to_tx: [f32; 2],
+    /// Begin and end of the slot in which this relay receives from the next node toward Tx.
+    pub from_tx: [f32; 2],
+    /// Begin and end of the slot in which this relay receives from the next node toward Rx. Empty, 1 and 1, in a
+    /// mission of one direction.
+    pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
     pub bits_per_hz: f32,
 }
@@ -184,6 +189,8 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
+    /// Positions of the best chain. Once the chain is solved, `[there, back, _]`: the sums of the times of the hops to
+    /// each relay, toward Rx and back.
     best_places: [Triple; RELAYS],
     /// Best state of the relay before, for each state of a relay: three bits each.
     choices: [u16; RELAYS],
@@ -201,6 +208,8 @@ pub(super) struct Fitted<const RELAYS: usize> {
     before: f32,
     /// Time of the best chain; 0 before the first.
     best: f32,
+    /// Sums of the times of the solved chain's hops, toward Rx and back.
+    sums: [f32; 2],
     worst: f32,
 }
 
@@ -228,6 +237,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         time: 0.0,
         before: 0.0,
         best: 0.0,
+        sums: [0.0; 2],
         worst: 0.0,
     };
 
@@ -243,7 +253,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
                     return Poll::Ready(Err(Infeasible));
                 }
                 self.places = self.best_places;
-                (self.time, self.worst) = (0.0, f32::INFINITY);
+                self.worst = f32::INFINITY;
                 self.work = Work::Sum(1);
             }
             Work::Begin(done) => self.begin(chain, done),
@@ -253,7 +263,12 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
                 let end = (index + OTHERS_AT_ONCE).min(relays + 2);
                 for index in index..end {
                     let [there, back] = self.hop_times(chain, index);
-                    self.time += there + back;
+                    let [all_there, all_back] = self.sums;
+                    self.sums = [all_there + there, all_back + back];
+                    let [there, back] = self.sums;
+                    if let Some(kept) = self.best_places.get_mut(usize::from(index - 1)) {
+                        *kept = [there, back, 0.0];
+                    }
                 }
                 if end > relays + 1 {
                     return Poll::Ready(Ok(self.worst));
@@ -471,15 +486,34 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the position of relay `index`, and the shares of its slots, once the chain is solved.
+    /// Returns the end of the slot to Rx of hop `hop`, 0..=N + 1, and the begin of its slot back. 0 and 1 for hop 0.
+    fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
+        let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
+        let [there, back] = match (kept, hop) {
+            (_, 0) => [0.0; 2],
+            (Some(&[there, back, _]), _) if hop <= relays => [there, back],
+            _ => self.sums,
+        };
+        let [all_there, all_back] = self.sums;
+        let share = |time: f32| time / (all_there + all_back);
+        // The slots of the two directions meet at one number, to the bit.
+        let middle = 1.0 - share(all_back);
+        let end = if hop > relays { 1.0 } else { share(there) };
+        [end.min(middle), 1.0 - share(back)]
+    }
+
+    /// Returns the position of relay `index`, and its slots, once the chain is solved.
     pub(super) fn place(
-        &mut self,
+        &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
         index: u16,
     ) -> (Placement, SlotShares) {
-        let [from_tx, to_tx] = self.hop_times(chain, index);
-        let [to_rx, from_rx] = self.hop_times(chain, index + 1);
-        let bits_per_hz = 1.0 / self.time;
+        let bounds = |hop| self.bounds(chain.mission.relays(), hop);
+        let [[begin, last], [middle, begin_back], [end, first_back]] = [
+            bounds(index.saturating_sub(1)),
+            bounds(index),
+            bounds(index + 1),
+        ];
         let [x_m, y_m, altitude_m] = self
             .spot(chain, index, 0.0)
             .at
@@ -488,11 +522,11 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             .room
             .nearest(CrossSection { y_m, altitude_m });
         let shares = SlotShares {
-            to_rx: to_rx * bits_per_hz,
-            to_tx: to_tx * bits_per_hz,
-            from_tx: from_tx * bits_per_hz,
-            from_rx: from_rx * bits_per_hz,
-            bits_per_hz,
+            to_rx: [middle, end],
+            to_tx: [begin_back, last],
+            from_tx: [begin, middle],
+            from_rx: [first_back, begin_back],
+            bits_per_hz: 1.0 / self.sums.iter().sum::<f32>(),
         };
         (at.at(x_m), shares)
     }

@@ -9,7 +9,7 @@ use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Scenario, mission};
 
 use super::attack::AttackReport;
-use super::hops::{LostReport, RelayReport, WorstBack, db, hop_sirs, hop_sirs_back};
+use super::hops::{HopSlots, LostReport, RelayReport, WorstBack, db, hop_sirs, hop_sirs_back};
 use super::sensing::SensingReport;
 use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
 use super::traffic::TrafficReport;
@@ -88,6 +88,9 @@ pub struct ChainReport {
     /// SIR of the last hop, at Rx, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rx_sir_db: Option<f64>,
+    /// Time slots of every hop on which the relays agreed; empty unless the mission has fitted slots.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hop_slots: Vec<HopSlots>,
     /// Number of passes (messages forwarded along the whole chain) and view proposals that relays began.
     pub sweeps: u32,
     /// Number of frames sent on all links.
@@ -173,6 +176,7 @@ impl ChainReport {
             report.index = *node;
             report.version = offered.map(|_| relay.version);
         }
+        let slots: Option<Vec<_>> = chain.iter().map(|(_, relay)| relay.slot_shares).collect();
         let flown = u16::try_from(chain.len()).unwrap_or(u16::MAX);
         let rx_sir = sirs.last().copied();
         let injected = outcome.injected;
@@ -202,6 +206,7 @@ impl ChainReport {
             relays,
             rx_sir,
             rx_sir_db: rx_sir.map(db),
+            hop_slots: slots.map_or_else(Vec::new, |slots| HopSlots::agreed(&slots)),
             sweeps: outcome.sweeps,
             messages: outcome.messages,
             bytes: outcome.bytes,
@@ -248,6 +253,7 @@ impl ChainReport {
     pub fn table(&self) -> String {
         let rx = (self.rx_sir, self.back.map(|back| back.rx_sir_back));
         let mut text = hops::hops_table(&self.relays, &self.lost, rx, self.room);
+        text += &HopSlots::table(&self.hop_slots);
         if let (Some(sir), Some(sir_db)) = (self.sir, self.sir_db) {
             _ = writeln!(
                 text,

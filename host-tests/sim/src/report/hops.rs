@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay::place::Station;
 use uav_relay::sir::{Sender, at_receiver, at_transmitter};
-use uav_relay::{Mission, Placement, Profile};
+use uav_relay::{Mission, Placement, Profile, SlotShares};
 
 /// Position of a relay at the end of a run, and the SIR at which it receives.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -30,6 +30,83 @@ pub struct RelayReport {
     /// Version of the relay's mission; 0 for the mission loaded before the start. Absent without uploads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
+}
+
+/// Time slots of a hop in fitted slots: begin and end of each, as shares of the frame, 0 to 1.
+///
+/// The slots toward Rx follow one another from hop 1 on, and after them the slots back from the last hop on.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct HopSlots {
+    /// Number of the hop, from 1: hop k connects the nodes k - 1 and k of the chain. Node 0 is Tx.
+    pub hop: usize,
+    /// Begin and end of the slot in the direction to Rx.
+    pub slot: [f64; 2],
+    /// Begin and end of the slot in the direction to Tx; absent without data in that direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slot_back: Option<[f64; 2]>,
+}
+
+impl HopSlots {
+    /// Returns the slots of all hops from the times that these need for their data: to Rx, and to Tx.
+    ///
+    /// `back` is empty for one direction. The result is empty if a hop carries nothing, so that its time is infinite.
+    pub fn of(there: &[f64], back: &[f64]) -> Vec<Self> {
+        let frame: f64 = there.iter().chain(back.iter().rev()).sum();
+        let mut spent = 0.0;
+        let mut next = |time: &f64| {
+            let begin = spent / frame;
+            spent += time;
+            [begin, spent / frame]
+        };
+        let there: Vec<_> = there.iter().map(&mut next).collect();
+        let mut back: Vec<_> = back.iter().rev().map(next).collect();
+        back.reverse();
+        let hops = (1..).zip(there).filter(|_| frame.is_finite());
+        hops.map(|(hop, slot)| Self {
+            hop,
+            slot,
+            slot_back: back.get(hop - 1).copied(),
+        })
+        .collect()
+    }
+
+    /// Returns the slots of all hops from those that the relays of a chain have agreed on, relay 1 first.
+    pub fn agreed(relays: &[SlotShares]) -> Vec<Self> {
+        let last = relays.last().map(|last| (last.to_rx, last.from_rx));
+        let hops = relays.iter().map(|own| (own.from_tx, own.to_tx));
+        (1..)
+            .zip(hops.chain(last))
+            .map(|(hop, (slot, [begin, end]))| Self {
+                hop,
+                slot: slot.map(f64::from),
+                slot_back: (end > begin).then_some([begin, end].map(f64::from)),
+            })
+            .collect()
+    }
+
+    /// Formats the slots of all hops as a table; empty without slots.
+    pub fn table(hops: &[Self]) -> String {
+        let mut text = String::new();
+        for Self {
+            hop,
+            slot,
+            slot_back,
+        } in hops
+        {
+            if *hop == 1 {
+                let back = slot_back.map_or("", |_| "    back from         to");
+                _ = writeln!(text, "{:>6} {:>12} {:>10}{back}", "hop", "slot from", "to");
+            }
+            let back = slot_back.map(|[begin, end]| format!(" {begin:>12.6} {end:>10.6}"));
+            let [begin, end] = slot;
+            _ = writeln!(
+                text,
+                "{hop:>6} {begin:>12.6} {end:>10.6}{}",
+                back.unwrap_or_default()
+            );
+        }
+        text
+    }
 }
 
 /// Relay that is not in the chain at the end of a run.

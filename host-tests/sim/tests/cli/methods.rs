@@ -28,6 +28,34 @@ fn fitted_slots_are_flown_by_joint() {
         (0.95..=1.0).contains(&(delivered / fitted)),
         "{delivered} {fitted}"
     );
+    // The relays' slots fill the frame, in order: toward Rx from hop 1 on, then back from the last hop on.
+    let slots = json(&format!("{ask} --method joint"))["hop_slots"].clone();
+    let slots = slots.as_array().unwrap();
+    let bounds = |key: &str| -> Vec<[f64; 2]> {
+        let slots = slots.iter().map(|hop| &hop[key]);
+        slots
+            .map(|slot| [0, 1].map(|end| slot[end].as_f64().unwrap()))
+            .collect()
+    };
+    let [there, back] = ["slot", "slot_back"].map(bounds);
+    assert_eq!(there.len(), 6);
+    let mut at = 0.0;
+    for [begin, end] in there.iter().chain(back.iter().rev()) {
+        assert!(*begin == at && end > begin, "{slots:?}");
+        at = *end;
+    }
+    assert_eq!(at, 1.0);
+    let table = chain(&format!("{ask} --method joint")).stdout;
+    let table = String::from_utf8(table).unwrap();
+    let row = format!(
+        "     2 {:>12.6} {:>10.6} {:>12.6} {:>10.6}\n",
+        there[1][0], there[1][1], back[1][0], back[1][1]
+    );
+    assert!(table.contains(&row), "{row}{table}");
+    assert_eq!(
+        json(&format!("{ask} --method align"))["hop_slots"],
+        Value::Null
+    );
     with("steps = [{ sinr_db = 0.0, bits_per_hz = 1.0 }]");
     let (_, line) = refusal(&format!("{ask} --method joint"));
     assert!(

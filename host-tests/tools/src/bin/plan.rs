@@ -36,6 +36,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number();
+    check_target(options, &scenario)?;
     check_out(options, &scenario)?;
     check_map(options, &scenario)?;
     let ask = PlanRequest {
@@ -357,6 +358,24 @@ impl Options {
             (None, None, None) => Number::Of(1),
         }
     }
+}
+
+/// Rejects a target SIR for relays that choose the positions of the largest data rate.
+fn check_target(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
+    let wanted = &options.wanted;
+    let asked = match (wanted.target_sir, wanted.target_sir_db) {
+        (Some(sir), _) => format!("--target-sir {sir:?}"),
+        (_, Some(db)) => format!("--target-sir-db {db:?}"),
+        (None, None) => return Ok(()),
+    };
+    // In a [field] the relays stay at one altitude, and choose the positions of the largest SIR.
+    let is_known = matches!(scenario.interference, Interference::Sources(_));
+    if options.altitude == Altitude::Free && scenario.has_fitted_slots() && is_known {
+        return Err(Failure::input(format!(
+            "{asked}: cannot be used with --altitude free and link.access = \"fitted\", because such relays choose the positions of the largest data rate; allowed: --target-rate-bps or --uavs, or link.access = \"slots\" or \"channels\", or --altitude given"
+        )));
+    }
+    Ok(())
 }
 
 /// Checks the options that concern `--out` before planning, so that a mistake is found at once.

@@ -12,27 +12,22 @@ use uav_relay::place::Station;
 use uav_relay::{Mission, Placement};
 
 use super::{NoPlan, Plan, ProfiledMission, Why, source};
-use uav_relay_scenario::link::{Access, RateModel};
 use uav_relay_scenario::{Scenario, mission};
 
 const MOST: usize = Mission::MAX_RELAYS as usize;
 
 type Chain = Solver<MOST, { MOST / 10 }>;
 
-/// Returns true if the relays fit their slots on board, with the method joint. They refuse a table of rate steps.
-pub(super) fn fits(scenario: &Scenario) -> bool {
-    scenario.link.as_ref().is_some_and(|link| {
-        link.access == Access::Fitted && matches!(link.model, RateModel::Shannon { .. })
-    })
-}
-
 /// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
 ///
-/// If the method finds none, the relays keep the altitudes that the scenario gives them.
+/// With fitted slots the positions are those of the largest data rate. If the method finds none, the relays keep the
+/// altitudes that the scenario gives them.
+///
+/// # Errors
+/// [`NoPlan`] if the scenario is not a valid mission, or for fitted slots with a table of rate steps.
 pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
     let mut briefed = ProfiledMission::new(scenario, relays, tolerance)?;
-    // Relays refuse fitted slots with rate steps, so such a plan is that of the largest SIR.
-    briefed.mission = mission::with_access(scenario, &briefed.mission).unwrap_or(briefed.mission);
+    briefed.mission = mission::with_access(scenario, &briefed.mission)?;
     match joint(&briefed) {
         Some(places) => {
             let how = if briefed.mission.fitted_gap() > 0.0 {

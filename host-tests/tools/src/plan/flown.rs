@@ -8,7 +8,7 @@ use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Scenario, mission};
 
 use super::multi_interferer::with_one;
-use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, source};
+use super::{LOSS, NoPlan, Number, Plan, PlanRequest, altitude, fitted_radio, merit, source};
 
 /// Result of the on-board method for a scenario: the positions on which the relays would agree.
 #[derive(Clone, PartialEq, Debug)]
@@ -17,29 +17,38 @@ pub struct Flown {
     pub plan: Plan,
     /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
+    /// Data rate of the relays' positions and the best one found, over the bandwidth, bit/s/Hz. Only if the relays fit
+    /// their slots: the rate then counts instead of the SIR.
+    pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
 }
 
 impl Flown {
-    /// Returns the loss of SIR by the relays' positions, as a fraction of the best SIR.
+    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots it is that of the
+    /// best data rate.
     pub fn loss(&self) -> f64 {
-        (1.0 - self.plan.sir() / self.best_sir).max(0.0)
+        let [own, best] = self.rates.unwrap_or([self.plan.sir(), self.best_sir]);
+        (1.0 - own / best).max(0.0)
     }
 
-    /// Returns true if the relays' positions lose more than 1 % of the best SIR ([`LOSS`]).
+    /// Returns true if the relays' positions lose more than 1 % of the best SIR or data rate ([`LOSS`]).
     pub fn is_poor(&self) -> bool {
         self.loss() > LOSS
     }
 
-    /// Returns a line for the user: how much SIR the relays' positions lose, why, and what to do.
+    /// Returns a line for the user: the loss by the relays' positions, its cause, and what to do.
     pub fn describe(&self) -> String {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
             (
                 "because the relays compute with one hypothetical interferer in place of all",
-                "let the relays estimate the interferer ([listen]; `cargo chain --listen` simulates it), or plan other altitudes or more \
-                 relays for the sum of all interferers (`cargo plan`)",
+                if self.rates.is_some() {
+                    "plan another number of relays or other altitudes (`cargo plan`), or use another link.access"
+                } else {
+                    "let the relays estimate the interferer ([listen]; `cargo chain --listen` simulates it), or plan other altitudes or more \
+                     relays for the sum of all interferers (`cargo plan`)"
+                },
             )
         } else {
             (
@@ -47,8 +56,12 @@ impl Flown {
                 "plan another geometry.altitude_m or another number of relays (`cargo plan`)",
             )
         };
+        let reached = match self.rates {
+            Some([own, best]) => format!("carry {own:.4} bit/s/Hz instead of the {best:.4}"),
+            None => format!("reach an SIR of {reach:.2} dB instead of the {best:.2} dB"),
+        };
         format!(
-            "the relays would reach an SIR of {reach:.2} dB instead of the {best:.2} dB of the best positions, {:.1} % less, {why}; {remedy}",
+            "the relays would {reached} of the best positions, {:.1} % less, {why}; {remedy}",
             100.0 * self.loss()
         )
     }
@@ -72,9 +85,16 @@ pub fn flown(
     };
     let best = super::plan(scenario, &ask)?;
     let best_sir = best.sir().max(plan.sir());
+    let radio = fitted_radio(scenario, ask.free_altitude);
+    let scene = Scene::new(scenario, relays);
+    let rates = radio.zip(scene).map(|(radio, scene)| {
+        let [own, best] = [&plan, &best].map(|of| merit(Some(&radio), &scene, &of.chain()));
+        [own, best.max(own)]
+    });
     Ok(Flown {
         plan,
         best_sir,
+        rates,
         stand_in: mission::hypothetical(scenario).is_some(),
     })
 }

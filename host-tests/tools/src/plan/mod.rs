@@ -28,8 +28,9 @@ mod steps;
 
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;
+use uav_relay_scenario::link::Radio;
 use uav_relay_scenario::mission::Refusal;
-use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, mission};
 use uav_relay_sim::report::{WorstBack, hop_sirs, hop_sirs_back};
 
@@ -131,6 +132,11 @@ pub struct Fitted {
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
     /// against all interferers.
     pub kept: bool,
+    /// Loss by the positions for the hypothetical interferer, as a fraction of the plan's SIR, 0 to 1. It is a loss of
+    /// data rate if the relays fit their slots. `None` if no such positions were found.
+    pub loss: Option<f64>,
+    /// True if the relays fit their slots, so that the data rate decides which positions are better.
+    pub by_rate: bool,
 }
 
 /// Result of the planner: positions of the relays and SIRs of the hops.
@@ -257,6 +263,31 @@ impl Plan {
             ..self
         }
     }
+}
+
+/// Returns the data link of relays that fit their slots, with a bandwidth of 1 Hz; else `None`.
+fn fitted_radio(scenario: &Scenario, free_altitude: bool) -> Option<Radio> {
+    let fits = free_altitude && scenario.has_fitted_slots();
+    let link = scenario.link.clone().filter(|_| fits)?;
+    Some(Radio {
+        link,
+        bandwidth_hz: 1.0,
+    })
+}
+
+/// Returns the value that relays maximise in `scene`: the SIR of the worst hop, linear.
+///
+/// With a `radio` it is the data rate to Rx in fitted slots, bit/s.
+fn merit(radio: Option<&Radio>, scene: &Scene, places: &[impl Copy + Into<Place>]) -> f64 {
+    let Some(radio) = radio else {
+        return scene.chain_sir(places);
+    };
+    let there = scene.hop_sirs(places);
+    if scene.reverse > 0.0 {
+        let [rate_bps, _] = radio.both_bps(&there, &scene.hop_sirs_back(places), scene.reverse);
+        return rate_bps;
+    }
+    radio.chain_bps(&there)
 }
 
 /// Returns the plan with the fewest relays whose SIR, by `sir`, is at least `target`. `plan` computes the plan of a number of

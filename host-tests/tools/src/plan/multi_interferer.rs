@@ -2,14 +2,15 @@
 //!
 //! A hypothetical interferer replaces them, so that relays can find their positions by themselves. These positions are judged
 //! against the true sum; if they lose more than a hundredth to the best against that sum, the latter are used. For both directions
-//! the best are those of a shortest path.
+//! the best are those of a shortest path. If relays with free altitudes fit their slots, the data rate decides instead of the SIR.
 
 use uav_relay::Placement;
 
 use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
 use super::{
-    Fitted, LOSS, NoPlan, Number, Plan, PlanRequest, ProfiledMission, altitude, fewest_of, source,
+    Fitted, LOSS, NoPlan, Number, Plan, PlanRequest, ProfiledMission, altitude, fewest_of,
+    fitted_radio, merit, source,
 };
 use crate::multi_interferer::{best_common_altitude, optimum, polish};
 use uav_relay_scenario::hypothetical::Hypothetical;
@@ -31,6 +32,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPla
         scenario,
         ask,
         hypothetical,
+        radio: fitted_radio(scenario, ask.free_altitude),
     };
     match ask.number {
         Number::Of(relays) => planner.candidates(relays)?.chosen(&planner, None),
@@ -47,6 +49,7 @@ pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPla
                     scenario,
                     ask,
                     hypothetical,
+                    radio: None,
                 }
                 .fewest(target)
             },
@@ -71,6 +74,8 @@ struct Planner<'a> {
     scenario: &'a Scenario,
     ask: &'a PlanRequest,
     hypothetical: Hypothetical,
+    /// Data link whose rate decides which positions are better; `None` if the SIR decides.
+    radio: Option<Radio>,
 }
 
 /// Two candidate chains with the same number of relays.
@@ -80,14 +85,15 @@ struct Planner<'a> {
 struct Candidates {
     scene: Scene,
     relays: u16,
+    /// Chain for the hypothetical interferer, and its value ([`merit`]).
     by_one: Option<(Plan, f64)>,
     by_all: Option<Best>,
 }
 
-/// Best chain found against the sum of all interferers.
+/// Best chain found against the sum of all interferers, with its value ([`merit`]).
 struct Best {
     places: Vec<Placement>,
-    sir: f64,
+    value: f64,
     proven: bool,
 }
 
@@ -101,8 +107,8 @@ impl Planner<'_> {
         };
         let by_one = match source::plan(&with_one(self.scenario, &self.hypothetical), &ask) {
             Ok(plan) => {
-                let sir = scene.chain_sir(&plan.chain());
-                Some((plan, sir))
+                let value = merit(self.radio.as_ref(), &scene, &plan.chain());
+                Some((plan, value))
             }
             Err(NoPlan::Unmet(..)) => None,
             Err(wrong) => return Err(wrong),
@@ -123,6 +129,9 @@ impl Planner<'_> {
         if let Some(x_m) = self.ask.x_m {
             return at(scene, x_m);
         }
+        if let Some(radio) = &self.radio {
+            return self.by_rate(radio, scene, start);
+        }
         if scene.reverse > 0.0 {
             return both_ways(scene, start, self.ask.tolerance);
         }
@@ -130,18 +139,14 @@ impl Planner<'_> {
             && let Some(chain) = optimum(scene)
         {
             let proven = !chain.separation_binds();
-            return Some(Best::new(scene, &chain.places, proven));
+            return Some(Best::new(None, scene, &chain.places, proven));
         }
         let mut scene = scene.clone();
         let mut starts = Vec::new();
         if self.ask.free_altitude {
             let common = best_common_altitude(&scene).map(|chain| chain.places);
             starts.extend(common.map(|chain| chain.into_iter().map(Place::from).collect()));
-            starts.extend(self.variants().iter().filter_map(|variant| {
-                let relays = u16::try_from(scene.relays.len()).ok()?;
-                let plan = altitude::best(variant, relays, self.ask.tolerance).ok()?;
-                Some(places(&plan))
-            }));
+            starts.extend(self.of_variants(&scene));
         } else {
             // Relays keep their different altitudes, right above the line.
             (scene.band.left_m, scene.band.right_m) = (0.0, 0.0);
@@ -159,8 +164,32 @@ impl Planner<'_> {
         starts
             .into_iter()
             .filter_map(|(_, start)| polish(&scene, &start, scene.band))
-            .map(|polished| Best::new(&scene, &polished.places, false))
-            .max_by(|a, b| a.sir.total_cmp(&b.sir))
+            .map(|polished| Best::new(None, &scene, &polished.places, false))
+            .max_by(|a, b| a.value.total_cmp(&b.value))
+    }
+
+    /// Returns the best chains of the [`Planner::variants`].
+    fn of_variants(&self, scene: &Scene) -> Vec<Vec<Place>> {
+        let best = |variant: &Scenario| {
+            let relays = u16::try_from(scene.relays.len()).ok()?;
+            let plan = altitude::best(variant, relays, self.ask.tolerance).ok()?;
+            Some(places(&plan))
+        };
+        self.variants().iter().filter_map(best).collect()
+    }
+
+    /// Returns the chain with the largest data rate that is found from several start chains.
+    fn by_rate(&self, radio: &Radio, scene: &Scene, start: Option<&Plan>) -> Option<Best> {
+        let mut starts = self.of_variants(scene);
+        starts.extend(start.map(places));
+        starts.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|start| merit(Some(radio), scene, start));
+            b.total_cmp(&a)
+        });
+        starts.truncate(POLISHED);
+        let improved = starts.into_iter().map(|start| faster(radio, scene, start));
+        let best = improved.map(|places| Best::new(Some(radio), scene, &places, false));
+        best.max_by(|a, b| a.value.total_cmp(&b.value))
     }
 
     /// Returns scenarios with a single interferer, whose best chains serve as further start chains.
@@ -210,24 +239,29 @@ impl Planner<'_> {
 
 impl Candidates {
     fn sir(&self) -> f64 {
-        let one = self.by_one.as_ref().map_or(0.0, |(_, sir)| *sir);
-        let all = self.by_all.as_ref().map_or(0.0, |best| best.sir);
+        let one = self.by_one.as_ref().map_or(0.0, |(_, value)| *value);
+        let all = self.by_all.as_ref().map_or(0.0, |best| best.value);
         one.max(all)
     }
 
-    /// Returns the chain for the hypothetical interferer if its SIR suffices, else the best chain found.
+    /// Returns the chain for the hypothetical interferer if it suffices, else the best chain found.
     ///
     /// With a `target` the SIR suffices if it is at least `target`. Without one it suffices if it is at most 1 %
     /// below the SIR of the best chain against all interferers.
     fn chosen(self, planner: &Planner, target: Option<f64>) -> Result<Plan, NoPlan> {
-        let one = self.by_one.as_ref().map(|(_, sir)| *sir);
-        let best = self.by_all.as_ref().map_or(0.0, |best| best.sir);
+        let one = self.by_one.as_ref().map(|(_, value)| *value);
+        let best = self.by_all.as_ref().map_or(0.0, |best| best.value);
         let enough = target.unwrap_or(best * (1.0 - LOSS));
         let is_kept = one.is_some_and(|one| one > 0.0 && one >= enough);
         let fitted = Fitted {
             hypothetical: planner.hypothetical,
-            sir: one,
+            sir: self
+                .by_one
+                .as_ref()
+                .map(|(plan, _)| self.scene.chain_sir(&plan.chain())),
             kept: is_kept,
+            loss: one.map(|one| if is_kept { 0.0 } else { 1.0 - one / best }),
+            by_rate: planner.radio.is_some(),
         };
         let most = target.map(|_| self.sir());
         let is_best = self.by_all.as_ref().is_some_and(|best| best.proven);
@@ -246,7 +280,7 @@ impl Candidates {
                 proven: is_fewest,
                 ..plan
             },
-            (_, Some(best)) if best.sir > 0.0 => {
+            (_, Some(best)) if best.value > 0.0 => {
                 let briefed = ProfiledMission::new(
                     &with_one(planner.scenario, &planner.hypothetical),
                     self.relays,
@@ -267,7 +301,12 @@ impl Candidates {
 
 impl Best {
     /// Creates the chain at `places`, rounded to the f32 numbers that relays use.
-    fn new(scene: &Scene, places: &[impl Copy + Into<Place>], proven: bool) -> Self {
+    fn new(
+        radio: Option<&Radio>,
+        scene: &Scene,
+        places: &[impl Copy + Into<Place>],
+        proven: bool,
+    ) -> Self {
         let places: Vec<Placement> = places
             .iter()
             .map(|&place| {
@@ -280,7 +319,7 @@ impl Best {
             })
             .collect();
         Self {
-            sir: scene.chain_sir(&places),
+            value: merit(radio, scene, &places),
             places,
             proven,
         }
@@ -315,11 +354,71 @@ fn both_ways(scene: &Scene, start: Option<&Plan>, tolerance: f64) -> Option<Best
     }
     let places = x.iter().zip(&scene.relays);
     let places: Vec<(f64, f64)> = places.map(|(&x, relay)| (x, relay.altitude_m)).collect();
-    let best = Best::new(scene, &places, false);
-    let there = best.sir * (1.0 + 2.0 * tolerance);
+    let best = Best::new(None, scene, &places, false);
+    let there = best.value * (1.0 + 2.0 * tolerance);
     let back = scene.reverse * there;
     let proven = excludes(scene, Targets { there, back });
     Some(Best { proven, ..best })
+}
+
+/// Widths of the first and the last moves that look for a larger rate, as fractions of the line.
+const MOVES: [f64; 2] = [1.0 / 16.0, 1e-5];
+/// Relative gain of a round of moves below which the width is halved.
+const GAIN: f64 = 1e-4;
+/// Rounding error allowed in a distance of two relays, as a fraction of the line.
+const ROUNDING: f64 = 2e-7;
+
+/// Returns the chain `start` after moves that raise its data rate. A move takes one relay, all before it or all after
+/// it, along one coordinate.
+fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
+    let (d, band) = (scene.distance_m, scene.band);
+    let moved = |at: Place, holds: bool, axis: usize, by: f64| match axis {
+        0 => Place {
+            x: (at.x + by).clamp(0.0, d),
+            ..at
+        },
+        1 => Place {
+            y: (at.y + by).clamp(band.left_m, band.right_m),
+            ..at
+        },
+        _ if holds => at,
+        _ => Place {
+            h: (at.h + by).clamp(band.least_m, band.most_m),
+            ..at
+        },
+    };
+    let least = scene.min_separation_m - ROUNDING * d;
+    let is_apart = |places: &[Place]| {
+        places.windows(2).all(|pair| match pair {
+            [a, b] => {
+                a.x < b.x && libm::hypot(libm::hypot(b.x - a.x, b.y - a.y), b.h - a.h) >= least
+            }
+            _ => false,
+        })
+    };
+    let count = start.len();
+    let mut best = (merit(Some(radio), scene, &start), start);
+    let [mut width, last] = MOVES.map(|width| width * d);
+    while width > last {
+        let before = best.0;
+        for group in (0..count).flat_map(|at| [at..at + 1, 0..at + 1, at..count]) {
+            for (axis, by) in (0..3).flat_map(|axis| [(axis, width), (axis, -width)]) {
+                let mut places = best.1.clone();
+                let own = places.iter_mut().zip(&scene.relays);
+                for (place, relay) in own.take(group.end).skip(group.start) {
+                    *place = moved(*place, relay.holds, axis, by);
+                }
+                let value = merit(Some(radio), scene, &places);
+                if value > best.0 && is_apart(&places) {
+                    best = (value, places);
+                }
+            }
+        }
+        if !(best.0 > before * (1.0 + GAIN)) {
+            width *= 0.5;
+        }
+    }
+    best.1
 }
 
 fn places(plan: &Plan) -> Vec<Place> {
@@ -347,5 +446,5 @@ fn at(scene: &Scene, x_m: f64) -> Option<Best> {
             (best.1 + step).min(band.most_m),
         );
     }
-    (best.0 > 0.0).then(|| Best::new(scene, &[(x_m, best.1)], false))
+    (best.0 > 0.0).then(|| Best::new(None, scene, &[(x_m, best.1)], false))
 }

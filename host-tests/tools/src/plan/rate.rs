@@ -11,6 +11,7 @@ use serde::Serialize;
 use uav_relay_scenario::link::{Access, Radio, worse_bps};
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario};
+use uav_relay_sim::report::HopSlots;
 
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
@@ -71,6 +72,19 @@ impl Rate {
             None => plan.sirs.clone(),
         };
         Some([there, plan.sirs_back(scenario)])
+    }
+
+    /// Returns the fitted time slots of the hops in `plan`; empty without them, or without data.
+    pub fn hop_slots(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Vec<HopSlots> {
+        if radio.link.access != Access::Fitted {
+            return Vec::new();
+        }
+        let both = Self::both_sirs(plan, scenario);
+        let [there, back] = both.unwrap_or_else(|| [plan.sirs.clone(), Vec::new()]);
+        let times = |sirs: &[f64], bits: f64| -> Vec<f64> {
+            sirs.iter().map(|sir| bits / radio.hop_bps(*sir)).collect()
+        };
+        HopSlots::of(&times(&there, 1.0), &times(&back, scenario.reverse))
     }
 
     /// Returns the smaller of the rate to Rx and the rate back divided by `reverse`, bit/s.

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::{Noise, Scenario};
-use uav_relay_sim::report::{RelayReport, WorstBack, db, hops_table, relays};
+use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, db, hops_table, relays};
 
 use super::rate::{BestRate, Rate, RateOf};
 use super::{Number, Plan, Unit, Why};
@@ -33,12 +33,16 @@ pub struct HypotheticalReport {
     /// against all interferers.
     pub kept: bool,
     /// SIR lost by the positions for the hypothetical interferer, as a fraction of the plan's SIR. It is 0 if the
-    /// plan has these positions.
+    /// plan has these positions. It is the data rate lost if the relays fit their slots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer.
+    /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer. It is the
+    /// gain in data rate if the relays fit their slots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
+    /// True if the data rate decides which positions are better: the relays fit their slots.
+    #[serde(skip)]
+    by_rate: bool,
 }
 
 /// Data rates of a planned chain, and of other numbers of relays.
@@ -55,6 +59,9 @@ pub struct RateReport {
     /// It is one per hop and direction on one frequency; one per direction if each hop has a frequency of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slots: Option<u32>,
+    /// Time slot of each hop and direction; empty unless `link.access` is `fitted`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hop_slots: Vec<HopSlots>,
     /// Way in which the hops share the radio: the word in the scenario file's `link.access`.
     pub access: &'static str,
     /// Bandwidth of one frequency, Hz.
@@ -103,6 +110,7 @@ impl RateReport {
             rate_bps: plan.map(|plan| Rate::of(plan, scenario, radio)),
             hop_rate_bps: plan.map(|plan| Rate::of_hop(plan, scenario, radio)),
             slots: plan.map(|_| radio.link.access.slots(relays, is_both)),
+            hop_slots: plan.map_or_else(Vec::new, |plan| Rate::hop_slots(plan, scenario, radio)),
             sharing: sharing + ways,
             reverse: scenario.reverse,
             access: radio.link.access.name(),
@@ -115,6 +123,7 @@ impl RateReport {
     }
 
     fn describe(&self, text: &mut String) {
+        *text += &HopSlots::table(&self.hop_slots);
         if let (Some(rate_bps), Some(hop_bps)) = (self.rate_bps, self.hop_rate_bps) {
             _ = writeln!(
                 text,
@@ -370,11 +379,12 @@ impl PlanReport {
                 relative_error: one.relative_error,
                 sir: fitted.sir,
                 kept: fitted.kept,
-                loss: fitted.sir.map(|by_one| (1.0 - by_one / sir).max(0.0)),
+                loss: fitted.loss,
                 gain: fitted
-                    .sir
-                    .filter(|by_one| *by_one > 0.0)
-                    .map(|by_one| sir / by_one - 1.0),
+                    .loss
+                    .filter(|loss| *loss < 1.0)
+                    .map(|loss| 1.0 / (1.0 - loss) - 1.0),
+                by_rate: fitted.by_rate,
             }
         });
         Self {
@@ -537,8 +547,14 @@ impl HypotheticalReport {
             self.mean_abs_error_w
         );
         let gain = self.gain.map_or_else(String::new, |gain| {
-            format!(", a gain of {:.2} %", 100.0 * gain)
+            let of = if self.by_rate { " in data rate" } else { "" };
+            format!(", a gain of {:.2} %{of}", 100.0 * gain)
         });
+        let listen = if self.by_rate {
+            ""
+        } else {
+            "; with `cargo chain --listen` the relays estimate the interferer themselves"
+        };
         _ = match (self.kept, self.sir) {
             (true, _) => writeln!(
                 text,
@@ -546,7 +562,7 @@ impl HypotheticalReport {
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its positions are not good enough, {} against all interferers; shown are the best found against all{gain}. Relays would fly the positions for the hypothetical one, so `cargo provision` refuses this scenario; with `cargo chain --listen` the relays estimate the interferer themselves",
+                "its positions are not good enough, {} against all interferers; shown are the best found against all{gain}. Relays would fly the positions for the hypothetical one, so `cargo provision` refuses this scenario{listen}",
                 unit.both(sir)
             ),
             (false, None) => writeln!(

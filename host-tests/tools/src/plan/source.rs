@@ -272,7 +272,7 @@ fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     match ask.number {
-        Number::Of(1) if ask.free_altitude && ask.x_m.is_none() && altitude::fits(scenario) => {
+        Number::Of(1) if ask.free_altitude && ask.x_m.is_none() && scenario.has_fitted_slots() => {
             altitude::best(scenario, 1, ask.tolerance)
         }
         Number::Of(1) if scenario.reverse > 0.0 => alone_both_ways(scenario, ask.tolerance),

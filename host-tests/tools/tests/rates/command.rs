@@ -237,6 +237,121 @@ fn several_interferers_and_fields_are_planned_both_ways() {
     }
 }
 
+/// Checks that a plan has the fitted slots of every hop, in order, and as long as the hop needs.
+#[test]
+fn fitted_slots_of_every_hop_are_in_the_plan() {
+    for (reverse, options) in [
+        (0.0, "--uavs 3"),
+        (0.5, "--uavs 3"),
+        (0.5, "--uavs 3 --altitude free"),
+        (1.0, "--target-rate-bps 1e5"),
+    ] {
+        let link = format!("access = \"fitted\"\nbandwidth_hz = 1e6\nreverse = {reverse:?}");
+        let file = scenario(5.0, &link);
+        let report = json(&file, options);
+        let rate = match &report["rate_bps"] {
+            Value::Array(rates) => number(&rates[0]),
+            rate => number(rate),
+        };
+        let [there, back] = sirs(&report);
+        let share = |sir: &f64, bits: f64| bits * rate / (1e6 * (1.0 + sir).log2());
+        let hops = report["hop_slots"].as_array().unwrap();
+        assert_eq!(hops.len(), there.len(), "{report}");
+        let back = back.iter().map(|sir| share(sir, reverse));
+        let back = hops
+            .iter()
+            .zip(back)
+            .map(|(hop, share)| (&hop["slot_back"], share));
+        let back: Vec<_> = back.filter(|(_, share)| *share > 0.0).collect();
+        let there = hops
+            .iter()
+            .zip(&there)
+            .map(|(hop, sir)| (&hop["slot"], share(sir, 1.0)));
+        let mut at = 0.0;
+        for (slot, share) in there.chain(back.into_iter().rev()) {
+            let [begin, end] = [0, 1].map(|end| number(&slot[end]));
+            assert_eq!(begin, at, "{report}");
+            assert!(
+                (end - begin - share).abs() < 1e-5,
+                "{slot} {share} {report}"
+            );
+            at = end;
+        }
+        assert_eq!(at, 1.0, "{report}");
+        let table = text(&file, options);
+        let row = |hop: &Value, key: &str| {
+            [0, 1]
+                .map(|end| format!("{:.6}", hop[key][end].as_f64().unwrap()))
+                .join("   ")
+        };
+        assert!(table.contains(&row(&hops[1], "slot")), "{table}");
+        let header = table.contains("    back from         to\n");
+        assert_eq!(header, reverse > 0.0, "{table}");
+    }
+    let equal = json(&scenario(5.0, "bandwidth_hz = 1e6"), "--uavs 3");
+    assert_eq!(equal["hop_slots"], Value::Null);
+}
+
+/// Checks that `--out` judges fitted slots against several interferers by the data rate.
+#[test]
+fn plans_in_fitted_slots_against_several_interferers_are_written_by_their_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("plan.toml");
+    let options = format!("--uavs 3 --altitude free --out {}", out.display());
+    let written = |reverse: f64| {
+        let text = std::fs::read_to_string(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../examples/multi_interferer.toml"
+        ));
+        let link = format!("access = \"fitted\"\nbandwidth_hz = 1e6\nreverse = {reverse:?}");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), format!("{}\n[link]\n{link}\n", text.unwrap())).unwrap();
+        plan(&file, &options)
+    };
+    let one_way = written(0.0);
+    assert!(one_way.status.success(), "{one_way:?}");
+    let text = std::fs::read_to_string(&out).unwrap();
+    assert!(text.contains("method = \"joint\""), "{text}");
+    std::fs::remove_file(&out).unwrap();
+    let both = written(0.5);
+    let line = String::from_utf8(both.stderr).unwrap();
+    assert_eq!(both.status.code(), Some(1), "{line}");
+    assert!(
+        line.contains("bit/s/Hz instead of the") && !line.contains("[listen]"),
+        "{line}"
+    );
+    assert!(!out.exists());
+}
+
+/// Checks that requests are refused if relays would not fly the planned positions.
+#[test]
+fn wrong_requests_for_fitted_slots_and_free_altitudes_are_named() {
+    let link = "access = \"fitted\"\nbandwidth_hz = 1e6";
+    let refused = |link: &str, options: &str| {
+        let output = plan(&scenario(5.0, link), options);
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{options}: {line}");
+        line
+    };
+    for asked in ["--target-sir 5.0", "--target-sir-db 7.0"] {
+        let line = refused(link, &format!("{asked} --altitude free"));
+        for part in [asked, "link.access = \"fitted\"", "--target-rate-bps"] {
+            assert!(line.contains(part), "{line}");
+        }
+        // Relays at given altitudes choose the positions of the largest SIR.
+        assert!(plan(&scenario(5.0, link), asked).status.success());
+    }
+    let steps = format!("{link}\nsteps = [{{ sinr_db = 0.0, bits_per_hz = 1.0 }}]");
+    for options in ["--uavs 2", "--target-rate-bps 1e4"] {
+        let line = refused(&steps, &format!("{options} --altitude free"));
+        assert!(
+            line.contains("link.steps") && line.contains("link.gap_db"),
+            "{line}"
+        );
+        assert!(plan(&scenario(5.0, &steps), options).status.success());
+    }
+}
+
 /// Checks that fitted slots with free altitudes are planned by the relays' own method.
 ///
 /// No number of relays is then proven to be the best one.

@@ -350,19 +350,19 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the position of relay `index` and the shares of its slots, once the chain is solved. `None` unless the
-    /// mission has fitted slots.
+    /// Returns the position of relay `index` and its slots, once the chain is solved. `None` unless the mission has
+    /// fitted slots.
     pub fn fitted(
-        &mut self,
+        &self,
         mission: &Mission,
         seat_of: &impl Fn(u16) -> Seat,
         index: u16,
     ) -> Option<(Placement, SlotShares)> {
-        let Way::Fitted(solver) = &mut self.0 else {
+        let Way::Fitted(solver) = &self.0 else {
             return None;
         };
         let chain = SolverContext::new(mission, seat_of)?;
-        Some(solver.first_mut()?.place(&chain, index))
+        Some(solver.first()?.place(&chain, index))
     }
 }
 

@@ -392,6 +392,38 @@ const COUNTED: &[Counted] = &[
     ),
     ("number of portions", "", &["portions_8_fitted_high"], None),
     (
+        "20 relays with free altitudes solved by the joint method for fitted slots, both directions",
+        "instructions",
+        &["solved_20_fitted_high"],
+        None,
+    ),
+    ("number of portions", "", &["portions_20_fitted_high"], None),
+    (
+        "50 relays with free altitudes solved by the joint method for fitted slots, both directions",
+        "instructions",
+        &["solved_50_fitted_high"],
+        None,
+    ),
+    ("number of portions", "", &["portions_50_fitted_high"], None),
+    (
+        "100 relays with free altitudes solved by the joint method for fitted slots, both directions",
+        "instructions",
+        &["solved_100_fitted_high"],
+        None,
+    ),
+    (
+        "number of portions",
+        "",
+        &["portions_100_fitted_high"],
+        None,
+    ),
+    (
+        "its costliest portion",
+        "instructions",
+        &["portion_100_fitted_high"],
+        None,
+    ),
+    (
         "`size_of::<Solver>()` for up to 100 relays",
         "bytes",
         &["size_of_solver"],
