@@ -15,6 +15,8 @@ use crate::sensing::sums::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};
+#[cfg(feature = "telemetry")]
+use crate::telemetry::Report;
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
 use crate::wire::auth::Auth;
@@ -212,6 +214,16 @@ impl Ground {
     /// Returns the progress of the upload.
     pub const fn progress(&self) -> Progress {
         self.progress
+    }
+
+    /// Requests the reports of all relays from now on, or no longer.
+    #[cfg(feature = "telemetry")]
+    pub fn watch(&mut self, _now: Instant, _is_on: bool) {}
+
+    /// Returns the newest report of every relay, by number.
+    #[cfg(feature = "telemetry")]
+    pub fn reports(&self) -> impl Iterator<Item = &Report> {
+        core::iter::empty()
     }
 
     /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
