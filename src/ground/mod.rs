@@ -230,12 +230,12 @@ impl Ground {
 
     /// Requests the reports of all relays from now on, or no longer.
     ///
-    /// The station repeats the request every 5 s. Relays report for 30 s after the last request.
+    /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
     #[cfg(feature = "telemetry")]
     pub fn watch(&mut self, now: Instant, is_on: bool) {
         let now = self.clock.advance(now);
         self.watching.repeat_at = is_on.then_some(now);
-        self.watching.request(now, self.reach);
+        self.watching.request(now, self.reach, self.node.into());
     }
 
     /// Returns the newest report of every relay, by number: of up to 1000 relays.
@@ -448,7 +448,7 @@ impl Ground {
         #[cfg(feature = "telemetry")]
         {
             self.watching.apply(now);
-            self.watching.request(now, self.reach);
+            self.watching.request(now, self.reach, self.node.into());
         }
         if self.repeat_at.is_none_or(|again| again > now) {
             return;
@@ -612,9 +612,10 @@ impl Watching {
     }
 
     /// Schedules the request to the next of the `reach` nearest relays, the farthest first, if it is due.
-    fn request(&mut self, now: Instant, reach: u16) {
+    fn request(&mut self, now: Instant, reach: u16, node: u64) {
         if self.repeat_at.is_some_and(|at| at <= now) {
-            let turn = WATCH_EVERY.as_micros() / u64::from(reach.max(1));
+            // Two stations do not request at the same time again and again.
+            let turn = (WATCH_EVERY.as_micros() + 100_000 * (node % 7)) / u64::from(reach.max(1));
             self.repeat_at = Some(now + Duration::from_micros(turn));
             if self.distance <= 1 {
                 self.number = self.number.wrapping_add(1);

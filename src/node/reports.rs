@@ -2,13 +2,13 @@
 //!
 //! | event | action |
 //! | --- | --- |
-//! | new Watch received from a side | report toward that side for 30 s; hand the Watch on to the other side |
+//! | new Watch received from a side | report toward that side for 60 s; hand the Watch on to the other side |
 //! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 25 s |
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
-//! On a shared channel a Watch is handed on to the relay four numbers away, and every other one to the neighbour, too: reports
+//! On a shared channel a Watch is handed on to the relay four numbers away, and every fourth one to the neighbour, too: reports
 //! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry` a relay hands on each Watch
 //! and each Report to its other neighbour, the latest only, and stores nothing.
@@ -28,7 +28,7 @@ use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 const TELEMETRY: bool = cfg!(feature = "telemetry");
 
 /// Time after the last Watch for which a relay reports.
-const WATCHED: Duration = Duration::from_millis(30_000);
+const WATCHED: Duration = Duration::from_millis(60_000);
 
 /// Time after a Watch for which its sender is the destination of reports: four lost ones do not change it.
 const DESTINED: Duration = Duration::from_millis(25_000);
@@ -289,7 +289,7 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 30 s after the last request, and forgets a destination that has sent none for 25 s.
+    /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s.
     fn expire(&mut self, now: Instant) {
         if now >= self.until {
             *self = Self::NONE;
@@ -340,7 +340,7 @@ impl State {
             watched.hand_on_at = now + turn;
             watched.hand_on |= match member.settings.wiring {
                 Wiring::Pair => mask(1),
-                Wiring::Shared if begins || number.is_multiple_of(2) => mask(1) | mask(CANDIDATES),
+                Wiring::Shared if begins || number.is_multiple_of(4) => mask(1) | mask(CANDIDATES),
                 Wiring::Shared => mask(CANDIDATES),
             };
         } else if ahead != 0 {
@@ -477,11 +477,13 @@ impl State {
         }
         let entries = u32::try_from(report.entries.len()).unwrap_or(0);
         let detail = report.detail.map_or(0, |_| SHARE);
-        // Half a period's share may be sent at once.
         let half = micros(period) / 2;
-        let saved = now.as_micros().saturating_sub(half.into());
-        watched.free = watched.free.max(Instant::from_micros(saved))
-            + byte.times(FRAME + 14 * entries + detail);
+        // On a shared channel half a period's share may be sent at once. On wires that would overflow the stores of relays nearer to the station.
+        let saved = match member.settings.wiring {
+            Wiring::Pair => now,
+            Wiring::Shared => Instant::from_micros(now.as_micros().saturating_sub(half.into())),
+        };
+        watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
         let late = Duration::from_micros((half / 4).into());
         if is_due {
             watched.own_from = now + late.times(6);
@@ -490,20 +492,24 @@ impl State {
             (true, _) => now,
             // The reports of relays behind come first.
             (false, true) => now + period + late,
-            (false, false) => now + period,
+            (false, false) => {
+                now + period
+                    + Duration::from_micros(late.as_micros() / 8)
+                        .times(micros(now.since(Instant::ZERO)) & 7)
+            }
         };
         watched.is_fed = false;
         (entries > 0).then_some(report)
     }
 
-    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take a twelfth of
+    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take an eleventh of
     /// the data rate.
     ///
     /// The data rate is at least a sweep in a `hop_time`. On a shared channel a relay may also take a twentieth of what its messages of an
     /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = micros(settings.hop_time) / 10;
+        let hop = micros(settings.hop_time) / 120 * 11;
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
             Wiring::Shared => {
@@ -513,7 +519,7 @@ impl State {
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);
-        Duration::from_micros(alone << u32::from(is_both))
+        Duration::from_micros(if is_both { alone * 9 / 4 } else { alone })
     }
 }
 
@@ -546,7 +552,7 @@ const fn all_loads(member: &Member) -> u32 {
 /// Returns the time between two reports of a relay. On wires it is that of the relay nearest to the station, which has the most to send.
 fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     let bytes = match member.settings.wiring {
-        Wiring::Pair => SHARE * (u32::from(member.all) + 1),
+        Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve
         Wiring::Shared => load(member, from_end(member, side)),
     };
     byte.times(bytes).max(LEAST_PERIOD)
