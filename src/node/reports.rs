@@ -58,14 +58,14 @@ const FRAME: u32 = 32;
 const SHARE: u32 = 24;
 
 /// Reports of one relay, and those that it hands on.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting {
     state: [State; TELEMETRY as usize],
     /// Message that is handed on, and the side of its destination. Only without the feature `telemetry`.
     handed: [Option<(Side, Message)>; !TELEMETRY as usize],
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct State {
     /// Last position of the drone, and when it was measured.
     position: Option<(Instant, Placement)>,
@@ -92,7 +92,7 @@ struct Stored {
 }
 
 /// Side with a ground station that watches.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Watched {
     number: u16,
     until: Instant,
@@ -114,37 +114,10 @@ struct Watched {
     is_fed: bool,
 }
 
-impl Watched {
-    const NONE: Self = Self {
-        number: 0,
-        until: Instant::ZERO,
-        to: None,
-        to_until: Instant::ZERO,
-        hand_on: 0,
-        hand_on_at: Instant::ZERO,
-        due: Instant::ZERO,
-        free: Instant::ZERO,
-        own_from: Instant::ZERO,
-        count: 0,
-        is_fed: false,
-    };
-}
-
-/// State of the relay that its own entry contains.
-#[derive(Clone, Copy)]
-pub(crate) struct Own {
-    /// Phase, hold reasons and flags, as in an entry.
-    pub(crate) state: u16,
-    /// Setpoint and agreed position.
-    pub(crate) places: [Option<Placement>; 2],
-}
+/// State of the relay for its own entry: phase, hold reasons and flags, as in an entry; setpoint and agreed position.
+pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
-    pub(crate) const NONE: Self = Self {
-        state: [const { State::NONE }; TELEMETRY as usize],
-        handed: [const { None }; !TELEMETRY as usize],
-    };
-
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
         if let Some(state) = self.state.first_mut() {
             state.position = Some((at, place));
@@ -292,7 +265,7 @@ impl Watched {
     /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s.
     fn expire(&mut self, now: Instant) {
         if now >= self.until {
-            *self = Self::NONE;
+            *self = Self::default();
         } else if now >= self.to_until {
             self.to = None;
         }
@@ -305,15 +278,6 @@ impl Watched {
 }
 
 impl State {
-    const NONE: Self = Self {
-        position: None,
-        control: 0,
-        power_w: 0.0,
-        stored: Vec::new(),
-        watched: [Watched::NONE; 2],
-        checked: Instant::ZERO,
-    };
-
     const fn at(&mut self, side: Side) -> &mut Watched {
         let [upstream, downstream] = &mut self.watched;
         match side {
@@ -438,7 +402,7 @@ impl State {
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
             let age = position.map_or(0, |(at, _)| age(now, at));
-            let entry = Entry::new(member.node, age, own.state + 4096 * control, at);
+            let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }
         self.stored
@@ -469,7 +433,7 @@ impl State {
         if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
             let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
             let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
-            let places = own.places.map(Coarse::of);
+            let places = own.1.map(Coarse::of);
             report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
             watched.count = 1;
         } else if is_due && !watched.count.is_multiple_of(8) {

@@ -47,9 +47,7 @@ impl Node {
         let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
         let sides = [Side::Upstream, Side::Downstream];
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
-        Own {
-            state: self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d),
-            places: [self.setpoint(), self.agreed_place()],
-        }
+        let state = self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d);
+        (state, [self.setpoint(), self.agreed_place()])
     }
 }
