@@ -10,8 +10,8 @@
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, and every fourth one to the neighbour, too: reports
 //! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
-//! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry` a relay hands on each Watch
-//! and each Report to its other neighbour, the latest only, and stores nothing.
+//! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
+//! `handing_on` takes the place of this file.
 
 use heapless::Vec;
 
@@ -23,9 +23,6 @@ use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
-
-/// True if the crate is built with the feature `telemetry`.
-const TELEMETRY: bool = cfg!(feature = "telemetry");
 
 /// Time after the last Watch for which a relay reports.
 const WATCHED: Duration = Duration::from_millis(60_000);
@@ -60,13 +57,6 @@ const SHARE: u32 = 24;
 /// Reports of one relay, and those that it hands on.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting {
-    state: [State; TELEMETRY as usize],
-    /// Message that is handed on, and the side of its destination. Only without the feature `telemetry`.
-    handed: [Option<(Side, Message)>; !TELEMETRY as usize],
-}
-
-#[derive(Clone, Debug, Default)]
-struct State {
     /// Last position of the drone, and when it was measured.
     position: Option<(Instant, Placement)>,
     /// Control state of the drone, from 1; 0 without an autopilot.
@@ -119,21 +109,15 @@ pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
-        if let Some(state) = self.state.first_mut() {
-            state.position = Some((at, place));
-        }
+        self.position = Some((at, place));
     }
 
     pub(crate) fn handle_measured(&mut self, power_w: f32) {
-        if let Some(state) = self.state.first_mut() {
-            state.power_w = power_w;
-        }
+        self.power_w = power_w;
     }
 
     pub(crate) fn handle_control(&mut self, control: u16) {
-        if let Some(state) = self.state.first_mut() {
-            state.control = control;
-        }
+        self.control = control;
     }
 
     /// Handles a Watch or a Report from node `from` at `side`. Returns false if an entry is of a relay that is not
@@ -145,15 +129,9 @@ impl Reporting {
         (side, from): (Side, u16),
         message: &Message,
     ) -> bool {
-        if let Some(handed) = self.handed.first_mut() {
-            *handed = Some((side.other(), message.clone()));
-        }
-        let Some(state) = self.state.first_mut() else {
-            return true;
-        };
         match message {
-            Message::Watch { number, .. } => state.on_watch(now, member, (side, from), *number),
-            Message::Report(report) => return state.on_report(now, member, (side, from), report),
+            Message::Watch { number, .. } => self.on_watch(now, member, (side, from), *number),
+            Message::Report(report) => return self.on_report(now, member, (side, from), report),
             _ => {}
         }
         true
@@ -169,16 +147,8 @@ impl Reporting {
         wait: Duration,
         own: Own,
     ) -> Option<(Side, u16, Message)> {
-        if let Some(handed) = self.handed.first_mut()
-            && let Some((side, message)) = handed.take()
-        {
-            let is_watch = matches!(message, Message::Watch { .. });
-            let to = next(member, neighbours, side).filter(|to| !is_watch || is_relay(member, *to));
-            return Some((side, to?, message));
-        }
-        let state = self.state.first_mut()?;
         for side in [Side::Upstream, Side::Downstream] {
-            let watched = state.at(side);
+            let watched = self.at(side);
             watched.expire(now);
             let is_ready = |at| now >= at + wait;
             while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
@@ -203,7 +173,7 @@ impl Reporting {
             if let Some(at) = watched.report_at()
                 && is_ready(at)
                 && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
-                && let Some(report) = state.report(now, member, neighbours, side, own)
+                && let Some(report) = self.report(now, member, neighbours, side, own)
             {
                 return Some((side, to, Message::Report(report)));
             }
@@ -213,26 +183,22 @@ impl Reporting {
 
     /// Records that the relay's timers have been handled up to `now`.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
-        if let Some(state) = self.state.first_mut() {
-            state.checked = now;
-        }
+        self.checked = now;
     }
 
     /// Returns true if a Watch or a Report may be due.
     pub(crate) fn is_due(&self, now: Instant, wait: Duration) -> bool {
-        self.handed.iter().any(Option::is_some) || self.times(wait).any(|at| at <= now)
+        self.times(wait).any(|at| at <= now)
     }
 
     /// Returns the time of the next Watch or Report.
     pub(crate) fn next_timeout(&self, wait: Duration) -> Option<Instant> {
-        let checked = self.state.first()?.checked;
-        self.times(wait).filter(|at| *at > checked).min()
+        self.times(wait).filter(|at| *at > self.checked).min()
     }
 
     /// Returns the times at which a Watch or a Report is due.
     fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
-        let sides = self.state.iter().flat_map(|state| &state.watched);
-        let times = sides.flat_map(|watched| {
+        let times = self.watched.iter().flat_map(|watched| {
             let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
             [watched.report_at(), hand_on]
         });
@@ -277,7 +243,7 @@ impl Watched {
     }
 }
 
-impl State {
+impl Reporting {
     const fn at(&mut self, side: Side) -> &mut Watched {
         let [upstream, downstream] = &mut self.watched;
         match side {

@@ -199,6 +199,16 @@ fn all(relays: u16) -> Vec<u16> {
 fn eight_relays_on_a_channel_report_within_two_seconds() {
     let span = [s(40), s(160)];
     let mut chain = Chain::new(flown(setup(8, Some(Access::Ideal), s(1), span[1]))).unwrap();
+    // The drones fly to their positions.
+    let mut moving = Figures::default();
+    moving.watch(&mut chain, Side::Upstream, &all(8), [s(15), s(40)]);
+    moving.print("the same while the drones fly", [s(1), s(40)]);
+    assert!(moving.errors_m.iter().all(|error| *error <= 1.0));
+    let far = chain
+        .live()
+        .map(|it| it.position.unwrap()[0])
+        .fold(0.0, f64::max);
+    assert!(far < 800.0, "the last drone has left its place at 889 m");
     let mut figures = Figures::default();
     figures.watch(&mut chain, Side::Upstream, &all(8), span);
     figures.print("8 relays, 57 600 baud, no collisions", [s(1), span[1]]);

@@ -24,7 +24,11 @@ impl Node {
         if !self.reporting.is_due(now, wait) {
             return None;
         }
-        let own = self.own();
+        let own = if cfg!(feature = "telemetry") {
+            self.own()
+        } else {
+            Own::default()
+        };
         let (member, neighbours) = (&self.member, &self.layers.neighbours);
         self.reporting.poll(now, member, neighbours, wait, own)
     }
@@ -36,7 +40,9 @@ impl Node {
             Phase::Holding | Phase::Infeasible | Phase::NoQuorum
         );
         match self.agreed_place() {
-            _ if is_idle || !self.searches() => Duration::from_micros(0),
+            _ if is_idle || !self.searches() || !cfg!(feature = "telemetry") => {
+                Duration::from_micros(0)
+            }
             Some(_) => PATIENCE,
             None => FIRST_PATIENCE,
         }
