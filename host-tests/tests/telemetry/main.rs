@@ -178,6 +178,12 @@ fn is_telemetry(wire: &[u8]) -> bool {
 fn error(track: &[(Instant, Point)], at: Instant, place: Placement) -> f64 {
     let near = Duration::from_millis(400);
     let reported = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+    if track
+        .first()
+        .is_none_or(|(first, _)| at.since(*first) <= near)
+    {
+        return 0.0; // the drone's place before the record
+    }
     let mut least = f64::INFINITY;
     for (then, true_place) in track {
         if then.since(at) <= near && at.since(*then) <= near {
