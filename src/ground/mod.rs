@@ -9,8 +9,6 @@
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
 //! | `Outdated` | holds a newer mission | done: the upload needs a larger version |
 
-#[cfg(feature = "telemetry")]
-use crate::mission::MAX_RELAYS;
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
@@ -38,6 +36,10 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
+
+/// Maximum number of relays whose reports are stored, 11 KB in all.
+#[cfg(feature = "telemetry")]
+const REPORTED: usize = 128;
 
 /// Time between two requests to one relay for the reports of all relays.
 #[cfg(feature = "telemetry")]
@@ -238,7 +240,7 @@ impl Ground {
         self.watching.request(now, self.reach, self.node.into());
     }
 
-    /// Returns the newest report of every relay, by number: of up to 1000 relays.
+    /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
     ///
     /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
     /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
@@ -592,7 +594,7 @@ struct Watching {
     /// Entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
     /// Newest report of every relay, by rising number.
-    reports: heapless::Vec<Report, { MAX_RELAYS as usize }>,
+    reports: heapless::Vec<Report, REPORTED>,
 }
 
 #[cfg(feature = "telemetry")]
