@@ -15,6 +15,8 @@ use crate::sensing::sums::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};
+#[cfg(feature = "telemetry")]
+use crate::telemetry::Report;
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
 use crate::wire::auth::Auth;
@@ -22,6 +24,8 @@ use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
 use crate::wire::endpoint::{Endpoint, Sent};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
+#[cfg(feature = "telemetry")]
+use crate::wire::message::{Detail, Entry, Reports};
 use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
@@ -32,6 +36,14 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
+
+/// Maximum number of relays whose reports are stored, 11 KB in all.
+#[cfg(feature = "telemetry")]
+const REPORTED: usize = 128;
+
+/// Time between two requests to one relay for the reports of all relays.
+#[cfg(feature = "telemetry")]
+const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
 /// Number of unanswered hellos to one relay after which the next relay is polled.
 const QUERIES_PER_RELAY: u8 = 3;
@@ -97,6 +109,8 @@ pub struct Ground {
     /// caller's time.
     clock: MonotonicClock,
     reports: PendingReports,
+    #[cfg(feature = "telemetry")]
+    watching: Watching,
     deframer: Deframer,
     endpoint: Endpoint,
     stats: Stats,
@@ -137,6 +151,8 @@ impl Ground {
             repeat_at: None,
             clock: MonotonicClock::new(Instant::ZERO),
             reports: PendingReports::NONE,
+            #[cfg(feature = "telemetry")]
+            watching: Watching::new(auth.parts().1, all),
             deframer: Deframer::new(),
             endpoint,
             stats: Stats::default(),
@@ -214,6 +230,26 @@ impl Ground {
         self.progress
     }
 
+    /// Requests the reports of all relays from now on, or no longer.
+    ///
+    /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
+    #[cfg(feature = "telemetry")]
+    pub fn watch(&mut self, now: Instant, is_on: bool) {
+        let now = self.clock.advance(now);
+        self.watching.repeat_at = is_on.then_some(now);
+        self.watching.request(now, self.reach, self.node.into());
+    }
+
+    /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
+    ///
+    /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
+    /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
+    /// them: a relay sends them with every eighth.
+    #[cfg(feature = "telemetry")]
+    pub fn reports(&self) -> impl Iterator<Item = &Report> {
+        self.watching.reports.iter()
+    }
+
     /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
     /// replayed or malformed, or from a relay with another loaded mission.
     pub fn refused(&self) -> u32 {
@@ -285,6 +321,14 @@ impl Ground {
                 offer_number,
             }) if self.answers_query(upload, *offer_number) => {
                 self.on_upload(sender, *upload);
+                &mut self.stats.received
+            }
+            #[cfg(feature = "telemetry")]
+            Some(Message::Report(report)) if report.mission() != self.base => {
+                &mut self.stats.mission
+            }
+            #[cfg(feature = "telemetry")]
+            Some(Message::Report(report)) if self.watching.record(report, self.clock.now()) => {
                 &mut self.stats.received
             }
             _ => &mut self.stats.malformed,
@@ -403,6 +447,11 @@ impl Ground {
     /// Schedules the next hello if it is due: to the same relay again, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
+        #[cfg(feature = "telemetry")]
+        {
+            self.watching.apply(now);
+            self.watching.request(now, self.reach, self.node.into());
+        }
         if self.repeat_at.is_none_or(|again| again > now) {
             return;
         }
@@ -437,7 +486,14 @@ impl Ground {
 
     /// Returns the latest time for the next call of [`Ground::handle_timeout`]; `None` if no timer runs.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        Some(self.clock.external(self.repeat_at?))
+        #[cfg(feature = "telemetry")]
+        let next = [self.repeat_at, self.watching.repeat_at]
+            .into_iter()
+            .flatten()
+            .min();
+        #[cfg(not(feature = "telemetry"))]
+        let next = self.repeat_at;
+        Some(self.clock.external(next?))
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
@@ -454,7 +510,10 @@ impl Ground {
             return handshake;
         }
         if !core::mem::take(&mut self.due) {
-            return self.next_report(frame);
+            let sent = self.next_report(frame);
+            #[cfg(feature = "telemetry")]
+            let sent = sent.or_else(|| self.next_watch(frame));
+            return sent;
         }
         let to = self.to();
         let loaded = MissionId {
@@ -505,6 +564,113 @@ impl Ground {
         };
         let to = self.at(distance);
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
+    }
+
+    /// Writes the request for reports to the next relay in reach; `None` if none is pending.
+    #[cfg(feature = "telemetry")]
+    fn next_watch(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
+        if !core::mem::take(&mut self.watching.is_due) {
+            return None;
+        }
+        let (number, mission) = (self.watching.number, self.base);
+        let message = Message::Watch { number, mission };
+        let to = self.at(self.watching.distance);
+        self.endpoint.transmit(to, &message, frame, &mut self.stats)
+    }
+}
+
+/// Requests for the reports of all relays, and the reports.
+#[cfg(feature = "telemetry")]
+#[derive(Clone, Debug)]
+struct Watching {
+    /// Number of relays of the mission.
+    all: u16,
+    /// Time of the next request; `None` while no reports are requested.
+    repeat_at: Option<Instant>,
+    number: u16,
+    /// Distance of the relay that the last request is for, and true if it is to be sent; 0 before the first one.
+    distance: u16,
+    is_due: bool,
+    /// Entries that have arrived since the last call with a time.
+    arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
+    /// Newest report of every relay, by rising number.
+    reports: heapless::Vec<Report, REPORTED>,
+}
+
+#[cfg(feature = "telemetry")]
+impl Watching {
+    /// Creates a station that requests nothing. A start with a larger `epoch` has larger request numbers.
+    #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
+    const fn new(epoch: u32, all: u16) -> Self {
+        Self {
+            all,
+            repeat_at: None,
+            number: (epoch as u16) << 10,
+            distance: 0,
+            is_due: false,
+            arrived: heapless::Vec::new(),
+            reports: heapless::Vec::new(),
+        }
+    }
+
+    /// Schedules the request to the next of the `reach` nearest relays, the farthest first, if it is due.
+    fn request(&mut self, now: Instant, reach: u16, node: u64) {
+        if self.repeat_at.is_some_and(|at| at <= now) {
+            // Two stations do not request at the same time again and again.
+            let turn = (WATCH_EVERY.as_micros() + 100_000 * (node % 7)) / u64::from(reach.max(1));
+            self.repeat_at = Some(now + Duration::from_micros(turn));
+            if self.distance <= 1 {
+                self.number = self.number.wrapping_add(1);
+            }
+            self.distance = if self.distance > 1 {
+                self.distance - 1
+            } else {
+                reach
+            };
+            self.is_due = true;
+        }
+    }
+
+    /// Records the entries of a report. Returns false, and records none, if one has a number outside the
+    /// mission.
+    fn record(&mut self, report: &Reports, now: Instant) -> bool {
+        if report.entries.iter().any(|entry| entry.relay() > self.all) {
+            return false;
+        }
+        let mut detail = report.detail;
+        for entry in &report.entries {
+            if self.arrived.is_full() {
+                self.apply(now);
+            }
+            _ = self.arrived.push((*entry, detail.take()));
+        }
+        true
+    }
+
+    /// Makes the newest report of every relay of the entries that have arrived, at `now`.
+    fn apply(&mut self, now: Instant) {
+        for (entry, detail) in &self.arrived {
+            let age = Duration::from_millis(100).times(entry.age.into());
+            let at = Instant::from_micros(now.as_micros().saturating_sub(age.as_micros()));
+            match self
+                .reports
+                .binary_search_by_key(&entry.relay(), |report| report.relay)
+            {
+                Ok(index) => {
+                    if let Some(report) = self.reports.get_mut(index)
+                        && at > report.at
+                    {
+                        *report = Report::of(entry, *detail, at, Some(report));
+                    }
+                }
+                Err(index) => {
+                    _ = self
+                        .reports
+                        .insert(index, Report::of(entry, *detail, at, None));
+                }
+            }
+        }
+        self.arrived.clear();
     }
 }
 

@@ -1,0 +1,59 @@
+//! Reports of this relay's state to a ground station that watches, and those that it hands on.
+
+use super::Node;
+use crate::node::reports::{FIRST_PATIENCE, Own, PATIENCE};
+use crate::node::round::state::Phase;
+use crate::side::Side;
+use crate::stats::bump;
+use crate::time::{Duration, Instant};
+use crate::wire::message::Message;
+
+impl Node {
+    /// Handles a Watch or a Report of node `from` at `side`, a neighbour or not.
+    pub(super) fn on_telemetry(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
+        if message.digest() != Some(self.member.digest) {
+            self.refuse_mission(now, side, from);
+        } else if !(self.reporting).handle(now, &self.member, (side, from), message) {
+            bump(&mut self.telemetry.stats.stale);
+        }
+    }
+
+    /// Returns the next Watch or Report, with its side and its destination.
+    pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        let wait = self.telemetry_waits();
+        if !self.reporting.is_due(now, wait) {
+            return None;
+        }
+        let own = if cfg!(feature = "telemetry") {
+            self.own()
+        } else {
+            Own::default()
+        };
+        let (member, neighbours) = (&self.member, &self.layers.neighbours);
+        self.reporting.poll(now, member, neighbours, wait, own)
+    }
+
+    /// Returns the time by which reports wait for an agreement that needs the shared channel.
+    pub(super) fn telemetry_waits(&self) -> Duration {
+        let is_idle = matches!(
+            self.phase(),
+            Phase::Holding | Phase::Infeasible | Phase::NoQuorum
+        );
+        match self.agreed_place() {
+            _ if is_idle || !self.searches() || !cfg!(feature = "telemetry") => {
+                Duration::from_micros(0)
+            }
+            Some(_) => PATIENCE,
+            None => FIRST_PATIENCE,
+        }
+    }
+
+    fn own(&self) -> Own {
+        let hold = |side| self.hold_reason(side).map_or(0, |reason| reason as u16 + 1);
+        let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
+        let sides = [Side::Upstream, Side::Downstream];
+        let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
+        let state = self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d);
+        (state, [self.setpoint(), self.agreed_place()])
+    }
+}

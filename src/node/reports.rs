@@ -1,0 +1,495 @@
+//! Reports of the relays' states, on their way to a ground station that watches.
+//!
+//! | event | action |
+//! | --- | --- |
+//! | new Watch received from a side | report toward that side for 60 s; hand the Watch on to the other side |
+//! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 25 s |
+//! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
+//! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
+//! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
+//!
+//! On a shared channel a Watch is handed on to the relay four numbers away, and every fourth one to the neighbour, too: reports
+//! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
+//! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
+//! `handing_on` takes the place of this file.
+
+use heapless::Vec;
+
+use super::context::Member;
+use super::neighbour::Neighbours;
+use super::neighbour::hearing::{CANDIDATES, mask};
+use crate::place::Placement;
+use crate::settings::Wiring;
+use crate::side::Side;
+use crate::time::{Duration, Instant};
+use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
+
+/// Time after the last Watch for which a relay reports.
+const WATCHED: Duration = Duration::from_millis(60_000);
+
+/// Time after a Watch for which its sender is the destination of reports: four lost ones do not change it.
+const DESTINED: Duration = Duration::from_millis(25_000);
+
+/// Minimum time between two repetitions of a Watch to relays that have not received it.
+const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
+
+/// Time by which telemetry waits for an agreement on a shared channel, at most.
+pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
+
+/// The same for the first agreement.
+pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
+
+/// Age above which a position of the drone counts as unknown.
+const OLD: Duration = Duration::from_millis(2_000);
+
+/// Minimum time between two reports of a relay.
+const LEAST_PERIOD: Duration = Duration::from_millis(500);
+
+/// Number of stored entries of other relays.
+const STORED: usize = 16;
+
+/// Bytes of a report without its entries, with frame and tag.
+const FRAME: u32 = 32;
+
+/// Assumed bytes of an entry, with its shares of a frame and of details.
+const SHARE: u32 = 24;
+
+/// Reports of one relay, and those that it hands on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reporting {
+    /// Last position of the drone, and when it was measured.
+    position: Option<(Instant, Placement)>,
+    /// Control state of the drone, from 1; 0 without an autopilot.
+    control: u16,
+    /// Last measured interference, W; 0 before any.
+    power_w: f32,
+    stored: Vec<Stored, STORED>,
+    watched: [Watched; 2],
+    /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
+    checked: Instant,
+}
+
+/// Entry of another relay that is to be handed on.
+#[derive(Clone, Debug)]
+struct Stored {
+    entry: Entry,
+    detail: Option<Detail>,
+    /// Time of the relay's state.
+    at: Instant,
+    /// Time from which the entry may be sent: at once, or again after the time in which a newer one should arrive.
+    from: Instant,
+    is_new: bool,
+}
+
+/// Side with a ground station that watches.
+#[derive(Clone, Copy, Debug, Default)]
+struct Watched {
+    number: u16,
+    until: Instant,
+    /// Node that reports are sent to, until a time; `None` for the neighbour.
+    to: Option<u16>,
+    to_until: Instant,
+    /// Bit mask of the distances of nodes to which the Watch is to be handed on, and when.
+    hand_on: u8,
+    hand_on_at: Instant,
+    /// Time of the next report, at least `free`.
+    due: Instant,
+    /// Time from which the share of the channel allows a report.
+    free: Instant,
+    /// Time from which the own entry is part of a report.
+    own_from: Instant,
+    /// Number of own entries, wrapping.
+    count: u8,
+    /// True if entries have arrived since the last report.
+    is_fed: bool,
+}
+
+/// State of the relay for its own entry: phase, hold reasons and flags, as in an entry; setpoint and agreed position.
+pub(crate) type Own = (u16, [Option<Placement>; 2]);
+
+impl Reporting {
+    pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
+        self.position = Some((at, place));
+    }
+
+    pub(crate) fn handle_measured(&mut self, power_w: f32) {
+        self.power_w = power_w;
+    }
+
+    pub(crate) fn handle_control(&mut self, control: u16) {
+        self.control = control;
+    }
+
+    /// Handles a Watch or a Report from node `from` at `side`. Returns false if an entry is of a relay that is not
+    /// behind `from`.
+    pub(crate) fn handle(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        (side, from): (Side, u16),
+        message: &Message,
+    ) -> bool {
+        match message {
+            Message::Watch { number, .. } => self.on_watch(now, member, (side, from), *number),
+            Message::Report(report) => return self.on_report(now, member, (side, from), report),
+            _ => {}
+        }
+        true
+    }
+
+    /// Returns the next Watch or Report with its side and its destination; `None` if none is due. It is sent `wait` later
+    /// than it is due, because an agreement needs the channel.
+    pub(crate) fn poll(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        neighbours: &Neighbours,
+        wait: Duration,
+        own: Own,
+    ) -> Option<(Side, u16, Message)> {
+        for side in [Side::Upstream, Side::Downstream] {
+            let watched = self.at(side);
+            watched.expire(now);
+            let is_ready = |at| now >= at + wait;
+            while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
+                let distance = if watched.hand_on & 1 != 0 {
+                    1
+                } else {
+                    CANDIDATES
+                };
+                let number = watched.number;
+                watched.hand_on &= !mask(distance);
+                let away = side.other();
+                let to = if distance == 1 {
+                    neighbours.at(away).node()
+                } else {
+                    beyond(member, away, distance)
+                };
+                if is_relay(member, to) {
+                    let mission = member.digest;
+                    return Some((away, to, Message::Watch { number, mission }));
+                }
+            }
+            if let Some(at) = watched.report_at()
+                && is_ready(at)
+                && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
+                && let Some(report) = self.report(now, member, neighbours, side, own)
+            {
+                return Some((side, to, Message::Report(report)));
+            }
+        }
+        None
+    }
+
+    /// Records that the relay's timers have been handled up to `now`.
+    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        self.checked = now;
+    }
+
+    /// Returns true if a Watch or a Report may be due.
+    pub(crate) fn is_due(&self, now: Instant, wait: Duration) -> bool {
+        self.times(wait).any(|at| at <= now)
+    }
+
+    /// Returns the time of the next Watch or Report.
+    pub(crate) fn next_timeout(&self, wait: Duration) -> Option<Instant> {
+        self.times(wait).filter(|at| *at > self.checked).min()
+    }
+
+    /// Returns the times at which a Watch or a Report is due.
+    fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
+        let times = self.watched.iter().flat_map(|watched| {
+            let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
+            [watched.report_at(), hand_on]
+        });
+        times.flatten().map(move |at| at + wait)
+    }
+}
+
+const fn is_relay(member: &Member, node: u16) -> bool {
+    node >= 1 && node <= member.all
+}
+
+/// Returns the node `distance` numbers away at `side`.
+const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
+    match side {
+        Side::Upstream => member.node.saturating_sub(distance),
+        Side::Downstream => member.node.saturating_add(distance),
+    }
+}
+
+/// Returns the neighbour at `side`, or Tx or Rx beyond the last relay; `None` while there is neither.
+fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
+    let end = beyond(member, side, 1);
+    match neighbours.at(side).node() {
+        0 => Some(end).filter(|end| !is_relay(member, *end)),
+        node => Some(node),
+    }
+}
+
+impl Watched {
+    /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s.
+    fn expire(&mut self, now: Instant) {
+        if now >= self.until {
+            *self = Self::default();
+        } else if now >= self.to_until {
+            self.to = None;
+        }
+    }
+
+    /// Returns the time of the next report; `None` while nobody watches.
+    fn report_at(&self) -> Option<Instant> {
+        (self.until > Instant::ZERO).then(|| self.due.max(self.free))
+    }
+}
+
+impl Reporting {
+    const fn at(&mut self, side: Side) -> &mut Watched {
+        let [upstream, downstream] = &mut self.watched;
+        match side {
+            Side::Upstream => upstream,
+            Side::Downstream => downstream,
+        }
+    }
+
+    fn on_watch(&mut self, now: Instant, member: &Member, (side, from): (Side, u16), number: u16) {
+        let watched = self.at(side);
+        watched.expire(now);
+        let begins = watched.until == Instant::ZERO;
+        let ahead = number.wrapping_sub(watched.number);
+        if begins {
+            watched.due = now;
+            watched.own_from = now;
+            watched.count = 0;
+        }
+        if begins || (1..0x8000).contains(&ahead) {
+            watched.number = number;
+            watched.until = now + WATCHED;
+            // The station sends to several relays at once.
+            let turn = Duration::from_millis(50).times(u32::from(member.node % 8) + 2);
+            watched.hand_on_at = now + turn;
+            watched.hand_on |= match member.settings.wiring {
+                Wiring::Pair => mask(1),
+                Wiring::Shared if begins || number.is_multiple_of(4) => mask(1) | mask(CANDIDATES),
+                Wiring::Shared => mask(CANDIDATES),
+            };
+        } else if ahead != 0 {
+            return;
+        }
+        let distance = |node: u16| node.abs_diff(member.node);
+        if watched.to.is_none_or(|to| distance(from) >= distance(to)) {
+            watched.to = Some(from);
+            watched.to_until = now + DESTINED;
+        }
+    }
+
+    fn on_report(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        (side, from): (Side, u16),
+        report: &Reports,
+    ) -> bool {
+        let is_behind = |relay: u16| match side {
+            Side::Upstream => relay <= from,
+            Side::Downstream => relay >= from && relay <= member.all,
+        };
+        if !report.entries.iter().all(|entry| is_behind(entry.relay())) {
+            return false;
+        }
+        let watched = self.at(side.other());
+        watched.expire(now);
+        if watched.until == Instant::ZERO {
+            return true;
+        }
+        let missed = watched.number.wrapping_sub(report.number());
+        if (1..0x8000).contains(&missed) && now >= watched.hand_on_at + REPEAT_AFTER {
+            watched.hand_on_at = now;
+            let is_far = from.abs_diff(member.node) == CANDIDATES;
+            watched.hand_on |= mask(if is_far { CANDIDATES } else { 1 });
+        }
+        watched.due = now;
+        watched.is_fed = true;
+        let mut detail = report.detail;
+        for entry in &report.entries {
+            let age = Duration::from_millis(100).times(entry.age.into());
+            let micros = now.as_micros().saturating_sub(age.as_micros());
+            self.store(now, *entry, detail.take(), Instant::from_micros(micros));
+        }
+        true
+    }
+
+    /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
+    /// else the oldest one, is dropped.
+    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) {
+        let mut stored = Stored {
+            entry,
+            detail,
+            at,
+            from: now,
+            is_new: true,
+        };
+        let mut all = self.stored.iter_mut();
+        if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
+            // Two ways of one entry differ by the rounding of its age.
+            if at > old.at + Duration::from_millis(300) {
+                stored.detail = detail.or(old.detail);
+                *old = stored;
+            } else if old.detail.is_none() {
+                old.detail = detail;
+            }
+        } else if let Err(stored) = self.stored.push(stored) {
+            let worst = self
+                .stored
+                .iter_mut()
+                .min_by_key(|old| (old.is_new, old.at));
+            if let Some(worst) = worst {
+                *worst = stored;
+            }
+        }
+    }
+
+    /// Returns the report toward `side` that is due now; `None` if there is nothing to report.
+    fn report(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        neighbours: &Neighbours,
+        side: Side,
+        own: Own,
+    ) -> Option<Reports> {
+        let byte = self.byte_time(now, member, side);
+        let period = period(member, side, byte);
+        let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
+        let (control, power_w) = (self.control, self.power_w);
+        let watched = self.at(side);
+        let mut report = Reports::new(watched.number, member.digest);
+        let is_due = now >= watched.own_from;
+        if is_due {
+            let at = Coarse::of(position.map(|(_, place)| place));
+            let age = position.map_or(0, |(at, _)| age(now, at));
+            let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
+            _ = report.entries.push(entry);
+        }
+        self.stored
+            .retain(|stored| stored.is_new || now.since(stored.at) < period.times(3));
+        let mut is_left = false;
+        for are_new in [true, false] {
+            for stored in &mut self.stored {
+                let is_toward = (stored.entry.relay() > member.node) == (side == Side::Upstream);
+                if stored.is_new != are_new || !is_toward || now < stored.from {
+                    continue;
+                }
+                stored.entry.age = age(now, stored.at);
+                if report.entries.push(stored.entry).is_err() {
+                    is_left |= are_new;
+                    continue;
+                }
+                if report.detail.is_none() && stored.detail.is_some() {
+                    report.detail = stored.detail.take();
+                    if let [first, .., last] = report.entries.as_mut_slice() {
+                        core::mem::swap(first, last);
+                    }
+                }
+                stored.is_new = false;
+                stored.from = now + period;
+            }
+        }
+        let watched = self.at(side);
+        if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
+            let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
+            let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
+            let places = own.1.map(Coarse::of);
+            report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
+            watched.count = 1;
+        } else if is_due && !watched.count.is_multiple_of(8) {
+            watched.count += 1;
+        }
+        let entries = u32::try_from(report.entries.len()).unwrap_or(0);
+        let detail = report.detail.map_or(0, |_| SHARE);
+        let half = micros(period) / 2;
+        // On a shared channel half a period's share may be sent at once. On wires that would overflow the stores of relays nearer to the station.
+        let saved = match member.settings.wiring {
+            Wiring::Pair => now,
+            Wiring::Shared => Instant::from_micros(now.as_micros().saturating_sub(half.into())),
+        };
+        watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
+        let late = Duration::from_micros((half / 4).into());
+        if is_due {
+            watched.own_from = now + late.times(6);
+        }
+        watched.due = match (is_left, watched.is_fed) {
+            (true, _) => now,
+            // The reports of relays behind come first.
+            (false, true) => now + period + late,
+            (false, false) => {
+                now + period
+                    + Duration::from_micros(late.as_micros() / 8)
+                        .times(micros(now.since(Instant::ZERO)) & 7)
+            }
+        };
+        watched.is_fed = false;
+        (entries > 0).then_some(report)
+    }
+
+    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take an eleventh of
+    /// the data rate.
+    ///
+    /// The data rate is at least a sweep in a `hop_time`. On a shared channel a relay may also take a twentieth of what its messages of an
+    /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
+    fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
+        let settings = &member.settings;
+        let hop = micros(settings.hop_time) / 120 * 11;
+        let alone = match settings.wiring {
+            Wiring::Pair => hop.into(),
+            Wiring::Shared => {
+                let share = 16 * all_loads(member) / load(member, from_end(member, side));
+                let share = (u64::from(share) * u64::from(hop)) >> 4;
+                share.min((micros(settings.probe_after) / 196).into())
+            }
+        };
+        let is_both = self.watched.iter().all(|watched| now < watched.until);
+        Duration::from_micros(if is_both { alone * 9 / 4 } else { alone })
+    }
+}
+
+fn micros(span: Duration) -> u32 {
+    u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
+}
+
+/// Returns the number of relays up to the end of the chain at `side`, this one included.
+const fn from_end(member: &Member, side: Side) -> u16 {
+    match side {
+        Side::Upstream => member.node,
+        Side::Downstream => member.all.saturating_sub(member.node).saturating_add(1),
+    }
+}
+
+/// Returns the assumed bytes that a relay sends in a period: own entry, and those of the relays four, eight, ... numbers
+/// farther from the station, which it is `distance` numbers away from.
+const fn load(member: &Member, distance: u16) -> u32 {
+    let behind = member.all.saturating_sub(distance) / CANDIDATES;
+    SHARE * (behind as u32 + 2)
+}
+
+/// Returns the sum of [`load`] over all distances, 1 to N.
+const fn all_loads(member: &Member) -> u32 {
+    let all = member.all as u32;
+    let (fours, rest) = (all / 4, all % 4);
+    SHARE * (2 * all + fours * (2 * fours).saturating_sub(2) + rest * fours)
+}
+
+/// Returns the time between two reports of a relay. On wires it is that of the relay nearest to the station, which has the most to send.
+fn period(member: &Member, side: Side, byte: Duration) -> Duration {
+    let bytes = match member.settings.wiring {
+        Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve
+        Wiring::Shared => load(member, from_end(member, side)),
+    };
+    byte.times(bytes).max(LEAST_PERIOD)
+}
+
+/// Returns the age in tenths of a second, rounded. It includes 20 ms for the transmission.
+fn age(now: Instant, at: Instant) -> u8 {
+    let tenths = micros(now.since(at)).saturating_add(70_000) / 100_000;
+    u8::try_from(tenths).unwrap_or(u8::MAX)
+}
