@@ -121,7 +121,7 @@ pub struct StationView {
 }
 
 impl StationView {
-    /// Returns the newest version of the mission that a relay has reported; `None` before the first report.
+    /// Returns the newest version of the mission that relays report; `None` before the first report of one.
     pub fn version(&self) -> Option<u16> {
         self.version.map(|(version, _)| version)
     }
@@ -186,7 +186,7 @@ impl StationView {
     /// Updates the newest version of the mission that relays report now.
     fn follow_version(&mut self, now: Instant) {
         let reports = self.known.values().map(|it| it.report);
-        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER);
+        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER && has_details(it));
         if let Some(newest) = fresh.map(|it| it.version).max()
             && self.version() != Some(newest)
         {
@@ -297,6 +297,7 @@ impl StationView {
             let version = known.report.version;
             if let Some((newest, since)) = self.version
                 && version != newest
+                && has_details(&known.report)
                 && known.report.at.since(since) >= SILENT_AFTER
             {
                 let note = format!(": version {version}, other relays version {newest}");
@@ -328,6 +329,11 @@ impl StationView {
         gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"))
             .collect()
     }
+}
+
+/// Returns true if a report has more than position and control: relays report the rest less often.
+fn has_details(report: &Report) -> bool {
+    report.agreed.is_some() || report.neighbours.iter().any(Option::is_some)
 }
 
 /// Returns the neighbours that a relay reports as silent.

@@ -128,6 +128,10 @@ impl Watched {
             "unagreed" => report.agreed = None,
             "restarted" => (report.agreed, report.setpoint) = (None, None),
             "passive" => report.is_passive = true,
+            "brief" => {
+                (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
+                report.version = 0;
+            }
             "version2" => report.version = 2,
             "nonext" => report.neighbours[1] = None,
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
