@@ -43,6 +43,7 @@ pub struct Frames {
 
 /// Newest report of a relay, and the past that its alarms depend on.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each alarm")]
 struct Known {
     report: Report,
     /// True from the control by the relay until the pilot's, also while the link to the autopilot is lost.
@@ -232,14 +233,7 @@ impl StationView {
 
     fn lasting(&self, now: Instant, relays: u16) -> Vec<Lasting> {
         let mut all = Vec::new();
-        let mut add = |reason, subject, reporters: Vec<u16>, note: String| {
-            all.push(Lasting {
-                reason,
-                subject,
-                reporters,
-                note,
-            });
-        };
+        let mut add = |reason, subject, by: Vec<u16>, note| all.push((reason, subject, by, note));
         let quiet = now.since(self.frame_at);
         let Frames { received, rejected } = self.frames;
         if quiet >= SILENT_AFTER && !self.known.is_empty() {
@@ -259,14 +253,10 @@ impl StationView {
             };
             add(Reason::NoReport, 0, unknown, note);
         }
-        if self
-            .rejected_at
-            .is_some_and(|at| now.since(at) < REJECTED_FOR)
-        {
-            let note = format!(
-                ": {rejected} of {} since its start",
-                u64::from(received) + u64::from(rejected)
-            );
+        let is_recent = |at: Instant| now.since(at) < REJECTED_FOR;
+        if self.rejected_at.is_some_and(is_recent) {
+            let all = u64::from(received) + u64::from(rejected);
+            let note = format!(": {rejected} of {all} since its start");
             add(Reason::Rejected, 0, Vec::new(), note);
         }
         for known in self.known.values() {
@@ -304,15 +294,13 @@ impl StationView {
                 add(Reason::Version, number, vec![number], note);
             }
         }
-        let shared: [(Reason, fn(&Known) -> bool); 3] = [
-            (Reason::NoQuorum, |it| it.report.phase == Phase::NoQuorum),
-            (Reason::Infeasible, |it| {
-                it.report.phase == Phase::Infeasible
-            }),
-            (Reason::LeaseExpired, |it| it.has_lost_agreement),
-        ];
-        for (reason, is) in shared {
-            let by = self.known.values().filter(|it| is(it));
+        for reason in [Reason::NoQuorum, Reason::Infeasible, Reason::LeaseExpired] {
+            let lasts = |it: &&Known| match reason {
+                Reason::NoQuorum => it.report.phase == Phase::NoQuorum,
+                Reason::Infeasible => it.report.phase == Phase::Infeasible,
+                _ => it.has_lost_agreement,
+            };
+            let by = self.known.values().filter(lasts);
             let by: Vec<u16> = by.map(|it| it.report.relay).collect();
             if !by.is_empty() {
                 add(reason, 0, by, String::new());
@@ -326,8 +314,8 @@ impl StationView {
         let fresh = self.known.values().map(|it| &it.report);
         let fresh = fresh.filter(|it| now.since(it.at) < SILENT_AFTER);
         let gaps = fresh.flat_map(|by| silent(by).map(|it| (by.relay, it)));
-        gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"))
-            .collect()
+        let gaps = gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"));
+        gaps.collect::<Vec<_>>().concat()
     }
 }
 
@@ -345,9 +333,8 @@ fn silent(report: &Report) -> impl Iterator<Item = u16> {
 /// Returns a line for each difference of a relay's report from the one before.
 fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     let Some(old) = before else {
-        let control = new
-            .control
-            .map_or(String::new(), |it| format!(", {}", control(it)));
+        let words = |it| format!(", {}", control(it));
+        let control = new.control.map_or(String::new(), words);
         return vec![format!("first report: {}{control}", phase(new))];
     };
     let mut lines = Vec::new();
@@ -360,12 +347,13 @@ fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     }
     if old.agreed != new.agreed {
         lines.push(match new.agreed {
-            Some(Placement {
-                x_m,
-                y_m,
-                altitude_m,
-            }) => {
-                format!("agreed position: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m")
+            Some(at) => {
+                let Placement {
+                    x_m,
+                    y_m,
+                    altitude_m: h_m,
+                } = at;
+                format!("agreed position: x {x_m:.1} m, y {y_m:.1} m, altitude {h_m:.1} m")
             }
             None => "no agreed position any more".to_owned(),
         });
