@@ -89,8 +89,10 @@ impl Reason {
     }
 }
 
-/// Alarm that lasts: its reason, the relay that it is about (0: its reporters or the station), the relays that have reported it,
-/// sorted, and a text that is appended to that of the reason.
+/// Alarm that lasts: its reason, its subject, its reporters and a note.
+///
+/// The subject is the relay that it is about; 0 if it is about its reporters or the station. The reporters are the relays that have
+/// reported it, sorted. The note is appended to the text of the reason.
 pub type Lasting = (Reason, u16, Vec<u16>, String);
 
 #[derive(Debug)]
@@ -115,7 +117,9 @@ pub struct Alarms {
 }
 
 impl Alarms {
-    /// Begins an alarm about relay `subject` (0: about its reporters), or adds the reporter `by` to the same alarm that lasts already.
+    /// Begins an alarm, or adds the reporter `by` to the same alarm that lasts already.
+    ///
+    /// `subject` is the relay that it is about; 0 if it is about its reporters.
     pub fn begin(&mut self, time_s: f64, reason: Reason, subject: u16, by: u16) {
         let known = self
             .lasting()

@@ -23,7 +23,7 @@ use crate::alarms::{Alarms, Lasting, Reason, named};
 use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
 use crate::snapshot::{LogLine, Snapshot};
 
-/// Time without any frame after which no alarm about a single relay begins, because the station itself may be cut off.
+/// Time without any frame after which no alarm about a single relay begins: the station may be cut off.
 const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 
 /// Time for which the rejection of a frame is shown.
@@ -46,7 +46,7 @@ pub struct Frames {
 #[expect(clippy::struct_excessive_bools, reason = "one for each alarm")]
 struct Known {
     report: Report,
-    /// True from the control by the relay until the pilot's, also while the link to the autopilot is lost.
+    /// True from the control by the relay until the pilot takes it, also without a link to the autopilot.
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
@@ -94,7 +94,7 @@ impl Known {
         self.report.is_passive || self.passive_at.is_some_and(is_recent)
     }
 
-    /// Returns true if the drone has no known position although it is in the air or should be ready for it.
+    /// Returns true if the drone is in the air and its position is unknown.
     fn is_blind(&self) -> bool {
         let Report {
             control, position, ..
@@ -109,7 +109,7 @@ impl Known {
 pub struct StationView {
     alarms: Alarms,
     known: BTreeMap<u16, Known>,
-    /// For each relay its neighbours that have reported it as silent, and the time of each neighbour's last such report.
+    /// Neighbours that have reported a relay as silent, by relay, and the time of their last such report.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     frames: Frames,
     /// Time of the last accepted frame; that of the start before the first one.
@@ -208,7 +208,9 @@ impl StationView {
         self.frames = frames;
     }
 
-    /// Drops the claims about relays that have reported since, unless the neighbour's newest report still has the claim.
+    /// Drops the claims about relays that have reported since.
+    ///
+    /// A claim that the newest report of a neighbour still has stays.
     fn drop_answered_claims(&mut self, now: Instant) {
         let known = &self.known;
         for (number, claims) in &mut self.claims {
@@ -309,7 +311,7 @@ impl StationView {
         all
     }
 
-    /// Returns the gaps in the chain that relays report now, for an alarm about relays that may be behind one.
+    /// Returns the gaps that relays report now, for an alarm about relays that may be behind one.
     fn gaps(&self, now: Instant) -> String {
         let fresh = self.known.values().map(|it| &it.report);
         let fresh = fresh.filter(|it| now.since(it.at) < SILENT_AFTER);
