@@ -18,7 +18,7 @@ pub use parts::RelayState;
 /// Some fields are drawn near the values in `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
-        15 => 15 + input.below(8),
+        15 => 15 + input.below(6),
         tag => tag,
     };
     let mut body = Body {
@@ -49,9 +49,15 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
         16 => body.pulsed(),
         17 | 18 => body.hearing(),
         19 => body.level(),
-        21 => body.pass_of_mission(),
-        22 => body.report(),
-        _ => body.bytes = body.input.piece().to_vec(),
+        _ => {
+            body.bytes = body.input.piece().to_vec();
+            // The recorded inputs keep their meaning.
+            match *body.bytes {
+                [21] => body.pass_of_mission(),
+                [22] => body.report(),
+                _ => {}
+            }
+        }
     }
     body.bytes
 }
@@ -240,7 +246,8 @@ impl Body<'_, '_> {
 
     fn several(&mut self, count: usize) {
         for _ in 0..count {
-            self.small(0, 255);
+            let byte = self.input.byte();
+            self.bytes.push(byte);
         }
     }
 

@@ -82,7 +82,7 @@ impl Wires {
 
     pub(crate) fn progress(&self, end: Side) -> Progress {
         let ground = self.bench.grounds[end as usize].as_ref();
-        ground.map_or(Progress::Idle, Ground::progress)
+        ground.map_or(Progress::Idle, |ground| ground.progress())
     }
 
     pub(crate) fn versions(&self) -> Vec<u16> {
