@@ -72,22 +72,22 @@ struct Figures {
 impl Figures {
     /// Advances `chain` to `until` in steps of 0.1 s. From `from` on it records the ages of the reports of `relays` at `end`.
     fn watch(&mut self, chain: &mut Chain, end: Side, relays: &[u16], [from, until]: [Instant; 2]) {
-        let mut tracks: Vec<Vec<(Instant, Point)>> = vec![Vec::new(); relays.len()];
+        let mut tracks: Vec<Vec<(Instant, Placement)>> = vec![Vec::new(); relays.len()];
         self.ages_s.resize(relays.len(), Vec::new());
         let mut now = chain.progress().1;
         while now < until {
             now = now + Duration::from_millis(100);
             chain.advance(now);
             self.frames.extend(chain.frames(now));
-            let live: Vec<_> = chain.live().collect();
+            let live: Vec<_> = chain.live(now).collect();
             let mut on = live.iter().filter(|relay| relay.is_on);
-            if self.agreed.is_none() && on.all(|relay| relay.phase == Phase::Holding) {
+            if self.agreed.is_none() && on.all(|relay| relay.report.phase == Phase::Holding) {
                 self.agreed = Some(now);
             }
             let reports = chain.reports(end);
             for (at, number) in relays.iter().enumerate() {
-                let truth = live.iter().find(|relay| relay.number == *number).unwrap();
-                tracks[at].extend(truth.position.map(|place| (now, place)));
+                let truth = live.iter().find(|relay| relay.report.relay == *number).unwrap();
+                tracks[at].extend(truth.report.position.map(|place| (now, place)));
                 if now < from {
                     continue;
                 }
@@ -175,9 +175,9 @@ fn is_telemetry(wire: &[u8]) -> bool {
 
 /// Returns the least distance of `place` from the positions of a drone from 0.4 s before `at` to 0.4 s after it: times of
 /// reports are in tenths of a second per hop, and positions are reported every 0.2 s.
-fn error(track: &[(Instant, Point)], at: Instant, place: Placement) -> f64 {
+fn error(track: &[(Instant, Placement)], at: Instant, place: Placement) -> f64 {
     let near = Duration::from_millis(400);
-    let reported = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+    let axes = |of: Placement| [of.x_m, of.y_m, of.altitude_m].map(f64::from);
     if track
         .first()
         .is_none_or(|(first, _)| at.since(*first) <= near)
@@ -187,9 +187,9 @@ fn error(track: &[(Instant, Point)], at: Instant, place: Placement) -> f64 {
     let mut least = f64::INFINITY;
     for (then, true_place) in track {
         if then.since(at) <= near && at.since(*then) <= near {
-            let squares = true_place
-                .iter()
-                .zip(reported)
+            let squares = axes(*true_place)
+                .into_iter()
+                .zip(axes(place))
                 .map(|(a, b)| (a - b) * (a - b));
             least = least.min(squares.sum::<f64>().sqrt());
         }
@@ -211,9 +211,9 @@ fn eight_relays_on_a_channel_report_within_two_seconds() {
     moving.print("the same while the drones fly", [s(1), s(40)]);
     assert!(moving.errors_m.iter().all(|error| *error <= 1.0));
     let far = chain
-        .live()
-        .map(|it| it.position.unwrap()[0])
-        .fold(0.0, f64::max);
+        .live(s(40))
+        .map(|it| it.report.position.unwrap().x_m)
+        .fold(0.0, f32::max);
     assert!(far < 800.0, "the last drone has left its place at 889 m");
     let mut figures = Figures::default();
     figures.watch(&mut chain, Side::Upstream, &all(8), span);
@@ -222,8 +222,9 @@ fn eight_relays_on_a_channel_report_within_two_seconds() {
     assert!(figures.errors_m.iter().all(|error| *error <= 1.0));
     assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
     let reports = chain.reports(Side::Upstream);
-    for (report, truth) in reports.iter().zip(chain.live()) {
-        assert_eq!(report.relay, truth.number);
+    let live = chain.live(span[1]).map(|it| it.report);
+    for (report, truth) in reports.iter().zip(live) {
+        assert_eq!(report.relay, truth.relay);
         assert_eq!(report.neighbours, truth.neighbours);
         assert_eq!(report.phase, truth.phase);
         let apart = |a: Option<Placement>, b: Option<Placement>| {
@@ -331,7 +332,7 @@ fn agreements_take_no_longer() {
             setup.soak = None;
             setup.seed = seed;
             let mut chain = Chain::new(setup).unwrap();
-            while !chain.live().all(|relay| relay.phase == Phase::Holding) {
+            while !chain.live(s(0)).all(|relay| relay.report.phase == Phase::Holding) {
                 assert!(!chain.step(1));
             }
             seconds(chain.progress().1.since(s(0)))
