@@ -86,7 +86,10 @@ impl Figures {
             }
             let reports = chain.reports(end);
             for (at, number) in relays.iter().enumerate() {
-                let truth = live.iter().find(|relay| relay.report.relay == *number).unwrap();
+                let truth = live
+                    .iter()
+                    .find(|relay| relay.report.relay == *number)
+                    .unwrap();
                 tracks[at].extend(truth.report.position.map(|place| (now, place)));
                 if now < from {
                     continue;
@@ -332,7 +335,10 @@ fn agreements_take_no_longer() {
             setup.soak = None;
             setup.seed = seed;
             let mut chain = Chain::new(setup).unwrap();
-            while !chain.live(s(0)).all(|relay| relay.report.phase == Phase::Holding) {
+            while !chain
+                .live(s(0))
+                .all(|relay| relay.report.phase == Phase::Holding)
+            {
                 assert!(!chain.step(1));
             }
             seconds(chain.progress().1.since(s(0)))

@@ -7,9 +7,7 @@ use chacha20::ChaCha8Rng;
 use host_tests::bench::Bench;
 use rand::{RngExt as _, SeedableRng as _};
 use uav_relay::ground::Progress;
-use uav_relay::{
-    Auth, Duration, Event, FlownMission, Ground, Identity, Key, Placement, Relay, Settings,
-};
+use uav_relay::{Auth, Duration, Event, FlownMission, Identity, Key, Placement, Relay, Settings};
 
 use super::*;
 
