@@ -8,8 +8,8 @@
 //! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
-//! On a shared channel a Watch is handed on to the relay four numbers away, and every fourth one to the neighbour, too: reports
-//! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
+//! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
+//! neighbour, too: reports then skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
@@ -29,6 +29,12 @@ const WATCHED: Duration = Duration::from_millis(60_000);
 
 /// Time after a Watch for which its sender is the destination of reports: four lost ones do not change it.
 const DESTINED: Duration = Duration::from_millis(25_000);
+
+/// Time without a report from the relay four numbers farther from the station after which a Watch to it is repeated.
+const UNCONFIRMED: Duration = Duration::from_millis(8_000);
+
+/// Maximum number of doublings of the time between two such repetitions.
+const MOST_DOUBLINGS: u8 = 3;
 
 /// Minimum time between two repetitions of a Watch to relays that have not received it.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
@@ -92,6 +98,9 @@ struct Watched {
     /// Bit mask of the distances of nodes to which the Watch is to be handed on, and when.
     hand_on: u8,
     hand_on_at: Instant,
+    /// Time of the last report from the relay four numbers farther from the station, and number of Watches to it since then.
+    confirmed: Instant,
+    unconfirmed: u8,
     /// Time of the next report, at least `free`.
     due: Instant,
     /// Time from which the share of the channel allows a report.
@@ -167,6 +176,11 @@ impl Reporting {
                 };
                 if is_relay(member, to) {
                     let mission = member.digest;
+                    if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
+                        watched.hand_on |= mask(CANDIDATES);
+                        watched.hand_on_at = now + REPEAT_AFTER.times(1 << watched.unconfirmed);
+                        watched.unconfirmed = (watched.unconfirmed + 1).min(MOST_DOUBLINGS);
+                    }
                     return Some((away, to, Message::Watch { number, mission }));
                 }
             }
@@ -301,6 +315,10 @@ impl Reporting {
         watched.expire(now);
         if watched.until == Instant::ZERO {
             return true;
+        }
+        if from.abs_diff(member.node) == CANDIDATES {
+            watched.confirmed = now;
+            watched.unconfirmed = 0;
         }
         let missed = watched.number.wrapping_sub(report.number());
         if (1..0x8000).contains(&missed) && now >= watched.hand_on_at + REPEAT_AFTER {
@@ -439,7 +457,7 @@ impl Reporting {
     /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = micros(settings.hop_time) / 120 * 11;
+        let hop = micros(settings.hop_time) / 1_200 * 106;
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
             Wiring::Shared => {
@@ -449,7 +467,7 @@ impl Reporting {
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);
-        Duration::from_micros(if is_both { alone * 9 / 4 } else { alone })
+        Duration::from_micros(if is_both { alone * 19 / 8 } else { alone })
     }
 }
 

@@ -160,9 +160,19 @@ pub(super) fn poll_transmit(
             return sent;
         }
     }
-    let (_, to, message) = node.poll_message(now)?;
+    let (side, mut to, message) = node.poll_message(now)?;
     if let Some(session) = endpoint.session_mut() {
         schedule_handshake(node, session, to, &message);
+        if matches!(message, Message::Watch { .. } | Message::Report(_)) && !session.knows(to) {
+            // The neighbour knows this relay. The next report goes to the node itself, if the handshake succeeds.
+            session.greet(to);
+            let [before, after] = node.neighbours();
+            let near = match side {
+                Side::Upstream => before,
+                Side::Downstream => after,
+            };
+            to = near.unwrap_or(to);
+        }
     }
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
@@ -175,8 +185,8 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
     {
         session.request_reply_of_silent(to);
     }
-    if node.needs_handshake(message) {
-        session.show(to);
+    if let Some(number) = node.handshake_of(message) {
+        session.show(to, number);
     }
     if let Message::Hello(hello) = message
         && hello.requests_reply

@@ -126,6 +126,8 @@ pub(crate) struct Session {
     /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
+    /// Number of the lease renewal for which this relay has shown its nonce last.
+    shown: Option<u16>,
 }
 
 /// Result of the authentication of a received frame.
@@ -162,6 +164,7 @@ impl Session {
             clock: 0,
             pinned: [None; 2],
             peers: heapless::Vec::new(),
+            shown: None,
         }
     }
 
@@ -195,11 +198,15 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`. It shows this relay's nonce, by which another node with this
-    /// relay's number can detect the duplicate.
-    pub(crate) fn show(&mut self, to: u16) {
+    /// Schedules a handshake to the known node `to`, once for each lease renewal `number`. It shows this relay's nonce,
+    /// by which another node with this relay's number can detect the duplicate.
+    pub(crate) fn show(&mut self, to: u16, number: u16) {
+        if self.shown == Some(number) {
+            return;
+        }
         if let Some(peer) = self.peers.iter_mut().find(|peer| peer.node == to) {
             peer.handshake = true;
+            self.shown = Some(number);
         }
     }
 

@@ -137,7 +137,8 @@ impl Figures {
         most
     }
 
-    fn print(&self, name: &str, between: [Instant; 2]) {
+    /// Prints the figures; `most_bytes` is the most that telemetry took of a link, in bytes per second.
+    fn print(&self, name: &str, most_bytes: f64) {
         let per_relay: Vec<String> = self
             .ages_s
             .iter()
@@ -154,7 +155,7 @@ impl Figures {
             self.age_s(0.95),
             self.age_s(0.99),
             self.errors_m.iter().copied().fold(0.0, f64::max),
-            100.0 * self.most_bytes(between) / RATE,
+            100.0 * most_bytes / RATE,
         );
     }
 }
@@ -211,7 +212,10 @@ fn eight_relays_on_a_channel_report_within_two_seconds() {
     // The drones fly to their positions.
     let mut moving = Figures::default();
     moving.watch(&mut chain, Side::Upstream, &all(8), [s(15), s(40)]);
-    moving.print("the same while the drones fly", [s(1), s(40)]);
+    moving.print(
+        "the same while the drones fly",
+        moving.most_bytes([s(1), s(40)]),
+    );
     assert!(moving.errors_m.iter().all(|error| *error <= 1.0));
     let far = chain
         .live(s(40))
@@ -220,7 +224,10 @@ fn eight_relays_on_a_channel_report_within_two_seconds() {
     assert!(far < 800.0, "the last drone has left its place at 889 m");
     let mut figures = Figures::default();
     figures.watch(&mut chain, Side::Upstream, &all(8), span);
-    figures.print("8 relays, 57 600 baud, no collisions", [s(1), span[1]]);
+    figures.print(
+        "8 relays, 57 600 baud, no collisions",
+        figures.most_bytes([s(1), span[1]]),
+    );
     assert!(figures.age_s(0.95) <= 2.0, "{}", figures.age_s(0.95));
     assert!(figures.errors_m.iter().all(|error| *error <= 1.0));
     assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
@@ -242,39 +249,47 @@ fn eight_relays_on_a_channel_report_within_two_seconds() {
     }
 }
 
-#[test]
-fn radios_that_collide() {
-    let span = [s(40), s(280)];
-    for (reach, name) in [(8, "all in range"), (4, "hidden nodes")] {
+/// Returns the figures of all seeds together: the ages of each relay's reports in all runs, and the most bytes of any run.
+fn runs(seeds: u64, span: [Instant; 2], end: Side, change: impl Fn(&mut Setup)) -> (Figures, f64) {
+    let mut all_runs = Figures::default();
+    let mut most = 0.0_f64;
+    for seed in 1..=seeds {
         let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
-        setup.radio_reach = reach;
+        change(&mut setup);
+        setup.seed = seed;
         let mut chain = Chain::new(flown(setup)).unwrap();
         let mut figures = Figures::default();
-        figures.watch(&mut chain, Side::Upstream, &all(8), span);
-        figures.print(
-            &format!("8 relays, 57 600 baud, CSMA, {name}"),
-            [s(1), span[1]],
-        );
-        assert!(figures.age_s(0.95) <= 4.0, "{}", figures.age_s(0.95));
-        assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
+        figures.watch(&mut chain, end, &all(8), span);
+        most = most.max(figures.most_bytes([s(1), span[1]]));
+        all_runs.errors_m.append(&mut figures.errors_m);
+        all_runs.ages_s.resize(8, Vec::new());
+        for (ages, more) in all_runs.ages_s.iter_mut().zip(&mut figures.ages_s) {
+            ages.append(more);
+        }
+    }
+    (all_runs, most)
+}
+
+#[test]
+fn radios_that_collide() {
+    // With hidden nodes the aim, 2 s, is missed: more reports collide.
+    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 3.2)] {
+        let change = |setup: &mut Setup| setup.radio_reach = reach;
+        let (figures, most) = runs(12, [s(40), s(280)], Side::Upstream, change);
+        figures.print(&format!("8 relays, 57 600 baud, CSMA, {name}"), most);
+        assert!(figures.age_s(0.95) <= limit_s, "{}", figures.age_s(0.95));
+        assert!(most <= 0.1 * RATE, "{most}");
     }
 }
 
 #[test]
 fn half_of_all_frames_lost() {
-    let span = [s(120), s(720)];
-    let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
-    setup.faults = Faults {
-        loss: 0.5,
-        ..Faults::default()
-    };
-    let mut chain = Chain::new(flown(setup)).unwrap();
-    let mut figures = Figures::default();
-    figures.watch(&mut chain, Side::Upstream, &all(8), span);
-    figures.print("8 relays, 57 600 baud, 50 % lost", [s(1), span[1]]);
-    assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
-    // The aim, 5 s, is missed: a tenth of the rate is too little for an entry that needs two frames for each of two hops.
-    assert!(figures.age_s(0.95) <= 25.0, "{}", figures.age_s(0.95));
+    let change = |setup: &mut Setup| setup.faults.loss = 0.5;
+    let (figures, most) = runs(5, [s(120), s(420)], Side::Upstream, change);
+    figures.print("8 relays, 57 600 baud, 50 % lost", most);
+    assert!(most <= 0.1 * RATE, "{most}");
+    // The aim, 5 s, is missed: a report needs two frames on average, one a second, and those of the far relays twice as many.
+    assert!(figures.age_s(0.95) <= 15.0, "{}", figures.age_s(0.95));
 }
 
 #[test]
@@ -285,7 +300,10 @@ fn two_stations_watch() {
     let mut chain = Chain::new(flown(setup)).unwrap();
     let mut figures = Figures::default();
     figures.watch(&mut chain, Side::Downstream, &all(8), span);
-    figures.print("two stations, the one at Rx", [s(1), span[1]]);
+    figures.print(
+        "two stations, the one at Rx",
+        figures.most_bytes([s(1), span[1]]),
+    );
     assert!(figures.age_s(0.95) <= 8.0, "{}", figures.age_s(0.95));
     assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
     assert_eq!(chain.reports(Side::Upstream).len(), 8);
@@ -300,13 +318,19 @@ fn a_lost_relay_and_a_restarted_one() {
     let mut figures = Figures::default();
     let others = [1, 2, 3, 5, 6, 7, 8];
     figures.watch(&mut chain, Side::Upstream, &others, [s(58), s(120)]);
-    figures.print("relay 4 lost, relay 7 restarted", [s(1), s(120)]);
+    figures.print(
+        "relay 4 lost, relay 7 restarted",
+        figures.most_bytes([s(1), s(120)]),
+    );
     let gap_s = figures.age_s(1.0);
     println!("longest age meanwhile: {gap_s:.1} s");
     assert!(gap_s <= 30.0);
     let mut later = Figures::default();
     later.watch(&mut chain, Side::Upstream, &others, [s(120), s(200)]);
-    later.print("after the chain has closed up", [s(120), s(200)]);
+    later.print(
+        "after the chain has closed up",
+        later.most_bytes([s(120), s(200)]),
+    );
     assert!(later.age_s(0.95) <= 10.0, "{}", later.age_s(0.95));
 }
 
@@ -317,7 +341,10 @@ fn a_hundred_relays_on_wires() {
     let mut chain = Chain::new(setup).unwrap();
     let mut figures = Figures::default();
     figures.watch(&mut chain, Side::Upstream, &all(100), span);
-    figures.print("100 relays, wires of 57 600 baud", [s(1), span[1]]);
+    figures.print(
+        "100 relays, wires of 57 600 baud",
+        figures.most_bytes([s(1), span[1]]),
+    );
     assert!(figures.age_s(0.95) <= 40.0, "{}", figures.age_s(0.95));
     assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
 }

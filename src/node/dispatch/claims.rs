@@ -110,17 +110,19 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns true if a handshake must be sent after `message`.
+    /// Returns the number of the lease renewal in which a handshake must be sent after `message`; `None` if none must.
     ///
     /// On a shared channel this is so once in each lease renewal. From the handshake another node with the same
     /// number detects this relay, even if the chain sends nothing else.
-    pub(crate) fn needs_handshake(&self, message: &Message) -> bool {
-        let renews = match message {
-            Message::Pulse(_) => self.layers.neighbours.at(self.back()).has_no_peer(),
-            Message::Pulsed(pulsed) => pulsed.done,
-            _ => false,
+    pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
+        let number = match message {
+            Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {
+                pulse.number
+            }
+            Message::Pulsed(pulsed) if pulsed.done => pulsed.number,
+            _ => return None,
         };
-        renews && self.member.settings.wiring == Wiring::Shared
+        (self.member.settings.wiring == Wiring::Shared).then_some(number)
     }
 
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
