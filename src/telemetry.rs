@@ -78,13 +78,8 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 }
 
 impl Report {
-    /// Creates the report of an entry at time `at`. What only details contain is taken from `last`, the report before.
-    pub(crate) fn of(
-        entry: &Entry,
-        detail: Option<Detail>,
-        at: Instant,
-        last: Option<&Self>,
-    ) -> Self {
+    /// Creates the report of an entry at time `at`, with the last details of the same relay.
+    pub(crate) fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
         let state = entry.state();
         let digit = |unit: u16| state / unit % 8;
         let mut report = Self {
@@ -113,11 +108,6 @@ impl Report {
                 [before, after].map(|node| Some(node).filter(|node| *node != report.relay));
             report.interference_w = Some(detail.power_w()).filter(|power_w| *power_w > 0.0);
             report.version = detail.version();
-        } else if let Some(last) = last {
-            (report.setpoint, report.agreed) = (last.setpoint, last.agreed);
-            report.neighbours = last.neighbours;
-            report.interference_w = last.interference_w;
-            report.version = last.version;
         }
         report
     }

@@ -105,7 +105,8 @@ impl Web {
             received: stats.received.saturating_add(stats.handshakes),
             rejected: ground.refused(),
         };
-        let snapshot = self.view.snapshot(now, &chain, ground.reports(), frames);
+        let reports: Vec<_> = ground.reports().collect();
+        let snapshot = self.view.snapshot(now, &chain, &reports, frames);
         self.screen.show(snapshot);
         self.next_at
     }

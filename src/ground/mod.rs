@@ -246,8 +246,9 @@ impl Ground {
     /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
     /// them: a relay sends them with every eighth.
     #[cfg(feature = "telemetry")]
-    pub fn reports(&self) -> impl Iterator<Item = &Report> {
-        self.watching.reports.iter()
+    pub fn reports(&self) -> impl Iterator<Item = Report> {
+        let known = self.watching.known.iter();
+        known.map(|known| Report::of(&known.entry, known.detail, known.at))
     }
 
     /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
@@ -593,8 +594,17 @@ struct Watching {
     is_due: bool,
     /// Entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
-    /// Newest report of every relay, by rising number.
-    reports: heapless::Vec<Report, REPORTED>,
+    /// Newest state of every relay, by rising number.
+    known: heapless::Vec<KnownState, REPORTED>,
+}
+
+/// Newest state of a relay at time `at`, and its last details.
+#[cfg(feature = "telemetry")]
+#[derive(Clone, Debug)]
+struct KnownState {
+    at: Instant,
+    entry: Entry,
+    detail: Option<Detail>,
 }
 
 #[cfg(feature = "telemetry")]
@@ -609,7 +619,7 @@ impl Watching {
             distance: 0,
             is_due: false,
             arrived: heapless::Vec::new(),
-            reports: heapless::Vec::new(),
+            known: heapless::Vec::new(),
         }
     }
 
@@ -652,22 +662,17 @@ impl Watching {
         for (entry, detail) in &self.arrived {
             let age = Duration::from_millis(100).times(entry.age.into());
             let at = Instant::from_micros(now.as_micros().saturating_sub(age.as_micros()));
-            match self
-                .reports
-                .binary_search_by_key(&entry.relay(), |report| report.relay)
-            {
+            let (entry, detail) = (*entry, *detail);
+            match (self.known).binary_search_by_key(&entry.relay(), |known| known.entry.relay()) {
                 Ok(index) => {
-                    if let Some(report) = self.reports.get_mut(index)
-                        && at > report.at
+                    if let Some(known) = self.known.get_mut(index)
+                        && at > known.at
                     {
-                        *report = Report::of(entry, *detail, at, Some(report));
+                        let detail = detail.or(known.detail);
+                        *known = KnownState { at, entry, detail };
                     }
                 }
-                Err(index) => {
-                    _ = self
-                        .reports
-                        .insert(index, Report::of(entry, *detail, at, None));
-                }
+                Err(index) => _ = self.known.insert(index, KnownState { at, entry, detail }),
             }
         }
         self.arrived.clear();

@@ -58,9 +58,7 @@ impl Chain {
     pub fn reports(&self, end: Side) -> Vec<Report> {
         let mut stations = self.stations.iter();
         let station = stations.find(|station| station.end == end);
-        station.map_or(Vec::new(), |station| {
-            station.ground.reports().copied().collect()
-        })
+        station.map_or(Vec::new(), |station| station.ground.reports().collect())
     }
 
     /// Passes received bytes to the ground station `at` (from 0) and sends its replies.
