@@ -127,6 +127,7 @@ fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
 
 /// Measures the instructions with which relay 2 handles a sweep message. The blocking and the async driver of its ports are
 /// compared. The sweep message carries the search for the positions along the chain.
+#[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;

@@ -10,6 +10,7 @@ use super::counter::instructions;
 
 /// Measures the instructions of three computations with the line from Tx to Rx on earth. They are its creation, and
 /// the conversion of a position from the mission's coordinates to latitude and longitude, and back.
+#[inline(never)]
 pub(crate) fn flight() {
     let site = Geodetic::from_degrees;
     let (Some(tx), Some(rx)) = (site(47.40, 8.54, 420.0), site(47.41, 8.55, 431.0)) else {
