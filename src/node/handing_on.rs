@@ -1,4 +1,6 @@
 //! Telemetry without the feature `telemetry`: the last Watch or Report is handed on to the other neighbour, and nothing is stored.
+//!
+//! Without the feature `auth` there is nothing to hand on, because ground stations sign all frames.
 
 use super::context::Member;
 use super::neighbour::Neighbours;
@@ -14,7 +16,7 @@ pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 /// Message that is handed on, and the side of its destination.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Reporting(Option<(Side, Message)>);
+pub(crate) struct Reporting([Option<(Side, Message)>; cfg!(feature = "auth") as usize]);
 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, _: Instant, _: Placement) {}
@@ -30,6 +32,9 @@ impl Reporting {
         (side, _): (Side, u16),
         message: &Message,
     ) -> bool {
+        let Some(handed) = self.0.first_mut() else {
+            return false;
+        };
         let copy = match message {
             Message::Watch { number, mission } => Message::Watch {
                 number: *number,
@@ -38,12 +43,12 @@ impl Reporting {
             Message::Report(report) => Message::Report(report.clone()),
             _ => return false,
         };
-        self.0 = Some((side.other(), copy));
+        *handed = Some((side.other(), copy));
         true
     }
 
     pub(crate) fn is_due(&self, _: Instant, _: Duration) -> bool {
-        self.0.is_some()
+        self.0.iter().any(Option::is_some)
     }
 
     pub(crate) fn next_timeout(&self, _: Duration) -> Option<Instant> {
@@ -58,7 +63,7 @@ impl Reporting {
         _: Duration,
         _: Own,
     ) -> Option<(Side, u16, Message)> {
-        let (side, message) = self.0.take()?;
+        let (side, message) = self.0.first_mut()?.take()?;
         let end = match side {
             Side::Upstream if member.node == 1 => 0,
             Side::Downstream if member.node == member.all => member.all.saturating_add(1),

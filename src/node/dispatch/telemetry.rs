@@ -11,6 +11,9 @@ use crate::wire::message::Message;
 impl Node {
     /// Handles a Watch or a Report of node `from` at `side`, a neighbour or not.
     pub(super) fn on_telemetry(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
+        if !cfg!(feature = "auth") {
+            return; // Ground stations sign all frames.
+        }
         if message.digest() != Some(self.member.digest) {
             self.refuse_mission(now, side, from);
         } else if !(self.reporting).handle(now, &self.member, (side, from), message) {
