@@ -67,6 +67,8 @@ mod sir;
 #[doc(hidden)]
 pub mod sir;
 mod stats;
+#[cfg(feature = "telemetry")]
+mod telemetry;
 pub mod time;
 mod view;
 #[cfg(not(feature = "internals"))]
@@ -103,6 +105,8 @@ pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiri
 pub use side::Heading;
 pub use side::Side;
 pub use stats::Stats;
+#[cfg(feature = "telemetry")]
+pub use telemetry::Report;
 pub use time::{Duration, Instant};
 pub use view::{View, ViewId};
 pub use wire::CRC_32C;

@@ -9,12 +9,16 @@
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
 //! | `Outdated` | holds a newer mission | done: the upload needs a larger version |
 
+#[cfg(feature = "telemetry")]
+use crate::mission::MAX_RELAYS;
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};
+#[cfg(feature = "telemetry")]
+use crate::telemetry::Report;
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
 use crate::wire::auth::Auth;
@@ -22,6 +26,8 @@ use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
 use crate::wire::endpoint::{Endpoint, Sent};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
+#[cfg(feature = "telemetry")]
+use crate::wire::message::{Detail, Entry, Reports};
 use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
@@ -32,6 +38,10 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
+
+/// Time between two requests for the reports of all relays.
+#[cfg(feature = "telemetry")]
+const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
 /// Number of unanswered hellos to one relay after which the next relay is polled.
 const QUERIES_PER_RELAY: u8 = 3;
@@ -97,6 +107,8 @@ pub struct Ground {
     /// caller's time.
     clock: MonotonicClock,
     reports: PendingReports,
+    #[cfg(feature = "telemetry")]
+    watching: Watching,
     deframer: Deframer,
     endpoint: Endpoint,
     stats: Stats,
@@ -137,6 +149,8 @@ impl Ground {
             repeat_at: None,
             clock: MonotonicClock::new(Instant::ZERO),
             reports: PendingReports::NONE,
+            #[cfg(feature = "telemetry")]
+            watching: Watching::new(auth.parts().1, all),
             deframer: Deframer::new(),
             endpoint,
             stats: Stats::default(),
@@ -214,6 +228,26 @@ impl Ground {
         self.progress
     }
 
+    /// Requests the reports of all relays from now on, or no longer.
+    ///
+    /// The station repeats the request every 5 s. Relays report for 30 s after the last request.
+    #[cfg(feature = "telemetry")]
+    pub fn watch(&mut self, now: Instant, is_on: bool) {
+        let now = self.clock.advance(now);
+        self.watching.repeat_at = is_on.then_some(now);
+        self.watching.request(now, self.reach);
+    }
+
+    /// Returns the newest report of every relay, by number: of up to 1000 relays.
+    ///
+    /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
+    /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
+    /// them: a relay sends them with every eighth.
+    #[cfg(feature = "telemetry")]
+    pub fn reports(&self) -> impl Iterator<Item = &Report> {
+        self.watching.reports.iter()
+    }
+
     /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
     /// replayed or malformed, or from a relay with another loaded mission.
     pub fn refused(&self) -> u32 {
@@ -285,6 +319,14 @@ impl Ground {
                 offer_number,
             }) if self.answers_query(upload, *offer_number) => {
                 self.on_upload(sender, *upload);
+                &mut self.stats.received
+            }
+            #[cfg(feature = "telemetry")]
+            Some(Message::Report(report)) if report.mission() != self.base => {
+                &mut self.stats.mission
+            }
+            #[cfg(feature = "telemetry")]
+            Some(Message::Report(report)) if self.watching.record(report, self.clock.now()) => {
                 &mut self.stats.received
             }
             _ => &mut self.stats.malformed,
@@ -403,6 +445,11 @@ impl Ground {
     /// Schedules the next hello if it is due: to the same relay again, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
+        #[cfg(feature = "telemetry")]
+        {
+            self.watching.apply(now);
+            self.watching.request(now, self.reach);
+        }
         if self.repeat_at.is_none_or(|again| again > now) {
             return;
         }
@@ -437,7 +484,14 @@ impl Ground {
 
     /// Returns the latest time for the next call of [`Ground::handle_timeout`]; `None` if no timer runs.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        Some(self.clock.external(self.repeat_at?))
+        #[cfg(feature = "telemetry")]
+        let next = [self.repeat_at, self.watching.repeat_at]
+            .into_iter()
+            .flatten()
+            .min();
+        #[cfg(not(feature = "telemetry"))]
+        let next = self.repeat_at;
+        Some(self.clock.external(next?))
     }
 
     /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
@@ -454,7 +508,10 @@ impl Ground {
             return handshake;
         }
         if !core::mem::take(&mut self.due) {
-            return self.next_report(frame);
+            let sent = self.next_report(frame);
+            #[cfg(feature = "telemetry")]
+            let sent = sent.or_else(|| self.next_watch(frame));
+            return sent;
         }
         let to = self.to();
         let loaded = MissionId {
@@ -505,6 +562,107 @@ impl Ground {
         };
         let to = self.at(distance);
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
+    }
+
+    /// Writes the request for reports to the next relay in reach; `None` if none is pending.
+    #[cfg(feature = "telemetry")]
+    fn next_watch(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
+        let (distance, number) = self.watching.poll(self.reach)?;
+        let mission = self.base;
+        let message = Message::Watch { number, mission };
+        let to = self.at(distance);
+        self.endpoint.transmit(to, &message, frame, &mut self.stats)
+    }
+}
+
+/// Requests for the reports of all relays, and the reports.
+#[cfg(feature = "telemetry")]
+#[derive(Clone, Debug)]
+struct Watching {
+    /// Number of relays of the mission.
+    all: u16,
+    /// Time of the next request; `None` while no reports are requested.
+    repeat_at: Option<Instant>,
+    number: u16,
+    /// Bit mask of the relays to which the request is pending. Bit d - 1 is the relay at distance d.
+    pending: u8,
+    /// Entries that have arrived since the last call with a time.
+    arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
+    /// Newest report of every relay, by rising number.
+    reports: heapless::Vec<Report, { MAX_RELAYS as usize }>,
+}
+
+#[cfg(feature = "telemetry")]
+impl Watching {
+    /// Creates a station that requests nothing. A start with a larger `epoch` has larger request numbers.
+    #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
+    const fn new(epoch: u32, all: u16) -> Self {
+        Self {
+            all,
+            repeat_at: None,
+            number: (epoch as u16) << 10,
+            pending: 0,
+            arrived: heapless::Vec::new(),
+            reports: heapless::Vec::new(),
+        }
+    }
+
+    /// Schedules the request to the `reach` nearest relays if it is due.
+    fn request(&mut self, now: Instant, reach: u16) {
+        if self.repeat_at.is_some_and(|at| at <= now) {
+            self.repeat_at = Some(now + WATCH_EVERY);
+            self.number = self.number.wrapping_add(1);
+            self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));
+        }
+    }
+
+    /// Returns the distance of the next relay to which the request is sent, and its number; `None` if none is pending.
+    fn poll(&mut self, reach: u16) -> Option<(u16, u16)> {
+        let distance = (1..=reach).find(|distance| self.pending & bit(*distance) != 0)?;
+        self.pending &= !bit(distance);
+        Some((distance, self.number))
+    }
+
+    /// Records the entries of a report. Returns false, and records none, if one has a number outside the
+    /// mission.
+    fn record(&mut self, report: &Reports, now: Instant) -> bool {
+        if report.entries.iter().any(|entry| entry.relay() > self.all) {
+            return false;
+        }
+        let mut detail = report.detail;
+        for entry in &report.entries {
+            if self.arrived.is_full() {
+                self.apply(now);
+            }
+            _ = self.arrived.push((*entry, detail.take()));
+        }
+        true
+    }
+
+    /// Makes the newest report of every relay of the entries that have arrived, at `now`.
+    fn apply(&mut self, now: Instant) {
+        for (entry, detail) in &self.arrived {
+            let age = Duration::from_millis(100).times(entry.age.into());
+            let at = Instant::from_micros(now.as_micros().saturating_sub(age.as_micros()));
+            match self
+                .reports
+                .binary_search_by_key(&entry.relay(), |report| report.relay)
+            {
+                Ok(index) => {
+                    if let Some(report) = self.reports.get_mut(index)
+                        && at > report.at
+                    {
+                        *report = Report::of(entry, *detail, at, Some(report));
+                    }
+                }
+                Err(index) => {
+                    _ = self
+                        .reports
+                        .insert(index, Report::of(entry, *detail, at, None));
+                }
+            }
+        }
+        self.arrived.clear();
     }
 }
 

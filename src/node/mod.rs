@@ -17,6 +17,7 @@
 //! | `dispatch` | [`Node`], which owns the layers, and is a relay as its facade sees it; `incoming` is a good start |
 //! | `duplicate` | detection of another node with the same number, and the choice of the one that becomes passive |
 //! | `steering` | setpoint on the way to the agreed position |
+//! | `reports` | states of the relays, on their way to a ground station that watches |
 //!
 //! | below the layers | content |
 //! | --- | --- |
@@ -34,6 +35,7 @@ pub(crate) mod duplicate;
 mod lease;
 pub(crate) mod mission_update;
 pub(crate) mod neighbour;
+pub(crate) mod reports;
 pub(crate) mod round;
 pub(crate) mod sample;
 mod steering;

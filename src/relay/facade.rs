@@ -709,6 +709,12 @@ impl Relay {
         self.node.handle_control(self.clock.advance(now), flown)
     }
 
+    /// Records the control state of the drone, for the reports to a ground station that watches.
+    #[cfg(feature = "telemetry")]
+    pub(crate) fn report_control(&mut self, state: crate::flight::autopilot::state::State) {
+        self.node.reporting.handle_control(state as u16 + 1);
+    }
+
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See
     /// [`handle_control`](Self::handle_control).
     ///

@@ -854,6 +854,8 @@ impl Autopilot {
         self.follow(relay, now);
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
+        #[cfg(feature = "telemetry")]
+        relay.report_control(self.state());
         let position = self.poll_position();
         if let Some(Position { at, place, .. }) = position {
             relay.handle_position(now, place, at);

@@ -37,6 +37,10 @@ impl Node {
             // Only the ground station sends levels.
             return false;
         }
+        if let Message::Watch { .. } | Message::Report(_) = message {
+            self.on_telemetry(now, side, from, message);
+            return true;
+        }
         let taken = self.layers.neighbours.at(side).node() == from;
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);

@@ -13,6 +13,7 @@
 //! | `claims` | claims to this node's number |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
+//! | `telemetry` | reports of this relay's state, and those that it hands on |
 //!
 //! A relay without a quorum drops its links after a while, and searches for neighbours again. Otherwise two interleaved parts,
 //! such as 1 - 3 - 5 and 2 - 4, or a part that has not selected the node toward the rest of the chain, would keep their links
@@ -26,6 +27,7 @@ use crate::node::duplicate::IndexClaims;
 use crate::node::lease::Lease;
 use crate::node::mission_update::MissionUpdate;
 use crate::node::neighbour::Neighbours;
+use crate::node::reports::Reporting;
 use crate::node::round::Round;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
@@ -46,6 +48,7 @@ mod incoming;
 mod offers;
 mod outgoing;
 mod setpoint;
+mod telemetry;
 mod timers;
 
 #[cfg(feature = "upload")]
@@ -60,6 +63,7 @@ pub(crate) struct Node {
     pub(super) member: Member,
     pub(super) layers: Layers,
     pub(super) steering: Steering,
+    pub(crate) reporting: Reporting,
     pub(super) duplicate: IndexClaims,
     pub(super) no_quorum_timer: NoQuorumTimer,
     /// Received claim to a node number that must be sent back to its sender; `None` if there is none.
@@ -104,6 +108,7 @@ impl Node {
                 round: Round::new(leads, number, profile, settings, seed, now),
             },
             steering: Steering::NONE,
+            reporting: Reporting::NONE,
             duplicate: IndexClaims::new(seed.rotate_left(24), now, settings),
             no_quorum_timer: NoQuorumTimer::NONE,
             echo: None,
@@ -308,6 +313,8 @@ impl Node {
     pub(crate) fn handle_sample(&mut self, now: Instant, sample: Sample) {
         if !self.layers.round.handle_sample(now, &self.member, sample) {
             bump(&mut self.telemetry.stats.samples_rejected);
+        } else if let Sample::Heard { power_w, .. } | Sample::Interference { power_w } = sample {
+            self.reporting.handle_measured(power_w);
         }
     }
 

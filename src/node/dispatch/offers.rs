@@ -51,6 +51,7 @@ impl Node {
                     Side::Downstream => Sample::Receiver { power_w: *power_w },
                 },
             ),
+            Message::Watch { .. } => self.on_telemetry(now, side, from, message),
             _ => return false,
         }
         true

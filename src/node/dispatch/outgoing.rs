@@ -39,7 +39,9 @@ impl Node {
                 return Some((side, to, report));
             }
         }
-        let (side, to, fence) = self.steering.poll_transmit()?;
+        let Some((side, to, fence)) = self.steering.poll_transmit() else {
+            return self.next_telemetry(now);
+        };
         let mission = self.layers.update.line_digest(&self.member);
         Some((
             side,

@@ -46,6 +46,7 @@ impl Node {
         }
         self.layers.update.handle_timeout(now);
         self.steering.handle_timeout(now);
+        self.reporting.handle_timeout(now);
         self.steer(now);
     }
 
@@ -62,6 +63,7 @@ impl Node {
             self.steering.next_timeout(),
             self.no_quorum_timer.next_timeout(),
             self.layers.update.next_timeout(),
+            self.reporting.next_timeout(self.is_agreeing()),
         ]
         .into_iter()
         .flatten()

@@ -72,7 +72,7 @@ impl ReportLimiter {
 
 /// Returns the bit of the node `distance` relays away in a mask of nodes. 0 if it is not one of the four nearest
 /// nodes.
-pub(super) const fn mask(distance: u16) -> u8 {
+pub(crate) const fn mask(distance: u16) -> u8 {
     if distance >= 1 && distance <= CANDIDATES {
         1 << (distance - 1)
     } else {

@@ -1,7 +1,7 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
 //! Each kind of message has its type, its encoder and its decoder beside each other: in `round` those of passes, in `view` those of view
-//! changes and leases, in `link` those between two neighbours, in `offer` uploads. A decoder checks all ranges: a decoded message has no
+//! changes and leases, in `link` those between two neighbours, in `offer` uploads, in `report` telemetry. A decoder checks all ranges: a decoded message has no
 //! invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
 //! shared parts.
 
@@ -9,17 +9,19 @@ mod link;
 #[cfg(feature = "upload")]
 mod offer;
 mod parts;
+mod report;
 mod round;
 mod view;
 
 pub use self::link::{Claim, Hello};
 pub use self::parts::MessageError;
+pub use self::report::{Coarse, Detail, Entry, MOST_ENTRIES, Reports};
 pub use self::round::{
     AdjustStep, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, SweepVerdict, Token,
 };
 pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
 
-use self::parts::{Word, read, tag, write};
+use self::parts::{PassId, Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
@@ -114,6 +116,15 @@ pub enum Message {
     },
     /// Either direction: claim to the sender's node number, or the echo of another node's claim.
     Claim(Claim),
+    /// Away from a ground station: request for the reports of all relays.
+    Watch {
+        /// Number of the request, wrapping. The station raises it every five seconds.
+        number: u16,
+        /// Digest of the mission that the sender loaded before flight.
+        mission: u16,
+    },
+    /// Toward a ground station that watches: states of relays.
+    Report(Reports),
 }
 
 impl Message {
@@ -129,7 +140,9 @@ impl Message {
                 line_digest: mission,
                 ..
             }
-            | Self::Level { mission, .. } => Some(*mission),
+            | Self::Level { mission, .. }
+            | Self::Watch { mission, .. } => Some(*mission),
+            Self::Report(report) => Some(report.mission()),
             Self::Pulse(pulse) => Some(pulse.view_digest),
             Self::Pulsed(pulsed) => Some(pulsed.view_digest),
             Self::Gather(roster) | Self::Gathered(roster) => Some(roster.view_digest),
@@ -224,6 +237,10 @@ impl Message {
             Self::Offer { upload, .. } => match *upload {},
             Self::Level { mission, power_w } => round::encode_level(*mission, *power_w, buffer),
             Self::Claim(claim) => claim.encode(buffer),
+            Self::Watch { number, mission } => {
+                write(&(tag::WATCH, PassId::new(*number, *mission)), buffer)
+            }
+            Self::Report(report) => report.encode(buffer),
         }
     }
 
@@ -287,6 +304,11 @@ impl Message {
                 Ok(Self::Level { mission, power_w })
             }
             tag::CLAIM => Claim::decode(body).map(Self::Claim),
+            tag::WATCH => read::<PassId>(body).map(|pass| Self::Watch {
+                number: pass.number(),
+                mission: pass.digest(),
+            }),
+            tag::REPORT => Reports::decode(body).map(Self::Report),
             _ => Err(MessageError::Encoding),
         }
     }

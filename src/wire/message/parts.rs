@@ -32,10 +32,12 @@ pub(super) mod tag {
     pub(crate) const SENSED: u8 = 18;
     pub(crate) const LEVEL: u8 = 19;
     pub(crate) const CLAIM: u8 = 20;
+    pub(crate) const WATCH: u8 = 21;
+    pub(crate) const REPORT: u8 = 22;
 }
 
 /// 16-bit number in two bytes; postcard would encode a `u16` as a varint.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
 pub(super) struct Word([u8; 2]);
 
 impl Word {
@@ -91,7 +93,7 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
 /// hop is limited, so that the sum of a position (at most 1e6 m) and this hop is in range.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
-#[derive(Clone, Copy, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(super) struct PassId {
     number: Word,
     mission: Word,

@@ -1,0 +1,51 @@
+//! Reports of this relay's state to a ground station that watches, and those that it hands on.
+
+use super::Node;
+use crate::node::reports::Own;
+use crate::node::round::state::Phase;
+use crate::side::Side;
+use crate::stats::bump;
+use crate::time::Instant;
+use crate::wire::message::Message;
+
+impl Node {
+    /// Handles a Watch or a Report of node `from` at `side`, a neighbour or not.
+    pub(super) fn on_telemetry(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
+        if message.digest() != Some(self.member.digest) {
+            self.refuse_mission(now, side, from);
+        } else if !(self.reporting).handle(now, &self.member, (side, from), message) {
+            bump(&mut self.telemetry.stats.stale);
+        }
+    }
+
+    /// Returns the next Watch or Report, with its side and its destination.
+    pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        let is_busy = self.is_agreeing();
+        if !self.reporting.is_due(now, is_busy) {
+            return None;
+        }
+        let own = self.own();
+        let (member, neighbours) = (&self.member, &self.layers.neighbours);
+        self.reporting.poll(now, member, neighbours, is_busy, own)
+    }
+
+    /// Returns true while an agreement on the view or the positions needs the shared channel.
+    pub(super) fn is_agreeing(&self) -> bool {
+        let is_idle = matches!(
+            self.phase(),
+            Phase::Holding | Phase::Infeasible | Phase::NoQuorum
+        );
+        self.searches() && !is_idle
+    }
+
+    fn own(&self) -> Own {
+        let hold = |side| self.hold_reason(side).map_or(0, |reason| reason as u16 + 1);
+        let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
+        let sides = [Side::Upstream, Side::Downstream];
+        let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
+        Own {
+            state: self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d),
+            places: [self.setpoint(), self.agreed_place()],
+        }
+    }
+}

@@ -1,0 +1,555 @@
+//! Reports of the relays' states, on their way to a ground station that watches.
+//!
+//! | event | action |
+//! | --- | --- |
+//! | new Watch received from a side | report toward that side for 30 s; hand the Watch on to the other side |
+//! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 16 s |
+//! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
+//! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
+//! | report due | send the own entry if it is due, and stored ones that fit; entries that have not been replaced since they were sent may be repeated |
+//!
+//! On a shared channel a Watch is handed on to the relay four numbers away, and every other one to the neighbour, too: reports
+//! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
+//! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry` a relay hands on each Watch
+//! and each Report to its other neighbour, the latest only, and stores nothing.
+
+use heapless::Vec;
+
+use super::context::Member;
+use super::neighbour::Neighbours;
+use super::neighbour::hearing::{CANDIDATES, mask};
+use crate::place::Placement;
+use crate::settings::Wiring;
+use crate::side::Side;
+use crate::time::{Duration, Instant};
+use crate::wire::message::{Coarse, Detail, Entry, MOST_ENTRIES, Message, Reports};
+
+/// True if the crate is built with the feature `telemetry`.
+const TELEMETRY: bool = cfg!(feature = "telemetry");
+
+/// Time after the last Watch for which a relay reports.
+const WATCHED: Duration = Duration::from_millis(30_000);
+
+/// Time after a Watch for which its sender is the destination of reports: three lost ones do not change it.
+const DESTINED: Duration = Duration::from_millis(16_000);
+
+/// Minimum time between two repetitions of a Watch to relays that have not received it.
+const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
+
+/// Time by which telemetry waits for agreements on a shared channel, at most.
+const PATIENCE: Duration = Duration::from_millis(2_000);
+
+/// Age above which a position of the drone counts as unknown, and minimum age of a repeated entry.
+const OLD: Duration = Duration::from_millis(2_000);
+
+/// Minimum time between two reports of a relay.
+const LEAST_PERIOD: Duration = Duration::from_millis(500);
+
+/// Number of stored entries of other relays.
+const STORED: usize = 16;
+
+/// Bytes of a report without its entries, with frame and tag.
+const FRAME: u32 = 32;
+
+/// Assumed bytes of an entry, with its shares of a frame and of details.
+const SHARE: u32 = 24;
+
+/// Reports of one relay, and those that it hands on.
+#[derive(Clone, Debug)]
+pub(crate) struct Reporting {
+    state: [State; TELEMETRY as usize],
+    /// Message that is handed on, and the side of its destination. Only without the feature `telemetry`.
+    handed: [Option<(Side, Message)>; !TELEMETRY as usize],
+}
+
+#[derive(Clone, Debug)]
+struct State {
+    /// Last position of the drone, and when it was measured.
+    position: Option<(Instant, Placement)>,
+    /// Control state of the drone, from 1; 0 without an autopilot.
+    control: u16,
+    /// Last measured interference, W; 0 before any.
+    power_w: f32,
+    stored: Vec<Stored, STORED>,
+    watched: [Watched; 2],
+    /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
+    checked: Instant,
+}
+
+/// Entry of another relay that is to be handed on.
+#[derive(Clone, Debug)]
+struct Stored {
+    entry: Entry,
+    detail: Option<Detail>,
+    /// Time of the relay's state.
+    at: Instant,
+    /// Time from which the entry may be sent: at once, or again after the time in which a newer one should arrive.
+    from: Instant,
+    is_new: bool,
+}
+
+/// Side with a ground station that watches.
+#[derive(Clone, Copy, Debug)]
+struct Watched {
+    number: u16,
+    until: Instant,
+    /// Node that reports are sent to, until a time; `None` for the neighbour.
+    to: Option<u16>,
+    to_until: Instant,
+    /// Bit mask of the distances of nodes to which the Watch is to be handed on, and when.
+    hand_on: u8,
+    hand_on_at: Instant,
+    /// Time of the next report, at least `free`.
+    due: Instant,
+    /// Time from which the share of the channel allows a report.
+    free: Instant,
+    /// Time from which the own entry is part of a report.
+    own_from: Instant,
+    /// Number of own entries, wrapping.
+    count: u8,
+    /// True if entries have arrived since the last report.
+    is_fed: bool,
+}
+
+impl Watched {
+    const NONE: Self = Self {
+        number: 0,
+        until: Instant::ZERO,
+        to: None,
+        to_until: Instant::ZERO,
+        hand_on: 0,
+        hand_on_at: Instant::ZERO,
+        due: Instant::ZERO,
+        free: Instant::ZERO,
+        own_from: Instant::ZERO,
+        count: 0,
+        is_fed: false,
+    };
+}
+
+/// State of the relay that its own entry contains.
+#[derive(Clone, Copy)]
+pub(crate) struct Own {
+    /// Phase, hold reasons and flags, as in an entry.
+    pub(crate) state: u16,
+    /// Setpoint and agreed position.
+    pub(crate) places: [Option<Placement>; 2],
+}
+
+impl Reporting {
+    pub(crate) const NONE: Self = Self {
+        state: [const { State::NONE }; TELEMETRY as usize],
+        handed: [const { None }; !TELEMETRY as usize],
+    };
+
+    pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
+        if let Some(state) = self.state.first_mut() {
+            state.position = Some((at, place));
+        }
+    }
+
+    pub(crate) fn handle_measured(&mut self, power_w: f32) {
+        if let Some(state) = self.state.first_mut() {
+            state.power_w = power_w;
+        }
+    }
+
+    pub(crate) fn handle_control(&mut self, control: u16) {
+        if let Some(state) = self.state.first_mut() {
+            state.control = control;
+        }
+    }
+
+    /// Handles a Watch or a Report from node `from` at `side`. Returns false if an entry is of a relay that is not
+    /// behind `from`.
+    pub(crate) fn handle(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        (side, from): (Side, u16),
+        message: &Message,
+    ) -> bool {
+        if let Some(handed) = self.handed.first_mut() {
+            *handed = Some((side.other(), message.clone()));
+        }
+        let Some(state) = self.state.first_mut() else {
+            return true;
+        };
+        match message {
+            Message::Watch { number, .. } => state.on_watch(now, member, (side, from), *number),
+            Message::Report(report) => return state.on_report(now, member, (side, from), report),
+            _ => {}
+        }
+        true
+    }
+
+    /// Returns the next Watch or Report with its side and its destination; `None` if none is due. `is_busy` is true
+    /// while an agreement needs the channel.
+    pub(crate) fn poll(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        neighbours: &Neighbours,
+        is_busy: bool,
+        own: Own,
+    ) -> Option<(Side, u16, Message)> {
+        if let Some(handed) = self.handed.first_mut()
+            && let Some((side, message)) = handed.take()
+        {
+            let is_watch = matches!(message, Message::Watch { .. });
+            let to = next(member, neighbours, side).filter(|to| !is_watch || is_relay(member, *to));
+            return Some((side, to?, message));
+        }
+        let state = self.state.first_mut()?;
+        for side in [Side::Upstream, Side::Downstream] {
+            let watched = state.at(side);
+            watched.expire(now);
+            let is_ready = |at| now >= delayed(at, is_busy);
+            while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
+                let distance = if watched.hand_on & 1 != 0 {
+                    1
+                } else {
+                    CANDIDATES
+                };
+                let number = watched.number;
+                watched.hand_on &= !mask(distance);
+                let away = side.other();
+                let to = if distance == 1 {
+                    neighbours.at(away).node()
+                } else {
+                    beyond(member, away, distance)
+                };
+                if is_relay(member, to) {
+                    let mission = member.digest;
+                    return Some((away, to, Message::Watch { number, mission }));
+                }
+            }
+            if let Some(at) = watched.report_at()
+                && is_ready(at)
+                && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
+                && let Some(report) = state.report(now, member, neighbours, side, own)
+            {
+                return Some((side, to, Message::Report(report)));
+            }
+        }
+        None
+    }
+
+    /// Records that the relay's timers have been handled up to `now`.
+    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        if let Some(state) = self.state.first_mut() {
+            state.checked = now;
+        }
+    }
+
+    /// Returns true if a Watch or a Report may be due.
+    pub(crate) fn is_due(&self, now: Instant, is_busy: bool) -> bool {
+        self.handed.iter().any(Option::is_some) || self.times(is_busy).any(|at| at <= now)
+    }
+
+    /// Returns the time of the next Watch or Report.
+    pub(crate) fn next_timeout(&self, is_busy: bool) -> Option<Instant> {
+        let checked = self.state.first()?.checked;
+        self.times(is_busy).filter(|at| *at > checked).min()
+    }
+
+    /// Returns the times at which a Watch or a Report is due.
+    fn times(&self, is_busy: bool) -> impl Iterator<Item = Instant> {
+        let sides = self.state.iter().flat_map(|state| &state.watched);
+        let times = sides.flat_map(|watched| {
+            let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
+            [watched.report_at(), hand_on]
+        });
+        times.flatten().map(move |at| delayed(at, is_busy))
+    }
+}
+
+fn delayed(at: Instant, is_busy: bool) -> Instant {
+    if is_busy { at + PATIENCE } else { at }
+}
+
+const fn is_relay(member: &Member, node: u16) -> bool {
+    node >= 1 && node <= member.all
+}
+
+/// Returns the node `distance` numbers away at `side`.
+const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
+    match side {
+        Side::Upstream => member.node.saturating_sub(distance),
+        Side::Downstream => member.node.saturating_add(distance),
+    }
+}
+
+/// Returns the neighbour at `side`, or Tx or Rx beyond the last relay; `None` while there is neither.
+fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
+    let end = beyond(member, side, 1);
+    match neighbours.at(side).node() {
+        0 => Some(end).filter(|end| !is_relay(member, *end)),
+        node => Some(node),
+    }
+}
+
+impl Watched {
+    /// Ends the watch 30 s after the last request, and forgets a destination that has sent none for 16 s.
+    fn expire(&mut self, now: Instant) {
+        if now >= self.until {
+            *self = Self::NONE;
+        } else if now >= self.to_until {
+            self.to = None;
+        }
+    }
+
+    /// Returns the time of the next report; `None` while nobody watches.
+    fn report_at(&self) -> Option<Instant> {
+        (self.until > Instant::ZERO).then(|| self.due.max(self.free))
+    }
+}
+
+impl State {
+    const NONE: Self = Self {
+        position: None,
+        control: 0,
+        power_w: 0.0,
+        stored: Vec::new(),
+        watched: [Watched::NONE; 2],
+        checked: Instant::ZERO,
+    };
+
+    const fn at(&mut self, side: Side) -> &mut Watched {
+        let [upstream, downstream] = &mut self.watched;
+        match side {
+            Side::Upstream => upstream,
+            Side::Downstream => downstream,
+        }
+    }
+
+    fn on_watch(&mut self, now: Instant, member: &Member, (side, from): (Side, u16), number: u16) {
+        let watched = self.at(side);
+        watched.expire(now);
+        let begins = watched.until == Instant::ZERO;
+        let ahead = number.wrapping_sub(watched.number);
+        if begins {
+            watched.due = now;
+            watched.own_from = now;
+            watched.count = 0;
+        }
+        if begins || (1..0x8000).contains(&ahead) {
+            watched.number = number;
+            watched.until = now + WATCHED;
+            watched.hand_on_at = now;
+            watched.hand_on |= match member.settings.wiring {
+                Wiring::Pair => mask(1),
+                Wiring::Shared if begins || number.is_multiple_of(2) => mask(1) | mask(CANDIDATES),
+                Wiring::Shared => mask(CANDIDATES),
+            };
+        } else if ahead != 0 {
+            return;
+        }
+        let distance = |node: u16| node.abs_diff(member.node);
+        if watched.to.is_none_or(|to| distance(from) >= distance(to)) {
+            watched.to = Some(from);
+            watched.to_until = now + DESTINED;
+        }
+    }
+
+    fn on_report(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        (side, from): (Side, u16),
+        report: &Reports,
+    ) -> bool {
+        let is_behind = |relay: u16| match side {
+            Side::Upstream => relay <= from,
+            Side::Downstream => relay >= from && relay <= member.all,
+        };
+        if !report.entries.iter().all(|entry| is_behind(entry.relay())) {
+            return false;
+        }
+        let watched = self.at(side.other());
+        watched.expire(now);
+        if watched.until == Instant::ZERO {
+            return true;
+        }
+        let missed = watched.number.wrapping_sub(report.number());
+        if (1..0x8000).contains(&missed) && now >= watched.hand_on_at + REPEAT_AFTER {
+            watched.hand_on_at = now;
+            let is_far = from.abs_diff(member.node) == CANDIDATES;
+            watched.hand_on |= mask(if is_far { CANDIDATES } else { 1 });
+        }
+        watched.due = now;
+        watched.is_fed = true;
+        let mut detail = report.detail;
+        for entry in &report.entries {
+            let age = Duration::from_millis(100).times(entry.age.into());
+            let micros = now.as_micros().saturating_sub(age.as_micros());
+            self.store(now, *entry, detail.take(), Instant::from_micros(micros));
+        }
+        true
+    }
+
+    /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
+    /// else the oldest one, is dropped.
+    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) {
+        let mut stored = Stored {
+            entry,
+            detail,
+            at,
+            from: now,
+            is_new: true,
+        };
+        let mut all = self.stored.iter_mut();
+        if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
+            // Two ways of one entry differ by the rounding of its age.
+            if at > old.at + Duration::from_millis(300) {
+                stored.detail = detail.or(old.detail);
+                *old = stored;
+            } else if old.detail.is_none() {
+                old.detail = detail;
+            }
+        } else if let Err(stored) = self.stored.push(stored) {
+            let worst = self
+                .stored
+                .iter_mut()
+                .min_by_key(|old| (old.is_new, old.at));
+            if let Some(worst) = worst {
+                *worst = stored;
+            }
+        }
+    }
+
+    /// Returns the report toward `side` that is due now; `None` if there is nothing to report.
+    fn report(
+        &mut self,
+        now: Instant,
+        member: &Member,
+        neighbours: &Neighbours,
+        side: Side,
+        own: Own,
+    ) -> Option<Reports> {
+        let byte = self.byte_time(now, member, side);
+        let period = period(member, side, byte);
+        let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
+        let (control, power_w) = (self.control, self.power_w);
+        let watched = self.at(side);
+        let mut report = Reports::new(watched.number, member.digest);
+        let is_due = now >= watched.own_from;
+        if is_due {
+            let Own { state, places } = own;
+            let at = Coarse::of(position.map(|(_, place)| place));
+            let age = position.map_or(0, |(at, _)| age(now, at));
+            let entry = Entry::new(member.node, age, state + 4096 * control, at);
+            _ = report.entries.push(entry);
+            if watched.count.is_multiple_of(8) {
+                let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
+                let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
+                let places = places.map(Coarse::of);
+                let detail = Detail::new(places, nodes, power_w, member.active.version);
+                report.detail = Some(detail);
+            }
+            watched.count = watched.count.wrapping_add(1);
+        }
+        self.stored.retain(|stored| age(now, stored.at) < u8::MAX);
+        let mut left = false;
+        for are_new in [true, false] {
+            for stored in &mut self.stored {
+                let toward = match side {
+                    Side::Upstream => stored.entry.relay() > member.node,
+                    Side::Downstream => stored.entry.relay() < member.node,
+                };
+                if stored.is_new != are_new || now < stored.from || !toward {
+                    continue;
+                }
+                let is_first = report.entries.is_empty();
+                if stored.detail.is_some() && !is_first || report.entries.is_full() {
+                    left |= are_new;
+                    continue;
+                }
+                stored.entry.age = age(now, stored.at);
+                _ = report.entries.push(stored.entry);
+                if is_first {
+                    report.detail = stored.detail.take();
+                }
+                stored.is_new = false;
+                stored.from = now + period.max(LEAST_PERIOD);
+            }
+        }
+        let entries = u32::try_from(report.entries.len()).unwrap_or(0);
+        let detail = report.detail.map_or(0, |_| SHARE);
+        let watched = self.at(side);
+        watched.free = now + byte.times(FRAME + 14 * entries + detail);
+        let late = Duration::from_micros(period.as_micros() / 8);
+        if is_due {
+            watched.own_from = now + Duration::from_micros(period.as_micros() / 4 * 3);
+        }
+        watched.due = match (left, watched.is_fed) {
+            (true, _) => now,
+            // The reports of relays behind come first.
+            (false, true) => now + period + late,
+            (false, false) => now + period,
+        };
+        watched.is_fed = false;
+        (entries > 0).then_some(report)
+    }
+
+    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take a twelfth of
+    /// the data rate.
+    ///
+    /// The data rate is at least a sweep in a `hop_time`. On a shared channel a relay may also take a twentieth of what its messages of an
+    /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
+    fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
+        let settings = &member.settings;
+        let hop = micros(settings.hop_time) / 10;
+        let alone = match settings.wiring {
+            Wiring::Pair => hop.into(),
+            Wiring::Shared => {
+                let share = 16 * all_loads(member) / load(member, from_end(member, side));
+                let share = (u64::from(share) * u64::from(hop)) >> 4;
+                share.min((micros(settings.probe_after) / 196).into())
+            }
+        };
+        let is_both = self.watched.iter().all(|watched| now < watched.until);
+        Duration::from_micros(alone << u32::from(is_both))
+    }
+}
+
+fn micros(span: Duration) -> u32 {
+    u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
+}
+
+/// Returns the number of relays up to the end of the chain at `side`, this one included.
+const fn from_end(member: &Member, side: Side) -> u16 {
+    match side {
+        Side::Upstream => member.node,
+        Side::Downstream => member.all.saturating_sub(member.node).saturating_add(1),
+    }
+}
+
+/// Returns the assumed bytes that a relay sends in a period: own entry, and those of the relays four, eight, ... numbers
+/// farther from the station, which it is `distance` numbers away from.
+const fn load(member: &Member, distance: u16) -> u32 {
+    let behind = member.all.saturating_sub(distance) / CANDIDATES;
+    SHARE * (behind as u32 + 2)
+}
+
+/// Returns the sum of [`load`] over all distances, 1 to N.
+const fn all_loads(member: &Member) -> u32 {
+    let all = member.all as u32;
+    let (fours, rest) = (all / 4, all % 4);
+    SHARE * (2 * all + fours * (2 * fours).saturating_sub(2) + rest * fours)
+}
+
+/// Returns the time between two reports of a relay. On wires it is that of the relay nearest to the station, which has the most to send.
+fn period(member: &Member, side: Side, byte: Duration) -> Duration {
+    let bytes = match member.settings.wiring {
+        Wiring::Pair => SHARE * (u32::from(member.all) + 1),
+        Wiring::Shared => load(member, from_end(member, side)),
+    };
+    byte.times(bytes).max(LEAST_PERIOD)
+}
+
+/// Returns the age in tenths of a second, rounded up: that includes the time of the transmission.
+fn age(now: Instant, at: Instant) -> u8 {
+    let tenths = micros(now.since(at)).div_ceil(100_000);
+    u8::try_from(tenths).unwrap_or(u8::MAX)
+}

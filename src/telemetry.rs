@@ -1,0 +1,124 @@
+//! Telemetry: the state of every relay, passed along the chain to a ground station.
+
+use crate::flight::autopilot::state::State;
+use crate::guard::HoldReason;
+use crate::node::round::state::Phase;
+use crate::place::Placement;
+use crate::time::Instant;
+use crate::wire::message::{Coarse, Detail, Entry};
+
+/// State that a relay has reported, and that has reached the ground station through the chain.
+///
+/// Pairs have the neighbour toward Tx first, then the one toward Rx.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Report {
+    /// Number of the relay in the mission, 1..=N.
+    pub relay: u16,
+    /// Time of the state, on the clock of the station.
+    pub at: Instant,
+    /// Position of the drone by its autopilot; `None` if it has none.
+    pub position: Option<Placement>,
+    /// Setpoint of the drone.
+    pub setpoint: Option<Placement>,
+    /// Position on which the chain has agreed for this relay.
+    pub agreed: Option<Placement>,
+    /// Phase of the relay's protocol.
+    pub phase: Phase,
+    /// True while the relay is passive because another node has its number.
+    pub is_passive: bool,
+    /// Control state of the drone; `None` for a relay without an autopilot link.
+    pub control: Option<State>,
+    /// Reasons to hold the position, because of each neighbour.
+    pub hold_reasons: [Option<HoldReason>; 2],
+    /// Numbers of the neighbours in the relay's view.
+    pub neighbours: [Option<u16>; 2],
+    /// True for a neighbour that this relay does not receive now.
+    pub silent: [bool; 2],
+    /// Last measured interference at this relay, W, to 0.8 %; `None` if not measured.
+    pub interference_w: Option<f32>,
+    /// Version of the mission that the relay flies.
+    pub version: u16,
+}
+
+/// Phases by their numbers in an entry.
+const PHASES: [Phase; 8] = [
+    Phase::Idle,
+    Phase::Planning,
+    Phase::Waiting,
+    Phase::Answered,
+    Phase::Holding,
+    Phase::Infeasible,
+    Phase::ViewChange,
+    Phase::NoQuorum,
+];
+
+/// Control states by their numbers in an entry, from 1.
+const CONTROLS: [State; 5] = [
+    State::Silent,
+    State::Grounded,
+    State::Standby,
+    State::Engaged,
+    State::Blind,
+];
+
+/// Hold reasons by their numbers in an entry, from 1.
+const HOLDS: [HoldReason; 7] = [
+    HoldReason::Unheard,
+    HoldReason::Order,
+    HoldReason::Close,
+    HoldReason::Lost,
+    HoldReason::NotFlown,
+    HoldReason::Pending,
+    HoldReason::Halted,
+];
+
+/// Returns the element with this number, from 1; `None` for 0.
+fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
+    all.get(usize::from(number).checked_sub(1)?).copied()
+}
+
+impl Report {
+    /// Creates the report of an entry at time `at`. What only details contain is taken from `last`, the report before.
+    pub(crate) fn of(
+        entry: &Entry,
+        detail: Option<Detail>,
+        at: Instant,
+        last: Option<&Self>,
+    ) -> Self {
+        let state = entry.state();
+        let digit = |unit: u16| state / unit % 8;
+        let mut report = Self {
+            relay: entry.relay(),
+            at,
+            position: entry.at.place(),
+            setpoint: None,
+            agreed: None,
+            phase: numbered(&PHASES, digit(1) + 1).unwrap_or(Phase::Idle),
+            is_passive: false,
+            control: numbered(&CONTROLS, state / 4096),
+            hold_reasons: [8, 64].map(|unit| numbered(&HOLDS, digit(unit))),
+            neighbours: [None; 2],
+            silent: [512, 1024].map(|unit| state / unit % 2 == 1),
+            interference_w: None,
+            version: 0,
+        };
+        if let Some(detail) = detail {
+            let [before, after] = detail.neighbours.map(u16::from);
+            let [before, after] = [
+                report.relay.saturating_sub(before),
+                report.relay.saturating_add(after),
+            ];
+            [report.setpoint, report.agreed] = detail.places.map(Coarse::place);
+            report.neighbours =
+                [before, after].map(|node| Some(node).filter(|node| *node != report.relay));
+            report.interference_w = Some(detail.power_w()).filter(|power_w| *power_w > 0.0);
+            report.version = detail.version();
+        } else if let Some(last) = last {
+            (report.setpoint, report.agreed) = (last.setpoint, last.agreed);
+            report.neighbours = last.neighbours;
+            report.interference_w = last.interference_w;
+            report.version = last.version;
+        }
+        report
+    }
+}

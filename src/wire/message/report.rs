@@ -1,0 +1,179 @@
+//! Telemetry: a ground station's request for reports, and the reports of relays on their way to it.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+use super::parts::{MessageError, PassId, Word, read, tag, write};
+use crate::mission::MAX_RELAYS;
+use crate::node::neighbour::hearing::CANDIDATES;
+use crate::place::Placement;
+
+/// Maximum number of entries in one report. A relay without any feature then has room for the message.
+pub const MOST_ENTRIES: usize = 4;
+
+/// Coordinate of an unknown position, in quarters of a metre.
+const UNKNOWN: i32 = -(1 << 23);
+
+/// Number of states of a relay: see [`Entry::state`].
+const STATES: u16 = 24_576;
+
+/// Largest upper half of a finite positive f32.
+const LARGEST: u16 = 0x7F7F;
+
+/// Position on the wire: x, y and altitude in quarters of a metre, 24 bits each.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Coarse([[u8; 3]; 3]);
+
+impl Coarse {
+    /// Rounds a position to quarters of a metre. A position farther than 2000 km from Tx counts as unknown.
+    pub fn of(at: Option<Placement>) -> Self {
+        let axes = at.map_or([f32::NAN; 3], |at| [at.x_m, at.y_m, at.altitude_m]);
+        let is_known = axes.iter().all(|metres| metres.abs() <= 2e6);
+        Self(axes.map(|metres| {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 8e6")]
+            let quarters = if is_known {
+                libm::roundf(metres * 4.0) as i32
+            } else {
+                UNKNOWN
+            };
+            let [a, b, c, _] = quarters.to_le_bytes();
+            [a, b, c]
+        }))
+    }
+
+    /// Returns the position; `None` if it is unknown.
+    pub fn place(self) -> Option<Placement> {
+        let quarters = self
+            .0
+            .map(|[a, b, c]| i32::from_le_bytes([0, a, b, c]) >> 8);
+        let [x_m, y_m, altitude_m] = quarters.map(|quarters| quarters as f32 / 4.0);
+        (!quarters.contains(&UNKNOWN)).then_some(Placement {
+            x_m,
+            y_m,
+            altitude_m,
+        })
+    }
+}
+
+/// State of one relay in a report.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Entry {
+    relay: Word,
+    /// Age of the state, in tenths of a second.
+    pub age: u8,
+    state: Word,
+    /// Position of the drone.
+    pub at: Coarse,
+}
+
+impl Entry {
+    /// Creates the entry of relay `relay`. The number `state` combines its phase, its control state and flags.
+    pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
+        Self {
+            relay: Word::new(relay),
+            age,
+            state: Word::new(state),
+            at,
+        }
+    }
+
+    /// Returns the number of the relay in the mission.
+    pub const fn relay(&self) -> u16 {
+        self.relay.number()
+    }
+
+    /// Returns the state: the phase, and in units of 8, 64, 512 and 4096 the hold reasons, flags and the control state.
+    pub const fn state(&self) -> u16 {
+        self.state.number()
+    }
+}
+
+/// Details of the relay in the first entry of a report. The relay sends them with every eighth of its entries.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Detail {
+    /// Setpoint of the drone, and the agreed position.
+    pub places: [Coarse; 2],
+    /// Distances to the neighbours toward Tx and toward Rx, in relays: 1 to 4, 0 for none.
+    pub neighbours: [u8; 2],
+    power: Word,
+    version: Word,
+}
+
+impl Detail {
+    /// Creates details with the measured interference in W, 0 for none, and the version of the mission.
+    pub fn new(places: [Coarse; 2], neighbours: [u8; 2], power_w: f32, version: u16) -> Self {
+        let [_, _, a, b] = power_w.to_le_bytes();
+        Self {
+            places,
+            neighbours,
+            power: Word::new(u16::from_le_bytes([a, b])),
+            version: Word::new(version),
+        }
+    }
+
+    /// Returns the measured interference, W; 0 for none. Its relative error is at most 0.8 %.
+    pub const fn power_w(&self) -> f32 {
+        f32::from_bits((self.power.number() as u32) << 16)
+    }
+
+    /// Returns the version of the mission that the relay flies.
+    pub const fn version(&self) -> u16 {
+        self.version.number()
+    }
+}
+
+/// Report: states of relays, on their way to the ground station.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Reports {
+    pass: PassId,
+    /// Details of the relay in the first entry; `None` in most reports.
+    pub detail: Option<Detail>,
+    /// States of relays.
+    pub entries: Vec<Entry, MOST_ENTRIES>,
+}
+
+impl Reports {
+    /// Creates a report without entries, which answers the request `number`.
+    pub const fn new(number: u16, mission: u16) -> Self {
+        Self {
+            pass: PassId::new(number, mission),
+            detail: None,
+            entries: Vec::new(),
+        }
+    }
+
+    /// Returns the number of the newest request that the sender has received.
+    pub const fn number(&self) -> u16 {
+        self.pass.number()
+    }
+
+    /// Returns the digest of the mission that the sender loaded before flight.
+    pub const fn mission(&self) -> u16 {
+        self.pass.digest()
+    }
+
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        write(&(tag::REPORT, self), buffer)
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let report: Self = read(body)?;
+        let detail = report.detail.map_or(0, |_| size_of::<Detail>());
+        // The count has no empty varint bytes: see `take_targets`.
+        if body.len() != 6 + detail + size_of::<Entry>() * report.entries.len() {
+            return Err(MessageError::Encoding);
+        }
+        let is_sound = |detail: Detail| {
+            let [before, after] = detail.neighbours.map(u16::from);
+            before.max(after) <= CANDIDATES && detail.power.number() <= LARGEST
+        };
+        let mut entries = report.entries.iter();
+        let are_sound = entries
+            .all(|entry| (1..=MAX_RELAYS).contains(&entry.relay()) && entry.state() < STATES);
+        if are_sound && report.detail.is_none_or(is_sound) {
+            Ok(report)
+        } else {
+            Err(MessageError::Value)
+        }
+    }
+}
