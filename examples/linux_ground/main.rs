@@ -14,9 +14,9 @@
 //! change, with the distance that each relay moves, and asks for confirmation (`--yes`, `--dry-run`). Every upload needs a larger
 //! `--version` than the one before. The epoch file must be this program's own.
 //!
-//! With `--stand` it keeps running: it answers the relays and reports the interference at its position (`--measurements`). It
-//! survives a lost port, a full disk and a blocked log. For an upload restart it with `--version`: it has no state to lose, and
-//! the relays recognise it by its first frames.
+//! With `--stand` it keeps running: it answers the relays and reports the interference at its position (`--measurements`). With
+//! `--web` a page in a browser shows the chain. It survives a lost port, a full disk and a blocked log. For an upload restart it
+//! with `--version`: it has no state to lose, and the relays recognise it by its first frames.
 //!
 //! Log lines have the format of `linux_companion`. Exit status: 0 once the chain flies the new mission, or after Ctrl-C or
 //! SIGTERM with `--stand`; 1 if the upload fails or it can not start; 2 if the options are wrong.
@@ -32,6 +32,7 @@
 //! | `measurements.rs` | measured interference, from a FIFO, a file or datagrams |
 //! | `heard.rs` | nearby relays that answer |
 //! | `report.rs` | log lines |
+//! | `screen.rs` | page that shows the chain in a browser |
 //!
 //! It shares a library with the relay, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
@@ -50,6 +51,8 @@ mod new;
 mod options;
 #[cfg(unix)]
 mod report;
+#[cfg(unix)]
+mod screen;
 #[cfg(unix)]
 mod station;
 #[cfg(unix)]

@@ -1,6 +1,7 @@
 //! Checked command line.
 
 use std::io::{IsTerminal as _, Write as _};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -101,6 +102,10 @@ pub(crate) struct Options {
     /// that mission first
     #[arg(long, help_heading = "Standing")]
     pub(crate) stand: bool,
+    /// Show the chain in a browser: a map of the relays by their reports, alarms and a log. Use 127.0.0.1:8080 for this computer alone;
+    /// port 0 takes any free port. Everyone who reaches another address sees the flight
+    #[arg(long, value_name = "ADDRESS:PORT", requires = "stand", value_parser = address, help_heading = "Standing")]
+    pub(crate) web: Option<SocketAddr>,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     pub(crate) status_socket: Option<PathBuf>,
@@ -169,10 +174,15 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.value("--timeout", own.timeout_s);
     given.flag("--stand", own.stand);
     given.path_or_udp("--measurements", own.measurements.as_ref());
+    given.value("--web", own.web.as_ref());
     given.flag("--json", own.json);
     given.path("--log-file", own.log_file.as_ref());
     given.path("--status-socket", own.status_socket.as_ref());
     given.path("--capture", own.capture.as_ref());
+}
+
+fn address(text: &str) -> Result<SocketAddr, String> {
+    uav_relay_screen::address(text).map_err(|error| error.to_string())
 }
 
 fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {

@@ -6,7 +6,7 @@ use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
+use uav_relay::{Auth, Ground, Instant, Key, Progress};
 use uav_relay_linux::counters::{RejectionReasons, counted};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::replug::Replug;
@@ -18,6 +18,7 @@ use crate::heard::NearbyRelays;
 use crate::measurements::{Measurements, name};
 use crate::options::Plan;
 use crate::report;
+use crate::screen::Web;
 use crate::uploading::{Fault, Outcome, Uploading};
 
 const READS: usize = 64;
@@ -33,6 +34,7 @@ struct Station<'a> {
     hearing: NearbyRelays,
     rejections: RejectionReasons,
     uploading: Option<Uploading>,
+    web: Option<Web>,
     /// True if the operator has answered a request for confirmation: standard input is readable.
     is_answered: bool,
 }
@@ -82,6 +84,10 @@ impl<'a> Station<'a> {
         let uploading = options
             .version
             .map(|version| Uploading::begin(service.now(), plan, version, &mut ground));
+        let web = options
+            .web
+            .map(|address| Web::start(address, service.now(), &service.log, &mut ground))
+            .transpose()?;
         Ok(Self {
             plan,
             service,
@@ -92,6 +98,7 @@ impl<'a> Station<'a> {
             hearing: NearbyRelays::default(),
             rejections: RejectionReasons::default(),
             uploading,
+            web,
             is_answered: false,
         })
     }
@@ -110,12 +117,15 @@ impl<'a> Station<'a> {
         if outcome.is_some() {
             return outcome;
         }
+        let (ground, uploading) = (&mut self.ground, self.uploading.as_ref());
+        let web = self.web.as_mut();
+        let shown = web.map(|web| web.turn(time, self.plan, ground, uploading));
         // An upload's next stage begins with a frame.
         self.send();
         let alive = self.serve_status(time);
         let measured = self.measurements.as_ref().and_then(Measurements::wake);
         let late = self.uploading.as_ref().and_then(Uploading::wake);
-        let others = [silent, alive, measured, late, self.tty.wake()];
+        let others = [silent, alive, measured, late, shown, self.tty.wake()];
         let wake = others
             .into_iter()
             .flatten()
@@ -198,7 +208,7 @@ impl<'a> Station<'a> {
             uploading,
             ..
         } = self;
-        let uploading = uploading.as_ref().and_then(Uploading::upload);
+        let uploading = uploading.as_ref();
         service.tend(time, "station", |log, command| {
             if let Some((command, _)) = command {
                 let text =
@@ -213,7 +223,7 @@ impl<'a> Station<'a> {
                     "end": name(plan.end),
                     "relays": plan.loaded.mission.relays(),
                     "hears": hearing.nodes(),
-                    "upload": upload(uploading, ground),
+                    "upload": uploading.map_or(Value::Null, upload),
                     "counters": counted(ground.stats()),
                 },
                 "measurements": measurements.as_ref().map(Measurements::status),
@@ -263,11 +273,11 @@ fn answered() -> String {
     }
 }
 
-fn upload(upload: Option<&Upload>, ground: &Ground) -> Value {
-    let Some(upload) = upload else {
+fn upload(uploading: &Uploading) -> Value {
+    let Some(upload) = uploading.upload() else {
         return Value::Null;
     };
-    let (progress, flown_by) = match ground.progress() {
+    let (progress, flown_by) = match uploading.progress() {
         Progress::Stored { .. } => ("stored", 0),
         Progress::Adopted { .. } => ("adopted", 1),
         Progress::Refused { .. } => ("refused", 0),

@@ -88,6 +88,15 @@ impl Uploading {
         self.upload.as_ref()
     }
 
+    /// Returns the last progress of the upload.
+    pub(crate) const fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    pub(crate) const fn has_ended(&self) -> bool {
+        matches!(self.stage, Stage::Ended)
+    }
+
     /// Handles the operator's answer to the request for confirmation. `line` is empty at the end of standard input.
     pub(crate) fn answer(
         &mut self,

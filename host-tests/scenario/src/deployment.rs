@@ -106,6 +106,8 @@ pub struct Ground {
     pub stand: Option<bool>,
     /// Source of interference measurements: a FIFO, a file, or `udp:[HOST:]PORT`.
     pub measurements: Option<String>,
+    /// Address and port at which a page shows the chain in a browser.
+    pub web: Option<String>,
     /// True to write log lines as JSON.
     pub json: Option<bool>,
     /// Log file of the ground station, in place of its standard output.

@@ -411,6 +411,7 @@ const GROUND: Keys = &[
     optional("timeout_s", Whole(range(1.0, 86_400.0, "s"))),
     optional("stand", Rule::Flag),
     optional("measurements", Text),
+    optional("web", Text),
     optional("json", Rule::Flag),
     optional("log_file", Text),
     optional("status_socket", Text),

@@ -21,6 +21,10 @@
 //! | module | content |
 //! | --- | --- |
 //! | `snapshot` | the state that the page shows |
+//! | `chain` | snapshot of a chain from the reports of its relays |
+//! | `hops` | SIR of every hop by the mission's model |
+//! | `alarms` | list of the alarms, which begin and end |
+//! | `station` | alarms and log lines of a ground station, from changes of the reports |
 //! | `server` | connections, their limits, and the stream of snapshots |
 //! | `clean` | values that the page cannot show |
 //! | `request` | checks of a request, and the files of the page |
@@ -35,15 +39,20 @@
 //! from elsewhere, and its content security policy allows only its own files. There is no password: everyone who reaches the address
 //! sees the screen. [`Screen::is_public`] tells whether other computers can reach it.
 
+pub mod alarms;
+pub mod chain;
 mod clean;
+pub mod hops;
 mod request;
 mod server;
 mod snapshot;
+pub mod station;
 
 use std::fmt;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
 
+pub use alarms::{list, named};
 pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, Screen};
 pub use snapshot::{
     Alarm, Condition, Fence, Frame, Hop, InterfererSnapshot, LogLine, Node, Position,

@@ -33,6 +33,7 @@ mod unanswered;
 mod unplugged;
 mod upload;
 mod views;
+mod web;
 mod words;
 
 use std::time::{Duration, Instant};

@@ -14,99 +14,22 @@
 //! | the autopilot was restarted | notice | the relay is engaged |
 //! | measurements that do not fit | notice | the relay has a new estimate |
 
-use uav_relay_screen::{Alarm, Urgency};
+use uav_relay_screen::alarms::{Alarms, Reason};
 
 use crate::report::seconds;
-use crate::report::timeline::named;
 use crate::simulator::outcome::{Moment, TimelineEvent};
 
-/// Number of alarms beyond which ended ones are dropped: the least urgent first, of these the oldest. Lasting ones stay.
-const MOST: usize = 200;
-
-/// Reason of an alarm.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Reason {
-    Lost,
-    NoQuorum,
-    Blind,
-    Duplicate,
-    Key,
-    Epoch,
-    Infeasible,
-    Released,
-    LeaseExpired,
-    NotReceived,
-    Mission,
-    Restarted,
-    Measurements,
-}
-
-impl Reason {
-    const fn urgency(self) -> Urgency {
-        match self {
-            Self::Lost
-            | Self::NoQuorum
-            | Self::Blind
-            | Self::Duplicate
-            | Self::Key
-            | Self::Epoch
-            | Self::Infeasible => Urgency::Critical,
-            Self::Released | Self::LeaseExpired | Self::NotReceived | Self::Mission => {
-                Urgency::Warning
-            }
-            Self::Restarted | Self::Measurements => Urgency::Notice,
-        }
-    }
-
-    /// Returns the text of an alarm about relay `subject`, or about its `reporters` for subject 0.
-    fn text(self, subject: u16, reporters: &[u16]) -> String {
-        let by = named(reporters);
-        match self {
-            Self::Lost => format!("relay {subject} lost: reported by {by}"),
-            Self::NoQuorum => format!("no quorum: {by} cannot reach enough relays, position held"),
-            Self::Blind => format!("{by}: the autopilot reports no position"),
-            Self::Duplicate => format!("two nodes have the number {subject}: reported by {by}"),
-            Self::Key => format!("relay {subject} signs with another key: reported by {by}"),
-            Self::Epoch => {
-                format!(
-                    "relay {subject} started with an old epoch: its frames are rejected by {by}"
-                )
-            }
-            Self::Infeasible => format!("{by}: no positions meet any target SIR, positions kept"),
-            Self::Released => format!("{by} released: the pilot took control"),
-            Self::LeaseExpired => format!("last agreement expired, setpoint kept: {by}"),
-            Self::NotReceived => format!("relay {subject} does not receive {by}"),
-            Self::Mission => format!("relay {subject} has another mission: reported by {by}"),
-            Self::Restarted => format!("{by}: the autopilot was restarted"),
-            Self::Measurements => {
-                format!("{by}: the measured interference does not fit one interferer")
-            }
-        }
-    }
-}
-
-#[derive(Debug)]
-struct Entry {
-    alarm: Alarm,
-    reason: Reason,
-    /// Relay that the alarm is about; 0 if it is about its reporters.
-    subject: u16,
-    /// Relays for which the reason lasts, sorted.
-    reporters: Vec<u16>,
-}
-
-/// Alarms of a run, in the order of their numbers.
-#[derive(Debug, Default)]
-pub(super) struct Alarms {
-    entries: Vec<Entry>,
-    raised: u32,
-}
-
-impl Alarms {
+/// Alarms that follow the events of a run.
+pub(super) trait Observe {
     /// Updates the alarms after an event.
-    pub(super) fn observe(&mut self, moment: &Moment) {
+    fn observe(&mut self, moment: &Moment);
+}
+
+impl Observe for Alarms {
+    fn observe(&mut self, moment: &Moment) {
         let (by, other) = (moment.relay, moment.other.unwrap_or_default());
-        let mut begin = |reason, subject| self.begin(moment, reason, subject);
+        let time_s = seconds(moment.at);
+        let mut begin = |reason, subject| self.begin(time_s, reason, subject, by);
         match moment.what {
             TimelineEvent::Lost(_) => begin(Reason::Lost, other),
             TimelineEvent::NoQuorum => begin(Reason::NoQuorum, 0),
@@ -117,7 +40,7 @@ impl Alarms {
             TimelineEvent::Infeasible => begin(Reason::Infeasible, 0),
             TimelineEvent::Released => {
                 begin(Reason::Released, by);
-                self.end(moment, Reason::Blind, None);
+                self.end(time_s, Reason::Blind, None, by);
             }
             TimelineEvent::LeaseLapsed => begin(Reason::LeaseExpired, 0),
             TimelineEvent::NotHeard => begin(Reason::NotReceived, other),
@@ -127,108 +50,26 @@ impl Alarms {
                 begin(Reason::Measurements, 0);
             }
             TimelineEvent::Found(_) => {
-                self.end(moment, Reason::Lost, Some(other));
-                self.end(moment, Reason::Lost, Some(by));
+                self.end(time_s, Reason::Lost, Some(other), by);
+                self.end(time_s, Reason::Lost, Some(by), by);
             }
             TimelineEvent::ViewAccepted { .. } => {
-                self.end(moment, Reason::NoQuorum, None);
-                self.end(moment, Reason::NotReceived, None);
+                self.end(time_s, Reason::NoQuorum, None, by);
+                self.end(time_s, Reason::NotReceived, None, by);
             }
             TimelineEvent::Converged => {
-                self.end(moment, Reason::LeaseExpired, None);
-                self.end(moment, Reason::Infeasible, None);
+                self.end(time_s, Reason::LeaseExpired, None, by);
+                self.end(time_s, Reason::Infeasible, None, by);
             }
             TimelineEvent::Engaged => {
                 for reason in [Reason::Blind, Reason::Released, Reason::Restarted] {
-                    self.end(moment, reason, None);
+                    self.end(time_s, reason, None, by);
                 }
             }
-            TimelineEvent::Adopted(_) => self.end(moment, Reason::Mission, Some(by)),
-            TimelineEvent::NewEstimate => self.end(moment, Reason::Measurements, None),
+            TimelineEvent::Adopted(_) => self.end(time_s, Reason::Mission, Some(by), by),
+            TimelineEvent::NewEstimate => self.end(time_s, Reason::Measurements, None, by),
             _ => {}
         }
-    }
-
-    /// Begins an alarm, or adds its reporter to the same alarm that lasts already.
-    fn begin(&mut self, moment: &Moment, reason: Reason, subject: u16) {
-        let by = moment.relay;
-        let mut lasting = self
-            .entries
-            .iter_mut()
-            .filter(|it| it.alarm.cleared_s.is_none());
-        if let Some(known) = lasting.find(|it| (it.reason, it.subject) == (reason, subject)) {
-            if let Err(at) = known.reporters.binary_search(&by) {
-                known.reporters.insert(at, by);
-            }
-            known.alarm.text = reason.text(subject, &known.reporters);
-            return;
-        }
-        self.raised += 1;
-        self.entries.push(Entry {
-            alarm: Alarm {
-                number: self.raised,
-                time_s: seconds(moment.at),
-                urgency: reason.urgency(),
-                text: reason.text(subject, &[by]),
-                cleared_s: None,
-            },
-            reason,
-            subject,
-            reporters: vec![by],
-        });
-        if self.entries.len() > MOST {
-            let all = self.entries.iter().enumerate();
-            let ended = all.filter(|(_, it)| it.alarm.cleared_s.is_some());
-            if let Some((at, _)) = ended.min_by_key(|(_, it)| it.alarm.urgency) {
-                self.entries.remove(at);
-            }
-        }
-    }
-
-    /// Ends the alarms of a reason about relay `subject`.
-    ///
-    /// `None` ends only the part that the moment's relay has reported.
-    fn end(&mut self, moment: &Moment, reason: Reason, subject: Option<u16>) {
-        let lasting = self
-            .entries
-            .iter_mut()
-            .filter(|it| it.alarm.cleared_s.is_none());
-        for entry in lasting.filter(|it| it.reason == reason) {
-            match subject {
-                Some(subject) if subject == entry.subject => entry.reporters.clear(),
-                Some(_) => continue,
-                None => entry.reporters.retain(|by| *by != moment.relay),
-            }
-            if entry.reporters.is_empty() {
-                entry.alarm.cleared_s = Some(seconds(moment.at));
-            } else {
-                entry.alarm.text = reason.text(entry.subject, &entry.reporters);
-            }
-        }
-    }
-
-    /// Returns the numbers of the relays that `by` has reported as lost and not found again.
-    pub(super) fn lost_for(&self, by: u16) -> Vec<u16> {
-        let lost = self.lost().filter(|it| it.reporters.contains(&by));
-        lost.map(|it| it.subject).collect()
-    }
-
-    /// Returns true if relay `number` is reported as lost.
-    pub(super) fn is_lost(&self, number: u16) -> bool {
-        self.lost().any(|it| it.subject == number)
-    }
-
-    fn lost(&self) -> impl Iterator<Item = &Entry> {
-        let lasting = self
-            .entries
-            .iter()
-            .filter(|it| it.alarm.cleared_s.is_none());
-        lasting.filter(|it| it.reason == Reason::Lost)
-    }
-
-    /// Returns all alarms.
-    pub(super) fn all(&self) -> Vec<Alarm> {
-        self.entries.iter().map(|it| it.alarm.clone()).collect()
     }
 }
 
@@ -238,8 +79,9 @@ mod tests {
 
     use uav_relay::{Instant, Side};
     use uav_relay_screen::Urgency;
+    use uav_relay_screen::alarms::{Alarms, MOST};
 
-    use super::{Alarms, MOST};
+    use super::Observe as _;
     use crate::simulator::outcome::{Moment, TimelineEvent};
 
     fn moment(at_s: u64, relay: u16, what: TimelineEvent, other: u16) -> Moment {

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 use uav_relay::Instant;
+use uav_relay_screen::{list, named};
 
 use crate::simulator::outcome::{Moment, TimelineEvent};
 
@@ -331,30 +332,6 @@ impl Group {
             _ => "no positions meet any target SIR, so the relays keep their positions".to_owned(),
         }
     }
-}
-
-/// Formats relay numbers: "3", "3 and 5", "1, 2 and 5", "1 to 3 and 5 to 9".
-pub(super) fn list(relays: &[u16]) -> String {
-    let mut sorted = relays.to_vec();
-    sorted.sort_unstable();
-    let mut parts: Vec<String> = Vec::new();
-    for run in sorted.chunk_by(|one, next| one + 1 == *next) {
-        match run {
-            [first, _, .., last] => parts.push(format!("{first} to {last}")),
-            few => parts.extend(few.iter().map(u16::to_string)),
-        }
-    }
-    match parts.as_slice() {
-        [] => String::new(),
-        [one] => one.clone(),
-        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
-    }
-}
-
-/// Formats relays by their numbers: "relay 3", "relays 3 and 5".
-pub(crate) fn named(relays: &[u16]) -> String {
-    let noun = if relays.len() > 1 { "relays" } else { "relay" };
-    format!("{noun} {}", list(relays))
 }
 
 /// Formats a count: "1 relay", "8 relays".

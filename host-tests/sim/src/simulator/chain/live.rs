@@ -1,37 +1,20 @@
 //! State of a running chain, for a screen that shows the flight.
 
-use uav_relay::flight::autopilot::state::State;
-use uav_relay::{HoldReason, Instant, Mission, Phase, Placement, Profile, Side};
+use uav_relay::{Instant, Mission, Profile, Report, Side};
 
 use super::{Chain, MAX_EVENTS};
-use crate::simulator::drones::{Point, point};
+use crate::simulator::drones::{placement, point};
 use crate::simulator::outcome::Moment;
 
 /// State of a relay during a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LiveRelay {
-    /// Number of the relay in the mission, from 1.
-    pub number: u16,
+    /// Present state, as the relay reports it. The position is that of the drone, without drones the setpoint.
+    pub report: Report,
     /// True while the relay is switched on.
     pub is_on: bool,
-    /// Position of the drone along the line of the relay's mission, m; without drones the setpoint. `None` before the first setpoint.
-    pub position: Option<Point>,
-    /// Setpoint of the relay.
-    pub setpoint: Option<Placement>,
-    /// Position on which the chain has agreed for this relay.
-    pub agreed: Option<Placement>,
     /// Altitude and power of the relay.
     pub profile: Profile,
-    /// Phase of the relay's protocol.
-    pub phase: Phase,
-    /// Control state of the drone; `None` without autopilots.
-    pub control: Option<State>,
-    /// Reasons to hold the position, because of the neighbour toward Tx and because of the one toward Rx.
-    pub hold_reasons: [Option<HoldReason>; 2],
-    /// Numbers of the neighbours, toward Tx and toward Rx.
-    pub neighbours: [Option<u16>; 2],
-    /// True while the relay is passive because another node has its number.
-    pub is_passive: bool,
     /// True if the relay has an interference estimate of its own, instead of that of the mission.
     pub estimates: bool,
 }
@@ -70,24 +53,33 @@ impl Chain {
             .map_or(&self.setup.mission, |member| member.relay.mission())
     }
 
-    /// Returns the present state of every relay, from relay 1.
-    pub fn live(&self) -> impl Iterator<Item = LiveRelay> {
-        self.members.iter().enumerate().map(|(index, member)| {
+    /// Returns the state of every relay at the present time `now`, from relay 1.
+    pub fn live(&self, now: Instant) -> impl Iterator<Item = LiveRelay> {
+        self.members.iter().enumerate().map(move |(index, member)| {
             let (relay, vehicle) = (&member.relay, self.fleet.get(index));
             let simple = || self.drone(index).or_else(|| relay.setpoint().map(point));
-            LiveRelay {
-                number: member.node,
-                is_on: member.killed.is_none(),
-                position: vehicle.map_or_else(simple, |vehicle| Some(vehicle.along())),
+            let report = Report {
+                relay: member.node,
+                at: now,
+                position: vehicle
+                    .map_or_else(simple, |vehicle| Some(vehicle.along()))
+                    .map(placement),
                 setpoint: relay.setpoint(),
                 agreed: relay.agreed_place(),
-                profile: relay.profile(),
                 phase: relay.phase(),
+                is_passive: relay.is_passive(),
                 control: vehicle.map(|vehicle| vehicle.link.state()),
                 hold_reasons: [Side::Upstream, Side::Downstream]
                     .map(|side| relay.hold_reason(side)),
                 neighbours: relay.neighbours(),
-                is_passive: relay.is_passive(),
+                silent: [false; 2],
+                interference_w: None,
+                version: relay.version(),
+            };
+            LiveRelay {
+                report,
+                is_on: member.killed.is_none(),
+                profile: relay.profile(),
                 estimates: relay.interference_estimate().number > 0,
             }
         })

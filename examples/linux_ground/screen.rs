@@ -1,0 +1,112 @@
+//! Screen of a station that stands: snapshots of the relays' reports for a page in a browser, five times a second.
+
+use std::net::SocketAddr;
+
+use serde_json::json;
+use uav_relay::flight::axis::Axis;
+use uav_relay::{Duration, Ground, GuardConfig, Instant, Mission, Upload};
+use uav_relay_linux::log::Log;
+use uav_relay_screen::Screen;
+use uav_relay_screen::chain::Chain;
+use uav_relay_screen::station::{Frames, StationView};
+
+use crate::options::Plan;
+use crate::uploading::Uploading;
+
+/// Time between two snapshots.
+const PERIOD: Duration = Duration::from_millis(200);
+
+/// Time between two questions for the mission that the chain flies, while the station does not know it.
+const ASK_AGAIN: Duration = Duration::from_millis(10_000);
+
+/// Screen of a station, and its view of the chain.
+#[derive(Debug)]
+pub(crate) struct Web {
+    screen: Screen,
+    view: StationView,
+    next_at: Instant,
+    ask_at: Instant,
+}
+
+impl Web {
+    /// Starts the server of the page, logs its address, and requests the relays' reports.
+    ///
+    /// # Errors
+    /// One line that names the option, its value and the fault.
+    pub(crate) fn start(
+        address: SocketAddr,
+        now: Instant,
+        log: &Log,
+        ground: &mut Ground,
+    ) -> Result<Self, String> {
+        let screen = Screen::start(address).map_err(|error| format!("--web {address}: {error}"))?;
+        let public = if screen.is_public() {
+            "; every computer that reaches this address can see it"
+        } else {
+            ""
+        };
+        let url = screen.url();
+        let what = format_args!("open {url} in a browser{public}");
+        log.event(now, "screen", json!({ "url": url }), what);
+        ground.watch(now, true);
+        Ok(Self {
+            screen,
+            view: StationView::default(),
+            next_at: now,
+            ask_at: now,
+        })
+    }
+
+    /// Shows a snapshot if it is due; returns the time of the next one. It does not wait for a browser.
+    pub(crate) fn turn(
+        &mut self,
+        now: Instant,
+        plan: &Plan,
+        ground: &mut Ground,
+        uploading: Option<&Uploading>,
+    ) -> Instant {
+        if now < self.next_at {
+            return self.next_at;
+        }
+        self.next_at = now + PERIOD;
+        let version = self.view.version().unwrap_or(0);
+        let own = uploading.and_then(Uploading::upload);
+        let answered = ground.flown().and_then(|flown| flown.upload.as_ref());
+        let mut uploads = own.into_iter().chain(answered);
+        let upload = uploads.find(|it| it.version() == version).copied();
+        let is_known = version == 0 || upload.is_some();
+        // A question would end an upload.
+        if !is_known && self.ask_at <= now && uploading.is_none_or(Uploading::has_ended) {
+            self.ask_at = now + ASK_AGAIN;
+            ground.request_flown(now);
+        }
+        let loaded = &plan.loaded.mission;
+        let flown = upload.and_then(|it| Mission::try_new(*it.config()).ok());
+        let own_sites = upload.as_ref().and_then(Upload::sites);
+        let sites = own_sites.or(plan.sited).filter(|_| is_known);
+        let axis = sites.and_then(|sites| Axis::between(sites).ok());
+        // The relays' geofence is that of the mission loaded before flight, on the line of that mission.
+        let is_same_line = is_known && own_sites.is_none();
+        let chain = Chain {
+            mission: if version == 0 {
+                Some(loaded)
+            } else {
+                flown.as_ref()
+            },
+            relays: loaded.relays(),
+            profiles: &plan.loaded.profiles,
+            is_estimated: false,
+            axis: axis.as_ref(),
+            geofence: is_same_line
+                .then(|| GuardConfig::of(loaded, loaded.config().common).geofence),
+        };
+        let stats = ground.stats();
+        let frames = Frames {
+            received: stats.received.saturating_add(stats.handshakes),
+            rejected: ground.refused(),
+        };
+        let snapshot = self.view.snapshot(now, &chain, ground.reports(), frames);
+        self.screen.show(snapshot);
+        self.next_at
+    }
+}

@@ -1,0 +1,271 @@
+//! Alarms of a chain: each has a reason, a relay that it is about, and the relays that have reported it.
+//!
+//! A program that receives events begins and ends alarms by [`Alarms::begin`] and [`Alarms::end`]. A program that knows which alarms
+//! last passes all of them to [`Alarms::settle`].
+
+use crate::snapshot::{Alarm, Urgency};
+
+/// Number of alarms beyond which ended ones are dropped: the least urgent first, of these the oldest. Lasting ones stay.
+pub const MOST: usize = 200;
+
+/// Reason of an alarm.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[expect(missing_docs, reason = "the texts of the alarms describe them")]
+pub enum Reason {
+    Lost,
+    NoQuorum,
+    Blind,
+    LinkLost,
+    Duplicate,
+    Key,
+    Epoch,
+    Infeasible,
+    ChainSilent,
+    Released,
+    LeaseExpired,
+    NotReceived,
+    Mission,
+    Version,
+    Restarted,
+    Measurements,
+    NoReport,
+    Rejected,
+}
+
+impl Reason {
+    const fn urgency(self) -> Urgency {
+        match self {
+            Self::Lost
+            | Self::NoQuorum
+            | Self::Blind
+            | Self::LinkLost
+            | Self::Duplicate
+            | Self::Key
+            | Self::Epoch
+            | Self::Infeasible
+            | Self::ChainSilent => Urgency::Critical,
+            Self::Released
+            | Self::LeaseExpired
+            | Self::NotReceived
+            | Self::Mission
+            | Self::Version => Urgency::Warning,
+            Self::Restarted | Self::Measurements | Self::NoReport | Self::Rejected => {
+                Urgency::Notice
+            }
+        }
+    }
+
+    /// Returns the text of an alarm about relay `subject`, or about its `reporters` for subject 0.
+    fn text(self, subject: u16, reporters: &[u16]) -> String {
+        let by = named(reporters);
+        match self {
+            // No relay has reported it: the station itself has noticed that the relay's reports stopped.
+            Self::Lost if reporters.is_empty() => format!("relay {subject}"),
+            Self::Lost => format!("relay {subject} lost: reported by {by}"),
+            Self::NoQuorum => format!("no quorum: {by} cannot reach enough relays, position held"),
+            Self::Blind => format!("{by}: the autopilot reports no position"),
+            Self::LinkLost => format!("{by}: the link to the autopilot is lost"),
+            Self::Duplicate => format!("two nodes have the number {subject}: reported by {by}"),
+            Self::Key => format!("relay {subject} signs with another key: reported by {by}"),
+            Self::Epoch => {
+                format!(
+                    "relay {subject} started with an old epoch: its frames are rejected by {by}"
+                )
+            }
+            Self::Infeasible => format!("{by}: no positions meet any target SIR, positions kept"),
+            Self::ChainSilent => "nothing received from the chain".to_owned(),
+            Self::Released => format!("{by} released: the pilot took control"),
+            Self::LeaseExpired => format!("last agreement expired, setpoint kept: {by}"),
+            Self::NotReceived => format!("relay {subject} does not receive {by}"),
+            Self::Mission => format!("relay {subject} has another mission: reported by {by}"),
+            Self::Version => format!("{by} flies another version of the mission"),
+            Self::Restarted => format!("{by}: the autopilot was restarted"),
+            Self::Measurements => {
+                format!("{by}: the measured interference does not fit one interferer")
+            }
+            Self::NoReport => format!("no report yet from {by}"),
+            Self::Rejected => "frames rejected by this station".to_owned(),
+        }
+    }
+}
+
+/// Alarm that lasts, as [`Alarms::settle`] takes it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Lasting {
+    /// Reason of the alarm.
+    pub reason: Reason,
+    /// Relay that the alarm is about; 0 if it is about its reporters or the station.
+    pub subject: u16,
+    /// Relays that have reported it, sorted.
+    pub reporters: Vec<u16>,
+    /// Text that is appended to that of the reason.
+    pub note: String,
+}
+
+#[derive(Debug)]
+struct Entry {
+    alarm: Alarm,
+    reason: Reason,
+    subject: u16,
+    reporters: Vec<u16>,
+}
+
+impl Entry {
+    const fn lasts(&self) -> bool {
+        self.alarm.cleared_s.is_none()
+    }
+}
+
+/// Alarms of a flight, in the order of their numbers.
+#[derive(Debug, Default)]
+pub struct Alarms {
+    entries: Vec<Entry>,
+    raised: u32,
+}
+
+impl Alarms {
+    /// Begins an alarm about relay `subject` (0: about its reporters), or adds the reporter `by` to the same alarm that lasts already.
+    pub fn begin(&mut self, time_s: f64, reason: Reason, subject: u16, by: u16) {
+        let known = self
+            .lasting()
+            .find(|it| (it.reason, it.subject) == (reason, subject));
+        let mut reporters = known.map_or_else(Vec::new, |it| it.reporters.clone());
+        if let Err(at) = reporters.binary_search(&by) {
+            reporters.insert(at, by);
+        }
+        self.put(
+            time_s,
+            Lasting {
+                reason,
+                subject,
+                reporters,
+                note: String::new(),
+            },
+        );
+    }
+
+    /// Begins an alarm, or updates the one of the same reason and subject that lasts already.
+    fn put(&mut self, time_s: f64, alarm: Lasting) {
+        let Lasting {
+            reason,
+            subject,
+            reporters,
+            note,
+        } = alarm;
+        let text = reason.text(subject, &reporters) + &note;
+        let mut entries = self.entries.iter_mut();
+        let same = |it: &&mut Entry| it.lasts() && (it.reason, it.subject) == (reason, subject);
+        if let Some(known) = entries.find(same) {
+            known.reporters = reporters;
+            known.alarm.text = text;
+            return;
+        }
+        self.raised += 1;
+        self.entries.push(Entry {
+            alarm: Alarm {
+                number: self.raised,
+                time_s,
+                urgency: reason.urgency(),
+                text,
+                cleared_s: None,
+            },
+            reason,
+            subject,
+            reporters,
+        });
+        if self.entries.len() > MOST {
+            let all = self.entries.iter().enumerate();
+            let ended = all.filter(|(_, it)| !it.lasts());
+            if let Some((at, _)) = ended.min_by_key(|(_, it)| it.alarm.urgency) {
+                self.entries.remove(at);
+            }
+        }
+    }
+
+    /// Ends the alarms of a reason about relay `subject`.
+    ///
+    /// `None` ends only the part that relay `by` has reported.
+    pub fn end(&mut self, time_s: f64, reason: Reason, subject: Option<u16>, by: u16) {
+        let lasting = self.entries.iter_mut().filter(|it| it.lasts());
+        for entry in lasting.filter(|it| it.reason == reason) {
+            match subject {
+                Some(subject) if subject == entry.subject => entry.reporters.clear(),
+                Some(_) => continue,
+                None => entry.reporters.retain(|it| *it != by),
+            }
+            if entry.reporters.is_empty() {
+                entry.alarm.cleared_s = Some(time_s);
+            } else {
+                entry.alarm.text = reason.text(entry.subject, &entry.reporters);
+            }
+        }
+    }
+
+    /// Begins and updates the alarms `lasting`, and ends all others.
+    pub fn settle(&mut self, time_s: f64, lasting: Vec<Lasting>) {
+        for entry in self.entries.iter_mut().filter(|it| it.lasts()) {
+            let mut all = lasting.iter();
+            if !all.any(|it| (it.reason, it.subject) == (entry.reason, entry.subject)) {
+                entry.alarm.cleared_s = Some(time_s);
+            }
+        }
+        for alarm in lasting {
+            self.put(time_s, alarm);
+        }
+    }
+
+    /// Returns the numbers of the relays that `by` has reported as lost and not found again.
+    pub fn lost_for(&self, by: u16) -> Vec<u16> {
+        let lost = self.lost().filter(|it| it.reporters.contains(&by));
+        lost.map(|it| it.subject).collect()
+    }
+
+    /// Returns true if relay `number` is reported as lost by another relay.
+    pub fn is_lost(&self, number: u16) -> bool {
+        self.lost()
+            .any(|it| it.subject == number && !it.reporters.is_empty())
+    }
+
+    /// Returns true while an alarm of a reason about relay `subject` lasts.
+    pub fn lasts(&self, reason: Reason, subject: u16) -> bool {
+        let mut lasting = self.lasting();
+        lasting.any(|it| (it.reason, it.subject) == (reason, subject))
+    }
+
+    fn lost(&self) -> impl Iterator<Item = &Entry> {
+        self.lasting().filter(|it| it.reason == Reason::Lost)
+    }
+
+    fn lasting(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|it| it.lasts())
+    }
+
+    /// Returns all alarms.
+    pub fn all(&self) -> Vec<Alarm> {
+        self.entries.iter().map(|it| it.alarm.clone()).collect()
+    }
+}
+
+/// Formats relay numbers: "3", "3 and 5", "1, 2 and 5", "1 to 3 and 5 to 9".
+pub fn list(relays: &[u16]) -> String {
+    let mut sorted = relays.to_vec();
+    sorted.sort_unstable();
+    let mut parts: Vec<String> = Vec::new();
+    for run in sorted.chunk_by(|one, next| one + 1 == *next) {
+        match run {
+            [first, _, .., last] => parts.push(format!("{first} to {last}")),
+            few => parts.extend(few.iter().map(u16::to_string)),
+        }
+    }
+    match parts.as_slice() {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+/// Formats relays by their numbers: "relay 3", "relays 3 and 5".
+pub fn named(relays: &[u16]) -> String {
+    let noun = if relays.len() > 1 { "relays" } else { "relay" };
+    format!("{noun} {}", list(relays))
+}

@@ -1,0 +1,388 @@
+//! Alarms and log lines of a ground station, which knows its chain by the relays' reports alone.
+//!
+//! | state | alarm |
+//! | --- | --- |
+//! | a relay has not reported yet | notice |
+//! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`] | critical, one for the relay |
+//! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
+//! | no quorum, no feasible positions, a passive relay | critical |
+//! | autopilot without a position, or its link lost after it was there | critical |
+//! | drone not engaged any more, until it is engaged again | warning |
+//! | agreed position lost, setpoint kept | warning |
+//! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
+//! | frames rejected by the station in the last [`REJECTED_FOR`] | notice |
+//!
+//! An alarm of a relay that does not report any more stays as it was.
+
+use std::collections::BTreeMap;
+
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::{Duration, Instant, Phase, Placement, Report};
+
+use crate::alarms::{Alarms, Lasting, Reason, named};
+use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
+use crate::snapshot::{LogLine, Snapshot};
+
+/// Time without any frame after which no alarm about a single relay begins, because the station itself may be cut off.
+const QUIET_AFTER: Duration = Duration::from_millis(2_000);
+
+/// Time for which the rejection of a frame is shown.
+const REJECTED_FOR: Duration = Duration::from_millis(30_000);
+
+/// Time for which a relay counts as passive after the last report that says so. Two nodes of one number report in turn.
+const PASSIVE_FOR: Duration = Duration::from_millis(10_000);
+
+/// Frame counters of a station.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Frames {
+    /// Number of accepted frames.
+    pub received: u32,
+    /// Number of rejected frames.
+    pub rejected: u32,
+}
+
+/// Newest report of a relay, and the past that its alarms depend on.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    report: Report,
+    /// True from the control by the relay until the pilot's, also while the link to the autopilot is lost.
+    was_engaged: bool,
+    is_released: bool,
+    is_link_lost: bool,
+    has_lost_agreement: bool,
+    passive_at: Option<Instant>,
+}
+
+impl Known {
+    fn new(report: Report) -> Self {
+        Self {
+            report,
+            was_engaged: false,
+            is_released: false,
+            is_link_lost: false,
+            has_lost_agreement: false,
+            passive_at: None,
+        }
+    }
+
+    /// Replaces the report by a newer one. The first report is taken, too.
+    fn take(&mut self, report: Report) {
+        let before = std::mem::replace(&mut self.report, report);
+        match report.control {
+            Some(State::Engaged | State::Blind) => {
+                (self.was_engaged, self.is_released) = (true, false);
+            }
+            Some(State::Standby | State::Grounded) => {
+                self.is_released |= std::mem::take(&mut self.was_engaged);
+            }
+            Some(State::Silent) | None => {}
+        }
+        let was_linked = before.control.is_some_and(|it| it != State::Silent);
+        self.is_link_lost =
+            report.control == Some(State::Silent) && (self.is_link_lost || was_linked);
+        let has_setpoint_only = report.agreed.is_none() && report.setpoint.is_some();
+        self.has_lost_agreement =
+            has_setpoint_only && (self.has_lost_agreement || before.agreed.is_some());
+        if report.is_passive {
+            self.passive_at = Some(report.at);
+        }
+    }
+
+    fn is_passive(&self, now: Instant) -> bool {
+        let is_recent = |at: Instant| now.since(at) < PASSIVE_FOR;
+        self.report.is_passive || self.passive_at.is_some_and(is_recent)
+    }
+
+    /// Returns true if the drone has no known position although it is in the air or should be ready for it.
+    fn is_blind(&self) -> bool {
+        let Report {
+            control, position, ..
+        } = self.report;
+        let needs = matches!(control, Some(State::Standby | State::Engaged));
+        control == Some(State::Blind) || (needs && position.is_none())
+    }
+}
+
+/// View of a chain by the reports of its relays, with the history that alarms and log lines need.
+#[derive(Debug, Default)]
+pub struct StationView {
+    alarms: Alarms,
+    known: BTreeMap<u16, Known>,
+    /// For each relay its neighbours that have reported it as silent, and the time of each neighbour's last such report.
+    claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
+    frames: Frames,
+    /// Time of the last accepted frame; that of the start before the first one.
+    frame_at: Instant,
+    /// Time of the last frame that ended a silence of the whole chain. Ages of reports count from it.
+    resumed_at: Instant,
+    rejected_at: Option<Instant>,
+    /// Newest version of the mission that is flown, and the time when it became known.
+    version: Option<(u16, Instant)>,
+}
+
+impl StationView {
+    /// Returns the newest version of the mission that a relay has reported; `None` before the first report.
+    pub fn version(&self) -> Option<u16> {
+        self.version.map(|(version, _)| version)
+    }
+
+    /// Returns the state of `chain` at the time `now`, its alarms, and the log since the last call.
+    ///
+    /// `reports` are the relays' newest reports. Those about relays that the chain does not list are ignored.
+    pub fn snapshot<'a>(
+        &mut self,
+        now: Instant,
+        chain: &Chain<'_>,
+        reports: impl IntoIterator<Item = &'a Report>,
+        frames: Frames,
+    ) -> Snapshot {
+        let mut log = Vec::new();
+        let mut is_new = false;
+        for report in reports {
+            let is_listed = (1..=chain.relays).contains(&report.relay);
+            is_new |= is_listed && self.take(*report, &mut log);
+        }
+        log.sort_by(|one: &LogLine, other| one.time_s.total_cmp(&other.time_s));
+        self.count(now, frames, is_new);
+        self.follow_version(now);
+        self.drop_answered_claims(now);
+        let lasting = self.lasting(now, chain.relays);
+        self.alarms.settle(seconds(now), lasting);
+        let reports: Vec<Report> = self.known.values().map(|it| it.report).collect();
+        Snapshot {
+            name: Some(format!("Chain of {} relays", chain.relays)),
+            log,
+            ..chain.snapshot(now, &reports, &self.alarms)
+        }
+    }
+
+    /// Takes a report and logs what has changed; returns false if it is not newer than the known one.
+    fn take(&mut self, report: Report, log: &mut Vec<LogLine>) -> bool {
+        let number = report.relay;
+        let before = self.known.get(&number).map(|it| it.report);
+        if before.is_some_and(|before| before.at >= report.at) {
+            return false;
+        }
+        let line = |text| LogLine {
+            time_s: seconds(report.at),
+            text: format!("relay {number}: {text}"),
+        };
+        log.extend(changes(before.as_ref(), &report).into_iter().map(line));
+        let known = self.known.entry(number);
+        known.or_insert_with(|| Known::new(report)).take(report);
+        for lost in silent(&report) {
+            // A neighbour that has never been received is not lost.
+            let was_received = before.is_some_and(|before| {
+                before.neighbours.contains(&Some(lost)) && !silent(&before).any(|it| it == lost)
+            });
+            if was_received || self.claims(lost).contains(&number) {
+                let claims = self.claims.entry(lost).or_default();
+                claims.insert(number, report.at);
+            }
+        }
+        true
+    }
+
+    /// Updates the newest version of the mission that relays report now.
+    fn follow_version(&mut self, now: Instant) {
+        let reports = self.known.values().map(|it| it.report);
+        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER);
+        if let Some(newest) = fresh.map(|it| it.version).max()
+            && self.version() != Some(newest)
+        {
+            self.version = Some((newest, now));
+        }
+    }
+
+    fn count(&mut self, now: Instant, frames: Frames, has_report: bool) {
+        if has_report || frames.received != self.frames.received {
+            if now.since(self.frame_at) >= QUIET_AFTER {
+                self.resumed_at = now;
+            }
+            self.frame_at = now;
+        }
+        if frames.rejected != self.frames.rejected {
+            self.rejected_at = Some(now);
+        }
+        self.frames = frames;
+    }
+
+    /// Drops the claims about relays that have reported since, unless the neighbour's newest report still has the claim.
+    fn drop_answered_claims(&mut self, now: Instant) {
+        let known = &self.known;
+        for (number, claims) in &mut self.claims {
+            let Some(subject) = known.get(number) else {
+                continue;
+            };
+            claims.retain(|by, at| {
+                let by = known.get(by).map(|it| it.report);
+                let lasts = by.is_some_and(|by| {
+                    now.since(by.at) < SILENT_AFTER && silent(&by).any(|it| it == *number)
+                });
+                lasts || subject.report.at <= *at
+            });
+        }
+        self.claims.retain(|_, claims| !claims.is_empty());
+    }
+
+    fn claims(&self, number: u16) -> Vec<u16> {
+        let claims = self.claims.get(&number).into_iter().flatten();
+        claims.map(|(by, _)| *by).collect()
+    }
+
+    fn lasting(&self, now: Instant, relays: u16) -> Vec<Lasting> {
+        let mut all = Vec::new();
+        let mut add = |reason, subject, reporters: Vec<u16>, note: String| {
+            all.push(Lasting {
+                reason,
+                subject,
+                reporters,
+                note,
+            });
+        };
+        let quiet = now.since(self.frame_at);
+        let Frames { received, rejected } = self.frames;
+        if quiet >= SILENT_AFTER && !self.known.is_empty() {
+            let note = format!(
+                " for {} s: {received} frames received before, {rejected} rejected",
+                quiet.as_micros() / 1_000_000
+            );
+            add(Reason::ChainSilent, 0, Vec::new(), note);
+        }
+        let is_unknown = |it: &u16| !self.known.contains_key(it);
+        let unknown: Vec<u16> = (1..=relays).filter(is_unknown).collect();
+        if !unknown.is_empty() {
+            let note = if received == 0 && self.known.is_empty() {
+                "; nothing received from the chain yet".to_owned()
+            } else {
+                self.gaps(now)
+            };
+            add(Reason::NoReport, 0, unknown, note);
+        }
+        if self
+            .rejected_at
+            .is_some_and(|at| now.since(at) < REJECTED_FOR)
+        {
+            let note = format!(
+                ": {rejected} of {} since its start",
+                u64::from(received) + u64::from(rejected)
+            );
+            add(Reason::Rejected, 0, Vec::new(), note);
+        }
+        for known in self.known.values() {
+            let number = known.report.relay;
+            let by = self.claims(number);
+            let heard_at = known.report.at.max(self.resumed_at);
+            let is_late = now.since(known.report.at) >= SILENT_AFTER;
+            // While nothing at all is received, an alarm that has begun stays, and none begins.
+            let begins = quiet < QUIET_AFTER && now.since(heard_at) >= SILENT_AFTER;
+            let is_silent = is_late && (begins || self.alarms.lasts(Reason::Lost, number));
+            if is_silent || !by.is_empty() {
+                let note = match (is_late, by.is_empty()) {
+                    (false, _) => String::new(),
+                    (true, false) => "; no report for 5 s".to_owned(),
+                    (true, true) => format!(": no report for 5 s{}", self.gaps(now)),
+                };
+                add(Reason::Lost, number, by, note);
+            }
+            let own = [
+                (Reason::Blind, known.is_blind()),
+                (Reason::LinkLost, known.is_link_lost),
+                (Reason::Released, known.is_released),
+                (Reason::Duplicate, known.is_passive(now)),
+            ];
+            for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
+                add(reason, number, vec![number], String::new());
+            }
+            let version = known.report.version;
+            if let Some((newest, since)) = self.version
+                && version != newest
+                && known.report.at.since(since) >= SILENT_AFTER
+            {
+                let note = format!(": version {version}, other relays version {newest}");
+                add(Reason::Version, number, vec![number], note);
+            }
+        }
+        let shared: [(Reason, fn(&Known) -> bool); 3] = [
+            (Reason::NoQuorum, |it| it.report.phase == Phase::NoQuorum),
+            (Reason::Infeasible, |it| {
+                it.report.phase == Phase::Infeasible
+            }),
+            (Reason::LeaseExpired, |it| it.has_lost_agreement),
+        ];
+        for (reason, is) in shared {
+            let by = self.known.values().filter(|it| is(it));
+            let by: Vec<u16> = by.map(|it| it.report.relay).collect();
+            if !by.is_empty() {
+                add(reason, 0, by, String::new());
+            }
+        }
+        all
+    }
+
+    /// Returns the gaps in the chain that relays report now, for an alarm about relays that may be behind one.
+    fn gaps(&self, now: Instant) -> String {
+        let fresh = self.known.values().map(|it| &it.report);
+        let fresh = fresh.filter(|it| now.since(it.at) < SILENT_AFTER);
+        let gaps = fresh.flat_map(|by| silent(by).map(|it| (by.relay, it)));
+        gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"))
+            .collect()
+    }
+}
+
+/// Returns the neighbours that a relay reports as silent.
+fn silent(report: &Report) -> impl Iterator<Item = u16> {
+    let pairs = report.neighbours.into_iter().zip(report.silent);
+    pairs.filter_map(|(beside, is_silent)| beside.filter(|_| is_silent))
+}
+
+/// Returns a line for each difference of a relay's report from the one before.
+fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
+    let Some(old) = before else {
+        let control = new
+            .control
+            .map_or(String::new(), |it| format!(", {}", control(it)));
+        return vec![format!("first report: {}{control}", phase(new))];
+    };
+    let mut lines = Vec::new();
+    if phase(old) != phase(new) {
+        lines.push(phase(new).to_owned());
+    }
+    if old.control != new.control {
+        let words = new.control.map_or("no autopilot link", control);
+        lines.push(format!("control: {words}"));
+    }
+    if old.agreed != new.agreed {
+        lines.push(match new.agreed {
+            Some(Placement {
+                x_m,
+                y_m,
+                altitude_m,
+            }) => {
+                format!("agreed position: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m")
+            }
+            None => "no agreed position any more".to_owned(),
+        });
+    }
+    let (waited, waits) = (hold_reason(old), hold_reason(new));
+    if waited != waits {
+        lines.push(waits.map_or("waits no longer".to_owned(), |why| format!("waits: {why}")));
+    }
+    for it in silent(new).filter(|it| !silent(old).any(|was| was == *it)) {
+        lines.push(format!("does not receive relay {it}"));
+    }
+    let beside: Vec<u16> = new.neighbours.into_iter().flatten().collect();
+    for it in silent(old).filter(|it| beside.contains(it) && !silent(new).any(|is| is == *it)) {
+        lines.push(format!("receives relay {it} again"));
+    }
+    if old.neighbours != new.neighbours {
+        lines.push(match beside.as_slice() {
+            [] => "no neighbours".to_owned(),
+            all => format!("neighbours: {}", named(all)),
+        });
+    }
+    if old.version != new.version {
+        lines.push(format!("flies version {} of the mission", new.version));
+    }
+    lines
+}

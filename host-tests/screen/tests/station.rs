@@ -1,0 +1,261 @@
+//! Alarms and log lines of a station, by reports alone. The script `faults.txt` has faults and the alarms that they raise.
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::expect_used,
+    dead_code,
+    unreachable_pub,
+    missing_docs
+)]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::{Instant, Mission, Phase, Placement, Report};
+use uav_relay_screen::chain::Chain;
+use uav_relay_screen::station::{Frames, StationView};
+use uav_relay_screen::{Condition, Snapshot};
+
+mod paper {
+    include!(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../src/docs/paper.rs"
+    ));
+}
+
+const RELAYS: u16 = 5;
+
+/// Returns the report of a relay of a chain without faults.
+fn healthy(relay: u16) -> Report {
+    let place = Some(Placement::on_line(160.0 * f32::from(relay), 20.0));
+    let next = Some(relay + 1).filter(|it| *it <= RELAYS);
+    Report {
+        relay,
+        at: Instant::ZERO,
+        position: place,
+        setpoint: place,
+        agreed: place,
+        phase: Phase::Holding,
+        is_passive: false,
+        control: Some(State::Engaged),
+        hold_reasons: [None; 2],
+        neighbours: [Some(relay - 1).filter(|it| *it > 0), next],
+        silent: [false; 2],
+        interference_w: None,
+        version: 0,
+    }
+}
+
+/// Chain whose relays report every second, and the station that watches it.
+struct Watched {
+    view: StationView,
+    relays: BTreeMap<u16, Report>,
+    off: BTreeSet<u16>,
+    mission: Mission,
+    second: u64,
+    frames: Frames,
+    last: Snapshot,
+    log: Vec<String>,
+}
+
+impl Watched {
+    fn new() -> Self {
+        Self {
+            view: StationView::default(),
+            relays: (1..=RELAYS).map(|it| (it, healthy(it))).collect(),
+            off: BTreeSet::new(),
+            mission: paper::MISSION.with_relays(RELAYS).unwrap(),
+            second: 0,
+            frames: Frames::default(),
+            last: Snapshot::default(),
+            log: Vec::new(),
+        }
+    }
+
+    /// Lets a second pass, in which the relays that are not off report.
+    fn second(&mut self) {
+        self.second += 1;
+        let now = Instant::from_millis(1_000 * self.second);
+        for (_, report) in self
+            .relays
+            .iter_mut()
+            .filter(|(it, _)| !self.off.contains(it))
+        {
+            report.at = now;
+            self.frames.received += 1;
+        }
+        self.show();
+    }
+
+    fn show(&mut self) {
+        let chain = Chain {
+            mission: Some(&self.mission),
+            relays: RELAYS,
+            profiles: &[],
+            is_estimated: false,
+            axis: None,
+            geofence: None,
+        };
+        let now = Instant::from_millis(1_000 * self.second);
+        let reports = self.relays.values().filter(|it| it.at > Instant::ZERO);
+        self.last = self.view.snapshot(now, &chain, reports, self.frames);
+        self.log
+            .extend(self.last.log.iter().map(|it| it.text.clone()));
+    }
+
+    fn change(&mut self, relay: u16, state: &str) {
+        self.off.remove(&relay);
+        let report = self.relays.get_mut(&relay).unwrap();
+        match state {
+            "off" => _ = self.off.insert(relay),
+            "ok" => {
+                *report = Report {
+                    version: report.version,
+                    at: report.at,
+                    ..healthy(relay)
+                }
+            }
+            "noquorum" => report.phase = Phase::NoQuorum,
+            "infeasible" => report.phase = Phase::Infeasible,
+            "viewchange" => report.phase = Phase::ViewChange,
+            "blind" => report.control = Some(State::Blind),
+            "standby" => report.control = Some(State::Standby),
+            "grounded" => report.control = Some(State::Grounded),
+            "nolink" => report.control = Some(State::Silent),
+            "bench" => (report.control, report.position) = (None, None),
+            "unlocated" => report.position = None,
+            "unagreed" => report.agreed = None,
+            "restarted" => (report.agreed, report.setpoint) = (None, None),
+            "passive" => report.is_passive = true,
+            "version2" => report.version = 2,
+            "nonext" => report.neighbours[1] = None,
+            "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
+            "skipsback" => (report.neighbours[0], report.silent[0]) = (Some(relay - 2), false),
+            "deafnext" | "nonextyet" => report.silent[1] = true,
+            "deafback" => report.silent[0] = true,
+            other => panic!("{other}"),
+        }
+    }
+
+    /// Makes the changes of a line of the script, as `12:ok 3:off`.
+    fn changes(&mut self, changes: &str) {
+        for change in changes.split_whitespace() {
+            if let Some((relays, state)) = change.split_once(':') {
+                relays
+                    .chars()
+                    .for_each(|it| self.change(it.to_digit(10).unwrap() as u16, state));
+            } else if change == "rejected" {
+                self.frames.rejected = 7;
+            }
+        }
+    }
+
+    /// Returns the lasting alarms, as the script has them.
+    fn lasting(&self) -> String {
+        let lasting = self.last.alarms.iter().filter(|it| it.cleared_s.is_none());
+        let mut lasting: Vec<String> = lasting
+            .map(|it| format!("{} {:?} {}", it.number, it.urgency, it.text))
+            .collect();
+        if lasting.is_empty() {
+            lasting.push(".".to_owned());
+        }
+        lasting.join(" & ")
+    }
+
+    fn condition(&self, relay: u16) -> Option<Condition> {
+        self.last.relays[usize::from(relay) - 1].condition
+    }
+
+    /// Returns the hops of the last snapshot whose SIR is known.
+    fn hops(&self) -> String {
+        let hops = self.last.hops.iter().filter(|it| it.sir_db.is_some());
+        hops.map(|it| format!("{}-{} ", it.from, it.to)).collect()
+    }
+}
+
+#[test]
+fn every_fault_is_one_alarm_with_its_text_that_begins_and_ends() {
+    let (mut watched, mut faults) = (Watched::new(), 0);
+    let script = include_str!("faults.txt")
+        .lines()
+        .filter(|line| !line.starts_with('#'));
+    for line in script {
+        if line.starts_with("flight") {
+            watched = Watched::new();
+            continue;
+        }
+        let (order, expected) = line.split_once(" = ").unwrap();
+        let (seconds, changes) = order.split_once(' ').unwrap();
+        watched.changes(changes);
+        watched.show();
+        (0..seconds.parse().unwrap()).for_each(|_| watched.second());
+        assert_eq!(watched.lasting(), expected, "{line}");
+        // An alarm that is not in the list has ended in the second of its end, and none came twice.
+        let all = &watched.last.alarms;
+        assert!(
+            (1..).zip(all).all(|(number, it)| it.number == number),
+            "{line}"
+        );
+        faults += usize::from(!changes.trim().ends_with(":ok") && expected != ".");
+    }
+    assert!(faults >= 30, "{faults}");
+}
+
+#[test]
+fn the_snapshot_and_the_log_contain_what_is_known_and_nothing_else() {
+    let mut watched = Watched::new();
+    watched.second();
+    assert_eq!(watched.hops(), "Tx-1 1-2 2-3 3-4 4-5 5-Rx ");
+    assert_eq!(watched.last.interferers[0].power_w, Some(80.0));
+    // A relay of unknown position has no hops, and hides none behind a longer one.
+    watched.changes("3:unlocated");
+    watched.second();
+    assert_eq!(watched.hops(), "Tx-1 1-2 4-5 5-Rx ");
+    // A lost relay leaves the chain; a silent one that no neighbour reports as lost does not.
+    watched.changes("3:ok");
+    watched.second();
+    watched.changes("3:off 2:deafnext 5:off");
+    (0..5).for_each(|_| watched.second());
+    assert_eq!(
+        [3, 5].map(|it| watched.condition(it)),
+        [Some(Condition::Lost), Some(Condition::Normal)]
+    );
+    assert_eq!(watched.hops(), "Tx-1 1-2 2-4 4-5 5-Rx ");
+    watched.changes("2:skipsnext 2:blind 4:version2");
+    watched.second();
+    let first = (1..=5).map(|it| format!("relay {it}: first report: agreed, engaged"));
+    let later = [
+        "relay 2: does not receive relay 3",
+        "relay 2: control: no position",
+        "relay 2: neighbours: relays 1 and 4",
+        "relay 4: flies version 2 of the mission",
+    ];
+    assert_eq!(
+        watched.log,
+        first.chain(later.map(str::to_owned)).collect::<Vec<_>>()
+    );
+
+    // Relays that have never reported are listed. Numbers outside the mission and older reports are ignored.
+    let mut silent = Watched::new();
+    silent.changes("1345:off");
+    silent.second();
+    assert_eq!((silent.last.relays.len(), silent.hops().as_str()), (5, ""));
+    assert_eq!(
+        [1, 2].map(|it| silent.last.relays[it - 1].age_s),
+        [None, Some(0.0)]
+    );
+    silent.relays.insert(
+        9,
+        Report {
+            relay: 9,
+            at: Instant::from_millis(900),
+            ..healthy(1)
+        },
+    );
+    silent.changes("2:noquorum");
+    silent.relays.get_mut(&2).unwrap().at = Instant::from_millis(500);
+    silent.show();
+    assert_eq!(silent.last.relays.len(), 5);
+    assert_eq!(silent.last.relays[1].phase.as_deref(), Some("agreed"));
+}
