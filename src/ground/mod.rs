@@ -39,7 +39,7 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Time between two requests for the reports of all relays.
+/// Time between two requests to one relay for the reports of all relays.
 #[cfg(feature = "telemetry")]
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
@@ -567,10 +567,12 @@ impl Ground {
     /// Writes the request for reports to the next relay in reach; `None` if none is pending.
     #[cfg(feature = "telemetry")]
     fn next_watch(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
-        let (distance, number) = self.watching.poll(self.reach)?;
-        let mission = self.base;
+        if !core::mem::take(&mut self.watching.is_due) {
+            return None;
+        }
+        let (number, mission) = (self.watching.number, self.base);
         let message = Message::Watch { number, mission };
-        let to = self.at(distance);
+        let to = self.at(self.watching.distance);
         self.endpoint.transmit(to, &message, frame, &mut self.stats)
     }
 }
@@ -584,8 +586,9 @@ struct Watching {
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Bit mask of the relays to which the request is pending. Bit d - 1 is the relay at distance d.
-    pending: u8,
+    /// Distance of the relay that the last request is for, and true if it is to be sent; 0 before the first one.
+    distance: u16,
+    is_due: bool,
     /// Entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
     /// Newest report of every relay, by rising number.
@@ -601,26 +604,28 @@ impl Watching {
             all,
             repeat_at: None,
             number: (epoch as u16) << 10,
-            pending: 0,
+            distance: 0,
+            is_due: false,
             arrived: heapless::Vec::new(),
             reports: heapless::Vec::new(),
         }
     }
 
-    /// Schedules the request to the `reach` nearest relays if it is due.
+    /// Schedules the request to the next of the `reach` nearest relays, the farthest first, if it is due.
     fn request(&mut self, now: Instant, reach: u16) {
         if self.repeat_at.is_some_and(|at| at <= now) {
-            self.repeat_at = Some(now + WATCH_EVERY);
-            self.number = self.number.wrapping_add(1);
-            self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));
+            let turn = WATCH_EVERY.as_micros() / u64::from(reach.max(1));
+            self.repeat_at = Some(now + Duration::from_micros(turn));
+            if self.distance <= 1 {
+                self.number = self.number.wrapping_add(1);
+            }
+            self.distance = if self.distance > 1 {
+                self.distance - 1
+            } else {
+                reach
+            };
+            self.is_due = true;
         }
-    }
-
-    /// Returns the distance of the next relay to which the request is sent, and its number; `None` if none is pending.
-    fn poll(&mut self, reach: u16) -> Option<(u16, u16)> {
-        let distance = (1..=reach).find(|distance| self.pending & bit(*distance) != 0)?;
-        self.pending &= !bit(distance);
-        Some((distance, self.number))
     }
 
     /// Records the entries of a report. Returns false, and records none, if one has a number outside the

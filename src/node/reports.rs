@@ -3,10 +3,10 @@
 //! | event | action |
 //! | --- | --- |
 //! | new Watch received from a side | report toward that side for 30 s; hand the Watch on to the other side |
-//! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 16 s |
+//! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 25 s |
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
-//! | report due | send the own entry if it is due, and stored ones that fit; entries that have not been replaced since they were sent may be repeated |
+//! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, and every other one to the neighbour, too: reports
 //! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
@@ -22,7 +22,7 @@ use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
-use crate::wire::message::{Coarse, Detail, Entry, MOST_ENTRIES, Message, Reports};
+use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
 /// True if the crate is built with the feature `telemetry`.
 const TELEMETRY: bool = cfg!(feature = "telemetry");
@@ -30,16 +30,19 @@ const TELEMETRY: bool = cfg!(feature = "telemetry");
 /// Time after the last Watch for which a relay reports.
 const WATCHED: Duration = Duration::from_millis(30_000);
 
-/// Time after a Watch for which its sender is the destination of reports: three lost ones do not change it.
-const DESTINED: Duration = Duration::from_millis(16_000);
+/// Time after a Watch for which its sender is the destination of reports: four lost ones do not change it.
+const DESTINED: Duration = Duration::from_millis(25_000);
 
 /// Minimum time between two repetitions of a Watch to relays that have not received it.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Time by which telemetry waits for agreements on a shared channel, at most.
-const PATIENCE: Duration = Duration::from_millis(2_000);
+/// Time by which telemetry waits for an agreement on a shared channel, at most.
+pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 
-/// Age above which a position of the drone counts as unknown, and minimum age of a repeated entry.
+/// The same for the first agreement.
+pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
+
+/// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
 
 /// Minimum time between two reports of a relay.
@@ -183,14 +186,14 @@ impl Reporting {
         true
     }
 
-    /// Returns the next Watch or Report with its side and its destination; `None` if none is due. `is_busy` is true
-    /// while an agreement needs the channel.
+    /// Returns the next Watch or Report with its side and its destination; `None` if none is due. It is sent `wait` later
+    /// than it is due, because an agreement needs the channel.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
         member: &Member,
         neighbours: &Neighbours,
-        is_busy: bool,
+        wait: Duration,
         own: Own,
     ) -> Option<(Side, u16, Message)> {
         if let Some(handed) = self.handed.first_mut()
@@ -204,7 +207,7 @@ impl Reporting {
         for side in [Side::Upstream, Side::Downstream] {
             let watched = state.at(side);
             watched.expire(now);
-            let is_ready = |at| now >= delayed(at, is_busy);
+            let is_ready = |at| now >= at + wait;
             while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
                 let distance = if watched.hand_on & 1 != 0 {
                     1
@@ -243,29 +246,25 @@ impl Reporting {
     }
 
     /// Returns true if a Watch or a Report may be due.
-    pub(crate) fn is_due(&self, now: Instant, is_busy: bool) -> bool {
-        self.handed.iter().any(Option::is_some) || self.times(is_busy).any(|at| at <= now)
+    pub(crate) fn is_due(&self, now: Instant, wait: Duration) -> bool {
+        self.handed.iter().any(Option::is_some) || self.times(wait).any(|at| at <= now)
     }
 
     /// Returns the time of the next Watch or Report.
-    pub(crate) fn next_timeout(&self, is_busy: bool) -> Option<Instant> {
+    pub(crate) fn next_timeout(&self, wait: Duration) -> Option<Instant> {
         let checked = self.state.first()?.checked;
-        self.times(is_busy).filter(|at| *at > checked).min()
+        self.times(wait).filter(|at| *at > checked).min()
     }
 
     /// Returns the times at which a Watch or a Report is due.
-    fn times(&self, is_busy: bool) -> impl Iterator<Item = Instant> {
+    fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
         let sides = self.state.iter().flat_map(|state| &state.watched);
         let times = sides.flat_map(|watched| {
             let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
             [watched.report_at(), hand_on]
         });
-        times.flatten().map(move |at| delayed(at, is_busy))
+        times.flatten().map(move |at| at + wait)
     }
-}
-
-fn delayed(at: Instant, is_busy: bool) -> Instant {
-    if is_busy { at + PATIENCE } else { at }
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
@@ -290,7 +289,7 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 30 s after the last request, and forgets a destination that has sent none for 16 s.
+    /// Ends the watch 30 s after the last request, and forgets a destination that has sent none for 25 s.
     fn expire(&mut self, now: Instant) {
         if now >= self.until {
             *self = Self::NONE;
@@ -336,7 +335,9 @@ impl State {
         if begins || (1..0x8000).contains(&ahead) {
             watched.number = number;
             watched.until = now + WATCHED;
-            watched.hand_on_at = now;
+            // The station sends to several relays at once.
+            let turn = Duration::from_millis(50).times(u32::from(member.node % 8) + 2);
+            watched.hand_on_at = now + turn;
             watched.hand_on |= match member.settings.wiring {
                 Wiring::Pair => mask(1),
                 Wiring::Shared if begins || number.is_multiple_of(2) => mask(1) | mask(CANDIDATES),
@@ -435,54 +436,57 @@ impl State {
         let mut report = Reports::new(watched.number, member.digest);
         let is_due = now >= watched.own_from;
         if is_due {
-            let Own { state, places } = own;
             let at = Coarse::of(position.map(|(_, place)| place));
             let age = position.map_or(0, |(at, _)| age(now, at));
-            let entry = Entry::new(member.node, age, state + 4096 * control, at);
+            let entry = Entry::new(member.node, age, own.state + 4096 * control, at);
             _ = report.entries.push(entry);
-            if watched.count.is_multiple_of(8) {
-                let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
-                let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
-                let places = places.map(Coarse::of);
-                let detail = Detail::new(places, nodes, power_w, member.active.version);
-                report.detail = Some(detail);
-            }
-            watched.count = watched.count.wrapping_add(1);
         }
-        self.stored.retain(|stored| age(now, stored.at) < u8::MAX);
-        let mut left = false;
+        self.stored
+            .retain(|stored| stored.is_new || now.since(stored.at) < period.times(3));
+        let mut is_left = false;
         for are_new in [true, false] {
             for stored in &mut self.stored {
-                let toward = match side {
-                    Side::Upstream => stored.entry.relay() > member.node,
-                    Side::Downstream => stored.entry.relay() < member.node,
-                };
-                if stored.is_new != are_new || now < stored.from || !toward {
-                    continue;
-                }
-                let is_first = report.entries.is_empty();
-                if stored.detail.is_some() && !is_first || report.entries.is_full() {
-                    left |= are_new;
+                let is_toward = (stored.entry.relay() > member.node) == (side == Side::Upstream);
+                if stored.is_new != are_new || !is_toward || now < stored.from {
                     continue;
                 }
                 stored.entry.age = age(now, stored.at);
-                _ = report.entries.push(stored.entry);
-                if is_first {
+                if report.entries.push(stored.entry).is_err() {
+                    is_left |= are_new;
+                    continue;
+                }
+                if report.detail.is_none() && stored.detail.is_some() {
                     report.detail = stored.detail.take();
+                    if let [first, .., last] = report.entries.as_mut_slice() {
+                        core::mem::swap(first, last);
+                    }
                 }
                 stored.is_new = false;
-                stored.from = now + period.max(LEAST_PERIOD);
+                stored.from = now + period;
             }
+        }
+        let watched = self.at(side);
+        if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
+            let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
+            let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
+            let places = own.places.map(Coarse::of);
+            report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
+            watched.count = 1;
+        } else if is_due && !watched.count.is_multiple_of(8) {
+            watched.count += 1;
         }
         let entries = u32::try_from(report.entries.len()).unwrap_or(0);
         let detail = report.detail.map_or(0, |_| SHARE);
-        let watched = self.at(side);
-        watched.free = now + byte.times(FRAME + 14 * entries + detail);
-        let late = Duration::from_micros(period.as_micros() / 8);
+        // Half a period's share may be sent at once.
+        let half = micros(period) / 2;
+        let saved = now.as_micros().saturating_sub(half.into());
+        watched.free = watched.free.max(Instant::from_micros(saved))
+            + byte.times(FRAME + 14 * entries + detail);
+        let late = Duration::from_micros((half / 4).into());
         if is_due {
-            watched.own_from = now + Duration::from_micros(period.as_micros() / 4 * 3);
+            watched.own_from = now + late.times(6);
         }
-        watched.due = match (left, watched.is_fed) {
+        watched.due = match (is_left, watched.is_fed) {
             (true, _) => now,
             // The reports of relays behind come first.
             (false, true) => now + period + late,
@@ -548,8 +552,8 @@ fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     byte.times(bytes).max(LEAST_PERIOD)
 }
 
-/// Returns the age in tenths of a second, rounded up: that includes the time of the transmission.
+/// Returns the age in tenths of a second, rounded. It includes 20 ms for the transmission.
 fn age(now: Instant, at: Instant) -> u8 {
-    let tenths = micros(now.since(at)).div_ceil(100_000);
+    let tenths = micros(now.since(at)).saturating_add(70_000) / 100_000;
     u8::try_from(tenths).unwrap_or(u8::MAX)
 }

@@ -133,8 +133,13 @@ impl<'s> Draw<'s> {
                 _ if self.chance(4) => 0,
                 _ => self.view(),
             }),
-            Kind::I32 => {
-                let (least, most) = (least.max(i32::MIN.into()), most.min(i32::MAX.into()));
+            Kind::I24 | Kind::I32 => {
+                let top = if *kind == Kind::I24 {
+                    8_388_607.0
+                } else {
+                    i32::MAX.into()
+                };
+                let (least, most) = (least.max(-top - 1.0), most.min(top));
                 let number = match self.byte() % 8 {
                     0 => least,
                     1 => most,
@@ -234,6 +239,7 @@ impl<'s> Draw<'s> {
             Kind::U8 => Value::Unsigned(long & 0xFF),
             Kind::U16 => Value::Unsigned(long & 0xFFFF),
             Kind::U32 => Value::Unsigned(long & 0xFFFF_FFFF),
+            Kind::I24 => Value::Signed((long as i32 >> 8).into()),
             Kind::I32 => Value::Signed((long as i32).into()),
             Kind::F32 => Value::Single(f32::from_bits(long as u32)),
             Kind::F64 => Value::Double(f64::from_bits(long)),

@@ -91,6 +91,10 @@ fn one<'f>(kind: &'f Kind, rest: &mut Rest<'_>) -> Result<Value<'f>, String> {
         Kind::U16 => Value::Unsigned(u16::from_le_bytes(rest.take()?).into()),
         Kind::U32 => Value::Unsigned(u32::from_le_bytes(rest.take()?).into()),
         Kind::U64 => Value::Unsigned(u64::from_le_bytes(rest.take()?)),
+        Kind::I24 => {
+            let [a, b, c] = rest.take()?;
+            Value::Signed((i32::from_le_bytes([0, a, b, c]) >> 8).into())
+        }
         Kind::I32 => Value::Signed(i32::from_le_bytes(rest.take()?).into()),
         Kind::F32 => Value::Single(f32::from_le_bytes(rest.take()?)),
         Kind::F64 => Value::Double(f64::from_le_bytes(rest.take()?)),

@@ -92,6 +92,10 @@ fn from_json<'f>(kind: &'f Kind, value: &Json) -> Option<Value<'f>> {
         }
         Kind::View => Value::View(u32::try_from(value.as_u64()?).ok()?),
         Kind::Words(_) => Value::Word(byte()?, None),
+        Kind::I24 => {
+            let fits = |number: &i64| (-(1 << 23)..1 << 23).contains(number);
+            Value::Signed(value.as_i64().filter(fits)?)
+        }
         Kind::I32 => Value::Signed(i32::try_from(value.as_i64()?).ok()?.into()),
         #[expect(clippy::cast_possible_truncation, reason = "to the nearest")]
         Kind::F32 => Value::Single(value.as_f64()? as f32),

@@ -13,12 +13,12 @@ use parts::Body;
 
 pub use parts::RelayState;
 
-/// Builds a message body of one of the kinds 0 to 19 with fuzzed fields, or arbitrary bytes.
+/// Builds a message body of one of the kinds 0 to 22, except 20, with fuzzed fields, or arbitrary bytes.
 ///
 /// Some fields are drawn near the values in `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
-        15 => 15 + input.below(6),
+        15 => 15 + input.below(8),
         tag => tag,
     };
     let mut body = Body {
@@ -49,6 +49,8 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
         16 => body.pulsed(),
         17 | 18 => body.hearing(),
         19 => body.level(),
+        21 => body.pass_of_mission(),
+        22 => body.report(),
         _ => body.bytes = body.input.piece().to_vec(),
     }
     body.bytes
@@ -211,6 +213,35 @@ impl Body<'_, '_> {
         }
         self.float(|input| input.even(0.0, 0.1 * distance_m));
         self.small(0, 15);
+    }
+
+    /// Appends a number and the digest of a mission, as in a Watch.
+    fn pass_of_mission(&mut self) {
+        self.request_number();
+        self.digest();
+    }
+
+    fn report(&mut self) {
+        self.pass_of_mission();
+        if self.small(0, 1) == 1 {
+            self.several(18);
+            self.small(0, 4);
+            self.small(0, 4);
+            self.word(0x3f80);
+            self.several(2);
+        }
+        for _ in 0..self.small(0, 4) {
+            self.relay();
+            self.several(1);
+            self.word(4);
+            self.several(9);
+        }
+    }
+
+    fn several(&mut self, count: usize) {
+        for _ in 0..count {
+            self.small(0, 255);
+        }
     }
 
     fn moved(&mut self) {

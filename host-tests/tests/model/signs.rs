@@ -87,6 +87,8 @@ impl Signs {
             | Message::Proposal(_)
             | Message::Decision(_)
             | Message::Offer { .. }
+            | Message::Watch { .. }
+            | Message::Report(_)
             | Message::Claim(_) => {}
             // Lease renewal, pass, or result of a pass.
             _ => {

@@ -28,6 +28,7 @@ fn renamed(message: &WireMessage, number: u16, mission: u16) -> WireMessage {
     message.with(match message.name() {
         "Claim" | "Busy" => json!({ "number": number }),
         "Heartbeat" | "Level" => json!({ "mission": mission }),
+        "Watch" | "Report" => json!({ "number": number, "mission": mission }),
         // A fence's number is that of its association, never 0.
         "Fence" => json!({ "line_digest": mission }),
         "Offer" => json!({ "base": mission }),

@@ -1,4 +1,4 @@
-//! `FORMAT.md` as a test: examples, ladders, digest; and every rejected stream of the vectors.
+//! `FORMAT.md` as a test: worked frame, ladder, digest; and every rejected stream of the vectors.
 
 use host_tests::fixtures::paper;
 use uav_relay::wire::digest::digest;
@@ -44,20 +44,8 @@ fn example(section: &str) -> (Vec<u8>, Vec<u8>) {
 }
 
 #[test]
-fn the_examples_of_the_document_are_golden_vectors() {
+fn the_worked_frame_of_the_document_is_a_golden_vector() {
     let vectors = vectors();
-    let mut seen = 0;
-    for section in DOCUMENT.split("### Example: ").skip(1) {
-        let name = section.lines().next().unwrap();
-        let mut frames = vectors.frames.iter();
-        let vector = frames.find(|vector| vector.name == name).unwrap();
-        let (plain, wire) = example(section);
-        assert_eq!((&plain, &wire), (&vector.plain, &vector.wire), "{name}");
-        let len = format!("On the wire, {} bytes:", wire.len());
-        assert!(section.contains(&len), "{name}");
-        seen += 1;
-    }
-    assert_eq!(seen, 2);
     let section = DOCUMENT.split("### Worked: ").nth(1).unwrap();
     let signed = &vectors.signed[2];
     assert_eq!(section.lines().next(), Some(&*signed.name));
@@ -77,7 +65,7 @@ fn the_ladders_of_the_document_are_golden_vectors() {
         assert!(vectors.iter().any(|vector| vector.targets == targets));
         found += 1;
     }
-    assert!(found > 1);
+    assert!(found > 0);
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut BoundsSeen) {
         Kind::Flags(names) => (0..names.len()).for_each(|bit| want(format!("flag {bit}"))),
         Kind::Words(words) => (0..words.len()).for_each(|word| want(format!("{:e}", word as f64))),
         // Ranges with a bound: numbers of one, two or four bytes without one are covered by the rest.
-        Kind::F32 | Kind::F64 | Kind::U8 | Kind::U16 | Kind::I32
+        Kind::F32 | Kind::F64 | Kind::U8 | Kind::U16 | Kind::I24 | Kind::I32
             if field.range.contains(" to ") =>
         {
             let (zero, bounds) = bounds();

@@ -116,6 +116,11 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
         level(mission),
         // The echo of a claim to the receiver's number.
         claim(1, 0, 2),
+        WireMessage::new("Watch", &json!({ "number": number, "mission": mission })),
+        WireMessage::new(
+            "Report",
+            &json!({ "number": number, "mission": mission, "detail": null, "entries": [] }),
+        ),
     ]
 }
 

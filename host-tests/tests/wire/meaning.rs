@@ -8,8 +8,8 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{
-    AdjustStep, Claim, Decision, Heard, Hello, Message, Moved, OwnSeat, Poll, Proposal, Pulse,
-    Pulsed, Roster, Successor, Sweep, SweepVerdict, Token,
+    AdjustStep, Claim, Coarse, Decision, Detail, Entry, Heard, Hello, Message, Moved, OwnSeat,
+    Poll, Proposal, Pulse, Pulsed, Reports, Roster, Successor, Sweep, SweepVerdict, Token,
 };
 use uav_relay::{
     Band, Interference, Interferer, Local, Placement, Profile, Sites, Upload, View, ViewId,
@@ -177,6 +177,11 @@ pub(crate) fn message(wire_message: &WireMessage) -> Message {
             passive: of.flag("flags", 0),
             echo: of.flag("flags", 1),
         }),
+        "Watch" => Message::Watch {
+            number: of.word("number"),
+            mission: of.word("mission"),
+        },
+        "Report" => Message::Report(reports(&of)),
         other => panic!("{other}"),
     }
 }
@@ -221,6 +226,39 @@ fn roster(of: &MessageFields<'_>) -> Roster {
         after: of.word("after"),
         seats: seats.iter().map(seat).collect(),
     }
+}
+
+fn coarse(of: &MessageFields<'_>, name: &str) -> Coarse {
+    let Some(Value::List(axes)) = of.0.get(name) else {
+        panic!("no {name}");
+    };
+    Coarse::new([0, 1, 2].map(|axis| match &axes[axis] {
+        Value::Signed(quarters) => *quarters as i32,
+        other => panic!("{other:?}"),
+    }))
+}
+
+fn reports(of: &MessageFields<'_>) -> Reports {
+    let mut report = Reports::new(of.word("number"), of.word("mission"));
+    report.detail = of.group("detail").map(|of| {
+        let power_w = f32::from_bits(u32::from(of.word("interference")) << 16);
+        let places = ["setpoint", "agreed"].map(|name| coarse(&of, name));
+        let neighbours = ["before", "after"].map(|name| of.byte(name));
+        Detail::new(places, neighbours, power_w, of.word("version"))
+    });
+    let Some(Value::List(entries)) = of.0.get("entries") else {
+        panic!("no entries");
+    };
+    for entry in entries {
+        let Value::Group(fields) = entry else {
+            panic!("{entry:?}");
+        };
+        let of = MessageFields(fields);
+        let at = coarse(&of, "position");
+        let entry = Entry::new(of.word("relay"), of.byte("age_ds"), of.word("state"), at);
+        report.entries.push(entry).unwrap();
+    }
+    report
 }
 
 fn hello(of: &MessageFields<'_>) -> Hello {

@@ -70,7 +70,7 @@ fn by_the_rules(chunk: &[u8], own: u16, neighbours: [Option<u16>; 2], port: Port
         return "malformed";
     };
     match message.name() {
-        "Hello" | "Claim" => "received",
+        "Hello" | "Claim" | "Watch" | "Report" => "received",
         // Only Tx and Rx send that.
         "Level" => "misaddressed",
         _ if neighbours.contains(&Some(sender)) => "received",

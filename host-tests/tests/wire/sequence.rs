@@ -70,8 +70,8 @@ fn a_message_of_another_mission_leads_to_a_hello_at_most() {
                 let mut after = bench.clone();
                 let out = after.receive(port, &message);
                 // Hellos and heartbeats reveal another mission; a pass may only be of another view.
-                let of_a_mission =
-                    ["Heartbeat", "Hello", "Fence", "Offer"].contains(&message.name());
+                let of_a_mission = ["Heartbeat", "Hello", "Fence", "Offer", "Watch", "Report"]
+                    .contains(&message.name());
                 let (expected, greeted) = if of_a_mission {
                     (["mission", "received"], None)
                 } else {

@@ -1,11 +1,11 @@
 //! Reports of this relay's state to a ground station that watches, and those that it hands on.
 
 use super::Node;
-use crate::node::reports::Own;
+use crate::node::reports::{FIRST_PATIENCE, Own, PATIENCE};
 use crate::node::round::state::Phase;
 use crate::side::Side;
 use crate::stats::bump;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::wire::message::Message;
 
 impl Node {
@@ -20,22 +20,26 @@ impl Node {
 
     /// Returns the next Watch or Report, with its side and its destination.
     pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
-        let is_busy = self.is_agreeing();
-        if !self.reporting.is_due(now, is_busy) {
+        let wait = self.telemetry_waits();
+        if !self.reporting.is_due(now, wait) {
             return None;
         }
         let own = self.own();
         let (member, neighbours) = (&self.member, &self.layers.neighbours);
-        self.reporting.poll(now, member, neighbours, is_busy, own)
+        self.reporting.poll(now, member, neighbours, wait, own)
     }
 
-    /// Returns true while an agreement on the view or the positions needs the shared channel.
-    pub(super) fn is_agreeing(&self) -> bool {
+    /// Returns the time by which reports wait for an agreement that needs the shared channel.
+    pub(super) fn telemetry_waits(&self) -> Duration {
         let is_idle = matches!(
             self.phase(),
             Phase::Holding | Phase::Infeasible | Phase::NoQuorum
         );
-        self.searches() && !is_idle
+        match self.agreed_place() {
+            _ if is_idle || !self.searches() => Duration::from_micros(0),
+            Some(_) => PATIENCE,
+            None => FIRST_PATIENCE,
+        }
     }
 
     fn own(&self) -> Own {

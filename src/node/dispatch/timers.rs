@@ -63,7 +63,7 @@ impl Node {
             self.steering.next_timeout(),
             self.no_quorum_timer.next_timeout(),
             self.layers.update.next_timeout(),
-            self.reporting.next_timeout(self.is_agreeing()),
+            self.reporting.next_timeout(self.telemetry_waits()),
         ]
         .into_iter()
         .flatten()

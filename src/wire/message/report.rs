@@ -29,14 +29,15 @@ impl Coarse {
     pub fn of(at: Option<Placement>) -> Self {
         let axes = at.map_or([f32::NAN; 3], |at| [at.x_m, at.y_m, at.altitude_m]);
         let is_known = axes.iter().all(|metres| metres.abs() <= 2e6);
-        Self(axes.map(|metres| {
-            #[expect(clippy::cast_possible_truncation, reason = "at most 8e6")]
-            let quarters = if is_known {
-                libm::roundf(metres * 4.0) as i32
-            } else {
-                UNKNOWN
-            };
-            let [a, b, c, _] = quarters.to_le_bytes();
+        #[expect(clippy::cast_possible_truncation, reason = "at most 8e6")]
+        let quarters = axes.map(|metres| libm::roundf(metres * 4.0) as i32);
+        Self::new(if is_known { quarters } else { [UNKNOWN; 3] })
+    }
+
+    /// Creates a position from its coordinates in quarters of a metre, -2^23 to 2^23 - 1; -2^23 for an unknown one.
+    pub fn new(quarters: [i32; 3]) -> Self {
+        Self(quarters.map(|axis| {
+            let [a, b, c, _] = axis.to_le_bytes();
             [a, b, c]
         }))
     }

@@ -33,6 +33,7 @@ local plain = {
     u16 = { 2, ProtoField.uint16 },
     u32 = { 4, ProtoField.uint32 },
     u64 = { 8, ProtoField.uint64 },
+    i24 = { 3, ProtoField.int24 },
     i32 = { 4, ProtoField.int32 },
     f32 = { 4, ProtoField.float },
     f64 = { 8, ProtoField.double },
@@ -179,7 +180,7 @@ function read(tree, field, body)
             item:append_text(field.per and string.format(" x %s", field.unit) or " " .. field.unit)
         end
         if field.per then
-            local number = kind == "i32" and range:le_int() or range:le_uint()
+            local number = (kind == "i24" or kind == "i32") and range:le_int() or range:le_uint()
             item:append_text(string.format(" = %.10g %s", number / field.per, field.base))
         elseif kind == "view" and range:le_uint() > 0 then
             local view = range:le_uint()

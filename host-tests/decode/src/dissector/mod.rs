@@ -58,6 +58,7 @@ fn kind(kind: &Kind, indent: usize, out: &mut String) {
         Kind::U16 => "u16",
         Kind::U64 => "u64",
         Kind::U32 => "u32",
+        Kind::I24 => "i24",
         Kind::I32 => "i32",
         Kind::F32 => "f32",
         Kind::F64 => "f64",

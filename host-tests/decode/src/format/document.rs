@@ -115,12 +115,13 @@ fn fields(rows: &[Row], tables: &[Table<'_>]) -> Result<Vec<Field>, String> {
 }
 
 fn item(row: &Row, all: &[Table<'_>]) -> Result<Kind, String> {
-    if row.kind != "seats" {
-        return plain(&row.kind);
-    }
-    let head = "offset in the seat";
+    let head = match row.kind.as_str() {
+        "seats" => "offset in the seat",
+        "entries" => "offset in the entry",
+        other => return plain(other),
+    };
     let table = all.iter().find(|table| table.head.first() == Some(&head));
-    let rows = rows(table.ok_or("seats without a table")?)?;
+    let rows = rows(table.ok_or("a list without a table")?)?;
     Ok(Kind::Group(fields(&rows, &[])?))
 }
 
@@ -143,7 +144,7 @@ fn kind(row: &Row, tables: &[Table<'_>]) -> Result<Kind, String> {
     if let Some((_, of)) = row.kind.split_once(' ') {
         let of = plain(of)?;
         let bytes = last_number(&row.size).ok_or("an array without a size")?;
-        return Ok(Kind::Array(bytes / 4, Box::new(of)));
+        return Ok(Kind::Array(bytes / of.size().max(1), Box::new(of)));
     }
     plain(&row.kind)
 }
@@ -165,6 +166,7 @@ fn plain(kind: &str) -> Result<Kind, String> {
         "u16" => Kind::U16,
         "u32" => Kind::U32,
         "u64" => Kind::U64,
+        "i24" => Kind::I24,
         "i32" => Kind::I32,
         "f32" => Kind::F32,
         "f64" => Kind::F64,

@@ -16,6 +16,8 @@ pub enum Kind {
     U64,
     /// Unsigned integer of four bytes.
     U32,
+    /// Signed integer of three bytes, two's complement.
+    I24,
     /// Signed integer of four bytes, two's complement.
     I32,
     /// Floating-point number of four bytes, IEEE 754 binary32.
@@ -48,6 +50,7 @@ impl Kind {
         match self {
             Self::U8 | Self::Bool | Self::Flags(_) | Self::Words(_) => 1,
             Self::U16 | Self::Digest => 2,
+            Self::I24 => 3,
             Self::U32 | Self::I32 | Self::F32 | Self::View => 4,
             Self::U64 | Self::F64 => 8,
             Self::Array(..) | Self::Option(_) | Self::List(..) | Self::Group(_) => 0,

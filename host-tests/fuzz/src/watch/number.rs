@@ -23,6 +23,8 @@ pub(super) const fn number_of(message: &Message) -> Option<u16> {
         | Message::Fence { .. }
         | Message::Offer { .. }
         | Message::Level { .. }
-        | Message::Claim(_) => return None,
+        | Message::Claim(_)
+        | Message::Watch { .. }
+        | Message::Report(_) => return None,
     })
 }

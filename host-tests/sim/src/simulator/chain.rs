@@ -187,6 +187,7 @@ impl Chain {
             QueuedEvent::Measure => self.measure_all(),
             QueuedEvent::Attack(kind) => self.send_attack(kind),
             QueuedEvent::Upload => self.begin_upload(index),
+            QueuedEvent::Watch => self.begin_watching(index),
             QueuedEvent::StationBytes { bytes } => self.station_receive(index, &bytes),
             QueuedEvent::StationTimeout => self.station_timeout(index),
             of_relay => self.process_relay_event(index, of_relay),
@@ -437,6 +438,9 @@ impl Chain {
         for (which, spec) in setup.uploads.iter().enumerate() {
             queue.put(spec.at, which, QueuedEvent::Upload);
         }
+        for (which, (_, at)) in setup.watches.iter().enumerate() {
+            queue.put(*at, which, QueuedEvent::Watch);
+        }
         let mut pending_planned = put_fleet(&setup, &mut queue)
             + setup.kills.len()
             + setup.boots.len()
@@ -573,6 +577,8 @@ pub enum QueuedEvent {
     StationTimeout,
     /// A ground station begins an upload. The event's relay index is the upload's index in the setup.
     Upload,
+    /// A ground station begins to watch. The event's relay index is that of the setup's `watches`.
+    Watch,
     /// A time step of the drones' flight.
     Fly,
     /// The autopilot of the relay's drone restarts.

@@ -93,6 +93,8 @@ pub struct Setup {
     pub auth: bool,
     /// Uploads of missions during the run. Without `auth` none takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
+    /// Ends of the chain whose ground stations watch the relays from a time on. None without `auth`, as for uploads.
+    pub watches: Vec<(Side, Instant)>,
     /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,
     /// Attack on the chain; `None` without an attacker.
@@ -149,6 +151,7 @@ impl Setup {
             partitions: Vec::new(),
             auth: false,
             uploads: Vec::new(),
+            watches: Vec::new(),
             forgetful: Vec::new(),
             attack: None,
             flight: None,

@@ -1,9 +1,11 @@
-//! Ground stations of a run: uploads and measurements.
+//! Ground stations of a run: uploads, measurements and telemetry.
 
 use rand::RngExt;
 use uav_relay::ground::{Ground, Progress};
 use uav_relay::sensing::estimate::NumberedEstimate;
-use uav_relay::{Duration, Instant, MAX_FRAME, Phase, Placement, Port, Sample, Side, Wiring};
+use uav_relay::{
+    Duration, Instant, MAX_FRAME, Phase, Placement, Port, Report, Sample, Side, Wiring,
+};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 
@@ -39,10 +41,35 @@ impl Chain {
         self.drain_station(at);
     }
 
+    pub(super) fn begin_watching(&mut self, which: usize) {
+        let Some((end, _)) = self.setup.watches.get(which).copied() else {
+            return;
+        };
+        let at = self.stations.iter().position(|station| station.end == end);
+        if let Some(at) = at
+            && let Some(station) = self.stations.get_mut(at)
+        {
+            station.ground.watch(self.now, true);
+            self.drain_station(at);
+        }
+    }
+
+    /// Returns the newest reports that have reached the ground station at `end`, by relay.
+    pub fn reports(&self, end: Side) -> Vec<Report> {
+        let mut stations = self.stations.iter();
+        let station = stations.find(|station| station.end == end);
+        station.map_or(Vec::new(), |station| {
+            station.ground.reports().copied().collect()
+        })
+    }
+
     /// Passes received bytes to the ground station `at` (from 0) and sends its replies.
     pub(super) fn station_receive(&mut self, at: usize, bytes: &[u8]) {
         if let Some(station) = self.stations.get_mut(at) {
             station.ground.handle_bytes(bytes);
+            if !self.setup.watches.is_empty() {
+                station.ground.handle_timeout(self.now);
+            }
         }
         self.drain_station(at);
     }
@@ -183,12 +210,16 @@ pub(super) fn stations(setup: &Setup) -> Vec<Station> {
         return Vec::new();
     };
     let uploads = setup.uploads.iter().map(|spec| spec.end);
+    let watches = setup.watches.iter().map(|(end, _)| *end);
     let measures = setup
         .true_interference
         .as_ref()
         .filter(|true_interference| true_interference.handed.is_empty());
     let both = measures.map(|_| [Side::Upstream, Side::Downstream]);
-    let mut ends: Vec<Side> = uploads.chain(both.into_iter().flatten()).collect();
+    let mut ends: Vec<Side> = uploads
+        .chain(watches)
+        .chain(both.into_iter().flatten())
+        .collect();
     ends.sort();
     ends.dedup();
     ends.into_iter()

@@ -1,0 +1,350 @@
+//! Telemetry: age, truth and cost of the reports that reach a ground station through the chain.
+//!
+//! `cargo test --test telemetry -- --nocapture` prints the figures.
+
+use host_tests::fixtures::paper;
+use uav_relay::{Duration, GuardConfig, Instant, Mission, Phase, Placement, Side};
+use uav_relay_decode::envelope::unstuffed;
+use uav_relay_sim::simulator::chain::Chain;
+use uav_relay_sim::simulator::drones::{FlightSpec, Point};
+use uav_relay_sim::simulator::faults::{Faults, LinkSpec};
+use uav_relay_sim::simulator::medium::Access;
+use uav_relay_sim::simulator::outcome::OnAir;
+use uav_relay_sim::simulator::setup::Setup;
+
+/// Data rate of the shared channel, and of a wire, in bytes per second.
+const RATE: f64 = 5_760.0;
+
+const fn s(seconds: u64) -> Instant {
+    Instant::from_millis(1_000 * seconds)
+}
+
+/// Returns the setup of `relays` signing relays with the paper's mission, and a watching station at Tx from `from` on.
+fn setup(relays: u16, access: Option<Access>, from: Instant, until: Instant) -> Setup {
+    let mission = Mission::try_new(paper(relays)).unwrap();
+    let mut setup = access.map_or_else(
+        || Setup::new(mission),
+        |access| Setup::on_air(mission, access),
+    );
+    setup.link = LinkSpec {
+        baud: 57_600,
+        latency: Duration::from_millis(2),
+    };
+    // All relays are in range of each other.
+    setup.radio_reach = usize::from(relays);
+    setup.auth = true;
+    setup.watches = vec![(Side::Upstream, from)];
+    setup.record = true;
+    setup.soaked(until)
+}
+
+/// Returns the setup with drones that hover 20 m off their positions and fly there.
+fn flown(mut setup: Setup) -> Setup {
+    let relays = setup.mission.relays();
+    let config = setup.mission.config();
+    let place = |index: u16| -> Point {
+        let share = f64::from(index) / f64::from(relays + 1);
+        [
+            share * f64::from(config.distance_m),
+            0.0,
+            config.common.altitude_m.into(),
+        ]
+    };
+    setup.settings.guard = Some(GuardConfig::of(&setup.mission, config.common));
+    setup.flight = Some(FlightSpec::multicopters(
+        (1..=relays).map(place).collect(),
+        0.0,
+        0.0,
+    ));
+    setup
+}
+
+/// Figures of a run: ages of each relay's reports, position errors, bytes.
+#[derive(Default)]
+struct Figures {
+    ages_s: Vec<Vec<f64>>,
+    errors_m: Vec<f64>,
+    frames: Vec<OnAir>,
+    /// First time at which all relays hold their positions.
+    agreed: Option<Instant>,
+}
+
+impl Figures {
+    /// Advances `chain` to `until` in steps of 0.1 s. From `from` on it records the ages of the reports of `relays` at `end`.
+    fn watch(&mut self, chain: &mut Chain, end: Side, relays: &[u16], [from, until]: [Instant; 2]) {
+        let mut tracks: Vec<Vec<(Instant, Point)>> = vec![Vec::new(); relays.len()];
+        self.ages_s.resize(relays.len(), Vec::new());
+        let mut now = chain.progress().1;
+        while now < until {
+            now = now + Duration::from_millis(100);
+            chain.advance(now);
+            self.frames.extend(chain.frames(now));
+            let live: Vec<_> = chain.live().collect();
+            let mut on = live.iter().filter(|relay| relay.is_on);
+            if self.agreed.is_none() && on.all(|relay| relay.phase == Phase::Holding) {
+                self.agreed = Some(now);
+            }
+            let reports = chain.reports(end);
+            for (at, number) in relays.iter().enumerate() {
+                let truth = live.iter().find(|relay| relay.number == *number).unwrap();
+                tracks[at].extend(truth.position.map(|place| (now, place)));
+                if now < from {
+                    continue;
+                }
+                let report = reports.iter().find(|report| report.relay == *number);
+                let age = report.map_or(f64::INFINITY, |report| seconds(now.since(report.at)));
+                self.ages_s[at].push(age);
+                if let Some((place, at_time)) = report.and_then(|it| Some((it.position?, it.at))) {
+                    self.errors_m.push(error(&tracks[at], at_time, place));
+                }
+            }
+        }
+    }
+
+    /// Returns the age that the reports of each relay do not exceed for this share of the time, s; the worst relay's.
+    fn age_s(&self, share: f64) -> f64 {
+        let all = self.ages_s.iter().map(|ages| quantile(ages, share));
+        all.fold(0.0, f64::max)
+    }
+
+    /// Returns the share of the rate that Watch and Report take on the most loaded link in any 30 s, in bytes per second.
+    fn most_bytes(&self, between: [Instant; 2]) -> f64 {
+        let mut most: f64 = 0.0;
+        let links: std::collections::BTreeSet<String> = self
+            .frames
+            .iter()
+            .map(|frame| format!("{:?}", frame.link))
+            .collect();
+        for link in links {
+            let all = self.frames.iter().filter(|frame| {
+                format!("{:?}", frame.link) == link
+                    && (between[0]..=between[1]).contains(&frame.at)
+                    && is_telemetry(&frame.bytes)
+            });
+            let all: Vec<(Instant, usize)> =
+                all.map(|frame| (frame.at, frame.bytes.len())).collect();
+            for (index, (first, _)) in all.iter().enumerate() {
+                let within = all[index..]
+                    .iter()
+                    .take_while(|(at, _)| at.since(*first) < Duration::from_millis(30_000));
+                let bytes: usize = within.map(|(_, bytes)| bytes).sum();
+                most = most.max(bytes as f64 / 30.0);
+            }
+        }
+        most
+    }
+
+    fn print(&self, name: &str, between: [Instant; 2]) {
+        if std::env::var("DUMP").is_ok() {
+            let mut n = std::collections::BTreeMap::new();
+            for frame in &self.frames {
+                let (plain, _) = unstuffed(&frame.bytes);
+                if is_telemetry(&frame.bytes) {
+                    let k = (plain[10], plain[0], plain[2]);
+                    let e: &mut (u32, usize) = n.entry(k).or_default();
+                    e.0 += 1;
+                    e.1 += frame.bytes.len();
+                    if frame.at > s(50) && frame.at < s(56) {
+                        println!(
+                            "{:.3} {:x?} {:02x?} {}",
+                            seconds(frame.at.since(s(0))),
+                            k,
+                            &plain[11..plain.len() - 12],
+                            frame.note
+                        );
+                    }
+                }
+            }
+            println!("{n:x?}");
+        }
+        let per_relay: Vec<String> = self
+            .ages_s
+            .iter()
+            .map(|ages| format!("{:.1}", quantile(ages, 0.95)))
+            .collect();
+        let shown = if per_relay.len() > 12 {
+            String::new()
+        } else {
+            format!(", by relay {}", per_relay.join(" "))
+        };
+        println!(
+            "{name}: age 50 % {:.2} s, 95 % {:.2} s, 99 % {:.2} s{shown}; position error at most {:.2} m; {:.1} % of the rate",
+            self.age_s(0.5),
+            self.age_s(0.95),
+            self.age_s(0.99),
+            self.errors_m.iter().copied().fold(0.0, f64::max),
+            100.0 * self.most_bytes(between) / RATE,
+        );
+    }
+}
+
+fn seconds(span: Duration) -> f64 {
+    span.as_micros() as f64 / 1e6
+}
+
+fn quantile(numbers: &[f64], share: f64) -> f64 {
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let index = (share * sorted.len() as f64) as usize;
+    sorted[index.min(sorted.len() - 1)]
+}
+
+fn is_telemetry(wire: &[u8]) -> bool {
+    let (plain, _) = unstuffed(wire);
+    let is_message = plain.get(3).is_some_and(|byte| byte >> 4 == 1);
+    is_message && matches!(plain.get(10), Some(0x15 | 0x16))
+}
+
+/// Returns the least distance of `place` from the positions of a drone from 0.4 s before `at` to 0.4 s after it: times of
+/// reports are in tenths of a second per hop, and positions are reported every 0.2 s.
+fn error(track: &[(Instant, Point)], at: Instant, place: Placement) -> f64 {
+    let near = Duration::from_millis(400);
+    let reported = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+    let mut least = f64::INFINITY;
+    for (then, true_place) in track {
+        if then.since(at) <= near && at.since(*then) <= near {
+            let squares = true_place
+                .iter()
+                .zip(reported)
+                .map(|(a, b)| (a - b) * (a - b));
+            least = least.min(squares.sum::<f64>().sqrt());
+        }
+    }
+    if least.is_infinite() { 0.0 } else { least }
+}
+
+fn all(relays: u16) -> Vec<u16> {
+    (1..=relays).collect()
+}
+
+#[test]
+fn eight_relays_on_a_channel_report_within_two_seconds() {
+    let span = [s(40), s(160)];
+    let mut chain = Chain::new(flown(setup(8, Some(Access::Csma), s(1), span[1]))).unwrap();
+    let mut figures = Figures::default();
+    figures.watch(&mut chain, Side::Upstream, &all(8), span);
+    figures.print("8 relays, 57 600 baud", [s(1), span[1]]);
+    assert!(figures.age_s(0.95) <= 2.0, "{}", figures.age_s(0.95));
+    assert!(figures.errors_m.iter().all(|error| *error <= 1.0));
+    assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
+    let reports = chain.reports(Side::Upstream);
+    for (report, truth) in reports.iter().zip(chain.live()) {
+        assert_eq!(report.relay, truth.number);
+        assert_eq!(report.neighbours, truth.neighbours);
+        assert_eq!(report.phase, truth.phase);
+        let apart = |a: Option<Placement>, b: Option<Placement>| {
+            let (a, b) = (a.unwrap(), b.unwrap());
+            (a.x_m - b.x_m)
+                .abs()
+                .max((a.y_m - b.y_m).abs())
+                .max((a.altitude_m - b.altitude_m).abs())
+        };
+        assert!(apart(report.agreed, truth.agreed) <= 0.13);
+        assert!(apart(report.setpoint, truth.setpoint) <= 0.13);
+    }
+}
+
+#[test]
+fn radios_that_reach_four_relays() {
+    let span = [s(40), s(160)];
+    let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
+    setup.radio_reach = 4;
+    let mut chain = Chain::new(flown(setup)).unwrap();
+    let mut figures = Figures::default();
+    figures.watch(&mut chain, Side::Upstream, &all(8), span);
+    figures.print("8 relays, 57 600 baud, hidden nodes", [s(1), span[1]]);
+    assert!(figures.age_s(0.95) <= 4.0, "{}", figures.age_s(0.95));
+    assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
+}
+
+#[test]
+fn half_of_all_frames_lost() {
+    let span = [s(120), s(720)];
+    let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
+    setup.faults = Faults {
+        loss: 0.5,
+        ..Faults::default()
+    };
+    let mut chain = Chain::new(flown(setup)).unwrap();
+    let mut figures = Figures::default();
+    figures.watch(&mut chain, Side::Upstream, &all(8), span);
+    figures.print("8 relays, 57 600 baud, 50 % lost", [s(1), span[1]]);
+    assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
+    assert!(figures.age_s(0.95) <= 5.0, "{}", figures.age_s(0.95));
+}
+
+#[test]
+fn two_stations_watch() {
+    let span = [s(40), s(160)];
+    let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
+    setup.watches.push((Side::Downstream, s(1)));
+    let mut chain = Chain::new(flown(setup)).unwrap();
+    let mut figures = Figures::default();
+    figures.watch(&mut chain, Side::Downstream, &all(8), span);
+    figures.print("two stations, the one at Rx", [s(1), span[1]]);
+    assert!(figures.age_s(0.95) <= 4.0, "{}", figures.age_s(0.95));
+    assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
+    assert_eq!(chain.reports(Side::Upstream).len(), 8);
+}
+
+#[test]
+fn a_lost_relay_and_a_restarted_one() {
+    let mut setup = flown(setup(8, Some(Access::Csma), s(1), s(200)));
+    setup.kills = vec![(4, s(60)), (7, s(60))];
+    setup.boots = vec![(7, s(62))];
+    let mut chain = Chain::new(setup).unwrap();
+    let mut figures = Figures::default();
+    let others = [1, 2, 3, 5, 6, 7, 8];
+    figures.watch(&mut chain, Side::Upstream, &others, [s(58), s(120)]);
+    figures.print("relay 4 lost, relay 7 restarted", [s(1), s(120)]);
+    let gap_s = figures.age_s(1.0);
+    println!("longest age meanwhile: {gap_s:.1} s");
+    assert!(gap_s <= 25.0);
+    let mut later = Figures::default();
+    later.watch(&mut chain, Side::Upstream, &others, [s(120), s(200)]);
+    later.print("after the chain has closed up", [s(120), s(200)]);
+    assert!(later.age_s(0.95) <= 2.0, "{}", later.age_s(0.95));
+}
+
+#[test]
+fn a_hundred_relays_on_wires() {
+    let span = [s(120), s(240)];
+    let setup = setup(100, None, s(1), span[1]);
+    let mut chain = Chain::new(setup).unwrap();
+    let mut figures = Figures::default();
+    figures.watch(&mut chain, Side::Upstream, &all(100), span);
+    figures.print("100 relays, wires of 57 600 baud", [s(1), span[1]]);
+    assert!(figures.age_s(0.95) <= 15.0, "{}", figures.age_s(0.95));
+    assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
+}
+
+#[test]
+fn agreements_take_no_longer() {
+    let times = |watch: bool| -> Vec<f64> {
+        let times = (1..=100).map(|seed| {
+            let mut setup = setup(8, Some(Access::Csma), s(0), s(20));
+            if !watch {
+                // A station without a request.
+                setup.watches = vec![(Side::Upstream, s(1_000))];
+            }
+            setup.record = false;
+            setup.soak = None;
+            setup.seed = seed;
+            let mut chain = Chain::new(setup).unwrap();
+            while !chain.live().all(|relay| relay.phase == Phase::Holding) {
+                assert!(!chain.step(1));
+            }
+            seconds(chain.progress().1.since(s(0)))
+        });
+        times.collect()
+    };
+    let (without, with) = (times(false), times(true));
+    for share in [0.5, 0.99] {
+        let [a, b] = [&without, &with].map(|times| quantile(times, share));
+        println!(
+            "first agreement, {:.0} % of 100 runs: {a:.3} s without, {b:.3} s with telemetry",
+            100.0 * share
+        );
+        assert!(b <= 1.05 * a);
+    }
+}
