@@ -89,18 +89,11 @@ impl Reason {
     }
 }
 
-/// Alarm that lasts, as [`Alarms::settle`] takes it.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Lasting {
-    /// Reason of the alarm.
-    pub reason: Reason,
-    /// Relay that the alarm is about; 0 if it is about its reporters or the station.
-    pub subject: u16,
-    /// Relays that have reported it, sorted.
-    pub reporters: Vec<u16>,
-    /// Text that is appended to that of the reason.
-    pub note: String,
-}
+/// Alarm that lasts: its reason, its subject, its reporters and a note.
+///
+/// The subject is the relay that it is about; 0 if it is about its reporters or the station. The reporters are the relays that have
+/// reported it, sorted. The note is appended to the text of the reason.
+pub type Lasting = (Reason, u16, Vec<u16>, String);
 
 #[derive(Debug)]
 struct Entry {
@@ -124,7 +117,9 @@ pub struct Alarms {
 }
 
 impl Alarms {
-    /// Begins an alarm about relay `subject` (0: about its reporters), or adds the reporter `by` to the same alarm that lasts already.
+    /// Begins an alarm, or adds the reporter `by` to the same alarm that lasts already.
+    ///
+    /// `subject` is the relay that it is about; 0 if it is about its reporters.
     pub fn begin(&mut self, time_s: f64, reason: Reason, subject: u16, by: u16) {
         let known = self
             .lasting()
@@ -133,25 +128,11 @@ impl Alarms {
         if let Err(at) = reporters.binary_search(&by) {
             reporters.insert(at, by);
         }
-        self.put(
-            time_s,
-            Lasting {
-                reason,
-                subject,
-                reporters,
-                note: String::new(),
-            },
-        );
+        self.put(time_s, (reason, subject, reporters, String::new()));
     }
 
     /// Begins an alarm, or updates the one of the same reason and subject that lasts already.
-    fn put(&mut self, time_s: f64, alarm: Lasting) {
-        let Lasting {
-            reason,
-            subject,
-            reporters,
-            note,
-        } = alarm;
+    fn put(&mut self, time_s: f64, (reason, subject, reporters, note): Lasting) {
         let text = reason.text(subject, &reporters) + &note;
         let mut entries = self.entries.iter_mut();
         let same = |it: &&mut Entry| it.lasts() && (it.reason, it.subject) == (reason, subject);
@@ -204,8 +185,8 @@ impl Alarms {
     /// Begins and updates the alarms `lasting`, and ends all others.
     pub fn settle(&mut self, time_s: f64, lasting: Vec<Lasting>) {
         for entry in self.entries.iter_mut().filter(|it| it.lasts()) {
-            let mut all = lasting.iter();
-            if !all.any(|it| (it.reason, it.subject) == (entry.reason, entry.subject)) {
+            let same = |it: &Lasting| (it.0, it.1) == (entry.reason, entry.subject);
+            if !lasting.iter().any(same) {
                 entry.alarm.cleared_s = Some(time_s);
             }
         }

@@ -23,7 +23,7 @@ use crate::alarms::{Alarms, Lasting, Reason, named};
 use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
 use crate::snapshot::{LogLine, Snapshot};
 
-/// Time without any frame after which no alarm about a single relay begins, because the station itself may be cut off.
+/// Time without any frame after which no alarm about a single relay begins: the station may be cut off.
 const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 
 /// Time for which the rejection of a frame is shown.
@@ -43,9 +43,10 @@ pub struct Frames {
 
 /// Newest report of a relay, and the past that its alarms depend on.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each alarm")]
 struct Known {
     report: Report,
-    /// True from the control by the relay until the pilot's, also while the link to the autopilot is lost.
+    /// True from the control by the relay until the pilot takes it, also without a link to the autopilot.
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
@@ -93,7 +94,7 @@ impl Known {
         self.report.is_passive || self.passive_at.is_some_and(is_recent)
     }
 
-    /// Returns true if the drone has no known position although it is in the air or should be ready for it.
+    /// Returns true if the drone is in the air and its position is unknown.
     fn is_blind(&self) -> bool {
         let Report {
             control, position, ..
@@ -108,7 +109,7 @@ impl Known {
 pub struct StationView {
     alarms: Alarms,
     known: BTreeMap<u16, Known>,
-    /// For each relay its neighbours that have reported it as silent, and the time of each neighbour's last such report.
+    /// Neighbours that have reported a relay as silent, by relay, and the time of their last such report.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     frames: Frames,
     /// Time of the last accepted frame; that of the start before the first one.
@@ -121,7 +122,7 @@ pub struct StationView {
 }
 
 impl StationView {
-    /// Returns the newest version of the mission that a relay has reported; `None` before the first report.
+    /// Returns the newest version of the mission that relays report; `None` before the first report of one.
     pub fn version(&self) -> Option<u16> {
         self.version.map(|(version, _)| version)
     }
@@ -186,7 +187,7 @@ impl StationView {
     /// Updates the newest version of the mission that relays report now.
     fn follow_version(&mut self, now: Instant) {
         let reports = self.known.values().map(|it| it.report);
-        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER);
+        let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER && has_details(it));
         if let Some(newest) = fresh.map(|it| it.version).max()
             && self.version() != Some(newest)
         {
@@ -207,7 +208,9 @@ impl StationView {
         self.frames = frames;
     }
 
-    /// Drops the claims about relays that have reported since, unless the neighbour's newest report still has the claim.
+    /// Drops the claims about relays that have reported since.
+    ///
+    /// A claim that the newest report of a neighbour still has stays.
     fn drop_answered_claims(&mut self, now: Instant) {
         let known = &self.known;
         for (number, claims) in &mut self.claims {
@@ -232,14 +235,7 @@ impl StationView {
 
     fn lasting(&self, now: Instant, relays: u16) -> Vec<Lasting> {
         let mut all = Vec::new();
-        let mut add = |reason, subject, reporters: Vec<u16>, note: String| {
-            all.push(Lasting {
-                reason,
-                subject,
-                reporters,
-                note,
-            });
-        };
+        let mut add = |reason, subject, by: Vec<u16>, note| all.push((reason, subject, by, note));
         let quiet = now.since(self.frame_at);
         let Frames { received, rejected } = self.frames;
         if quiet >= SILENT_AFTER && !self.known.is_empty() {
@@ -259,14 +255,10 @@ impl StationView {
             };
             add(Reason::NoReport, 0, unknown, note);
         }
-        if self
-            .rejected_at
-            .is_some_and(|at| now.since(at) < REJECTED_FOR)
-        {
-            let note = format!(
-                ": {rejected} of {} since its start",
-                u64::from(received) + u64::from(rejected)
-            );
+        let is_recent = |at: Instant| now.since(at) < REJECTED_FOR;
+        if self.rejected_at.is_some_and(is_recent) {
+            let all = u64::from(received) + u64::from(rejected);
+            let note = format!(": {rejected} of {all} since its start");
             add(Reason::Rejected, 0, Vec::new(), note);
         }
         for known in self.known.values() {
@@ -297,21 +289,20 @@ impl StationView {
             let version = known.report.version;
             if let Some((newest, since)) = self.version
                 && version != newest
+                && has_details(&known.report)
                 && known.report.at.since(since) >= SILENT_AFTER
             {
                 let note = format!(": version {version}, other relays version {newest}");
                 add(Reason::Version, number, vec![number], note);
             }
         }
-        let shared: [(Reason, fn(&Known) -> bool); 3] = [
-            (Reason::NoQuorum, |it| it.report.phase == Phase::NoQuorum),
-            (Reason::Infeasible, |it| {
-                it.report.phase == Phase::Infeasible
-            }),
-            (Reason::LeaseExpired, |it| it.has_lost_agreement),
-        ];
-        for (reason, is) in shared {
-            let by = self.known.values().filter(|it| is(it));
+        for reason in [Reason::NoQuorum, Reason::Infeasible, Reason::LeaseExpired] {
+            let lasts = |it: &&Known| match reason {
+                Reason::NoQuorum => it.report.phase == Phase::NoQuorum,
+                Reason::Infeasible => it.report.phase == Phase::Infeasible,
+                _ => it.has_lost_agreement,
+            };
+            let by = self.known.values().filter(lasts);
             let by: Vec<u16> = by.map(|it| it.report.relay).collect();
             if !by.is_empty() {
                 add(reason, 0, by, String::new());
@@ -320,14 +311,19 @@ impl StationView {
         all
     }
 
-    /// Returns the gaps in the chain that relays report now, for an alarm about relays that may be behind one.
+    /// Returns the gaps that relays report now, for an alarm about relays that may be behind one.
     fn gaps(&self, now: Instant) -> String {
         let fresh = self.known.values().map(|it| &it.report);
         let fresh = fresh.filter(|it| now.since(it.at) < SILENT_AFTER);
         let gaps = fresh.flat_map(|by| silent(by).map(|it| (by.relay, it)));
-        gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"))
-            .collect()
+        let gaps = gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"));
+        gaps.collect::<Vec<_>>().concat()
     }
+}
+
+/// Returns true if a report has more than position and control: relays report the rest less often.
+fn has_details(report: &Report) -> bool {
+    report.agreed.is_some() || report.neighbours.iter().any(Option::is_some)
 }
 
 /// Returns the neighbours that a relay reports as silent.
@@ -339,9 +335,8 @@ fn silent(report: &Report) -> impl Iterator<Item = u16> {
 /// Returns a line for each difference of a relay's report from the one before.
 fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     let Some(old) = before else {
-        let control = new
-            .control
-            .map_or(String::new(), |it| format!(", {}", control(it)));
+        let words = |it| format!(", {}", control(it));
+        let control = new.control.map_or(String::new(), words);
         return vec![format!("first report: {}{control}", phase(new))];
     };
     let mut lines = Vec::new();
@@ -354,12 +349,13 @@ fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     }
     if old.agreed != new.agreed {
         lines.push(match new.agreed {
-            Some(Placement {
-                x_m,
-                y_m,
-                altitude_m,
-            }) => {
-                format!("agreed position: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m")
+            Some(at) => {
+                let Placement {
+                    x_m,
+                    y_m,
+                    altitude_m: h_m,
+                } = at;
+                format!("agreed position: x {x_m:.1} m, y {y_m:.1} m, altitude {h_m:.1} m")
             }
             None => "no agreed position any more".to_owned(),
         });

@@ -110,11 +110,8 @@ impl Watched {
         match state {
             "off" => _ = self.off.insert(relay),
             "ok" => {
-                *report = Report {
-                    version: report.version,
-                    at: report.at,
-                    ..healthy(relay)
-                }
+                let Report { version, at, .. } = *report;
+                (*report, report.version, report.at) = (healthy(relay), version, at);
             }
             "noquorum" => report.phase = Phase::NoQuorum,
             "infeasible" => report.phase = Phase::Infeasible,
@@ -128,6 +125,10 @@ impl Watched {
             "unagreed" => report.agreed = None,
             "restarted" => (report.agreed, report.setpoint) = (None, None),
             "passive" => report.is_passive = true,
+            "brief" => {
+                (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
+                report.version = 0;
+            }
             "version2" => report.version = 2,
             "nonext" => report.neighbours[1] = None,
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
@@ -144,7 +145,7 @@ impl Watched {
             if let Some((relays, state)) = change.split_once(':') {
                 relays
                     .chars()
-                    .for_each(|it| self.change(it.to_digit(10).unwrap() as u16, state));
+                    .for_each(|it| self.change(it.to_string().parse().unwrap(), state));
             } else if change == "rejected" {
                 self.frames.rejected = 7;
             }
@@ -170,7 +171,8 @@ impl Watched {
     /// Returns the hops of the last snapshot whose SIR is known.
     fn hops(&self) -> String {
         let hops = self.last.hops.iter().filter(|it| it.sir_db.is_some());
-        hops.map(|it| format!("{}-{} ", it.from, it.to)).collect()
+        let hops = hops.map(|it| format!("{}-{} ", it.from, it.to));
+        hops.collect::<Vec<_>>().concat()
     }
 }
 

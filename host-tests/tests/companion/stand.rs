@@ -1,7 +1,7 @@
 //! Ground stations on duty with three relays in the air, which receive their measurements.
 
 use std::fmt::Write as _;
-use std::net::UdpSocket;
+use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
@@ -172,6 +172,18 @@ fn wrong_options_of_a_station_are_named() {
             "--stand".to_owned(),
         ),
     ];
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let own = taken.local_addr().unwrap();
+    for (address, why) in [
+        (own.to_string(), format!("port {} is in use by", own.port())),
+        (
+            "192.0.2.1:80".to_owned(),
+            "192.0.2.1 is not an address of".to_owned(),
+        ),
+    ] {
+        let option = format!("--web {address}");
+        cases.push((format!("--stand {option}"), 1, format!("{option}: {why}")));
+    }
     let from = ["udp:", "udp:0", "udp:65536", "udp::9000", "udp:localhost:x"];
     let from = from.map(|from| (from, udp));
     let files = [

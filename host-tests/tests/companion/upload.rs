@@ -328,6 +328,8 @@ const WRONG: &[&str] = &[
     "--timeout 0",
     "--baud 1199",
     "--of 0",
+    "--web 127.0.0.1:65536",
+    "--web 127.0.0.1:0",
     "--new-interferer 80,500",
     "--new-altitude 0",
     "--min-separation 501",

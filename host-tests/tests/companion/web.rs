@@ -1,7 +1,7 @@
 //! Screen of a ground station that stands: its page, its snapshots, and a serial loop that no browser disturbs.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::net::{Shutdown, TcpListener, TcpStream};
+use std::net::{Shutdown, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
@@ -158,47 +158,4 @@ fn no_request_disturbs_the_serial_loop() {
         "Chain of 1 relays"
     );
     station.stopped();
-}
-
-#[test]
-fn wrong_addresses_of_the_page_are_named() {
-    let (files, tty) = (Files::new(), Pty::new());
-    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-    let port = taken.local_addr().unwrap().port();
-    let form = "must be ADDRESS:PORT, as 127.0.0.1:8080, [::1]:8080 or localhost:8080, with a port of 0 to 65535";
-    for (more, status, part) in [
-        (
-            "--version 1 --yes --web 127.0.0.1:0".to_owned(),
-            2,
-            "--stand".to_owned(),
-        ),
-        (
-            "--stand --web 8080".to_owned(),
-            2,
-            format!("'8080' for '--web <ADDRESS:PORT>': {form}"),
-        ),
-        (
-            "--stand --web 127.0.0.1:65536".to_owned(),
-            2,
-            form.to_owned(),
-        ),
-        (
-            format!("--stand --web 127.0.0.1:{port}"),
-            1,
-            format!("--web 127.0.0.1:{port}: port {port} is in use"),
-        ),
-        (
-            "--stand --web 192.0.2.1:8080".to_owned(),
-            1,
-            "--web 192.0.2.1:8080: 192.0.2.1 is not an address of this computer".to_owned(),
-        ),
-    ] {
-        let good = format!(
-            "--end rx --of 3 --tty {} {}",
-            tty.path().display(),
-            files.signed("key", "epoch")
-        );
-        let line = Relay::ground(&format!("{good} {more}")).refused(status);
-        assert!(line.contains(&part), "{part} not in {line}");
-    }
 }
