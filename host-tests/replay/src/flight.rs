@@ -74,8 +74,9 @@ pub struct Flight {
     pub alarms: Vec<Alarm>,
     /// Number of relays.
     pub relays: u16,
-    /// First time when every relay had agreed, and the share of the time since then in which every relay had agreed and reported.
-    pub available: Option<(f64, f64)>,
+    /// First time when every relay had agreed and reported, and the share of the time since then in which that was so: for all relays, and for
+    /// as many as the last agreed view had then.
+    pub available: Option<(f64, [f64; 2])>,
     /// Lowest SIR of a known hop at each snapshot, dB.
     pub worst_db: Vec<Option<f64>>,
     /// Times in which relays did not report.
@@ -234,8 +235,8 @@ struct Recorder<'a> {
     open: BTreeMap<u16, Loss>,
     /// Last time when no relay reported.
     silent_at: Instant,
-    /// Number of snapshots since the first agreement of all relays, and of these with all relays agreed.
-    agreed: Option<(f64, u32, u32)>,
+    /// First agreement of all relays, number of snapshots since then, and of these with all relays and with all members agreed.
+    agreed: Option<(f64, u32, [u32; 2])>,
 }
 
 impl<'a> Recorder<'a> {
@@ -340,13 +341,16 @@ impl<'a> Recorder<'a> {
             .iter()
             .filter(|it| it.phase == Phase::Holding)
             .count();
-        let is_available = have_agreed == usize::from(flight.relays) && have_agreed > 0;
-        if is_available && self.agreed.is_none() {
-            self.agreed = Some((now, 0, 0));
+        let views = flight.views.iter().take_while(|(at, ..)| *at <= now);
+        let members = views.last().map_or(flight.relays, |(.., members)| *members);
+        let is_available = [flight.relays, members].map(|all| have_agreed >= usize::from(all));
+        if is_available[0] && self.agreed.is_none() {
+            self.agreed = Some((now, 0, [0; 2]));
         }
-        if let Some((_, all, agreed)) = &mut self.agreed {
+        if let Some((_, all, [every, members])) = &mut self.agreed {
             *all += 1;
-            *agreed += u32::from(is_available);
+            *every += u32::from(is_available[0]);
+            *members += u32::from(is_available[1]);
         }
         let last = self.newest.values().map(|it| it.at).max();
         if reporting.is_empty() {
@@ -412,7 +416,7 @@ impl<'a> Recorder<'a> {
             .sort_by(|one, other| one.from.total_cmp(&other.from));
         flight.available = self
             .agreed
-            .map(|(at, all, agreed)| (at, f64::from(agreed) / f64::from(all)));
+            .map(|(at, all, agreed)| (at, agreed.map(|it| f64::from(it) / f64::from(all))));
     }
 }
 

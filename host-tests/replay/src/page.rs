@@ -128,11 +128,14 @@ fn report(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
         "Availability",
         match flight.available {
             None => "0 %: at no time all relays had agreed and reported".to_owned(),
-            Some((at, share)) => format!(
-                "{:.1} % of the time since the first agreement at {}: all relays had agreed, and reported within 5 s",
-                (share * 1_000.0).floor() / 10.0,
-                time(at)
-            ),
+            Some((at, shares)) => {
+                let [every, members] = shares.map(|share| (share * 1_000.0).floor() / 10.0);
+                format!(
+                    "{every:.1} % of the time since {}: all {} relays had agreed, and reported within 5 s; {members:.1} %: as many as the last agreed membership",
+                    time(at),
+                    flight.relays
+                )
+            }
         },
     );
     let known = flight

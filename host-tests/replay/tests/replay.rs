@@ -20,6 +20,7 @@ use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission::mission;
 use uav_relay_sim::simulator::drones::FlightSpec;
 use uav_relay_sim::simulator::faults::LinkSpec;
+use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::{Link, OnAir};
 use uav_relay_sim::simulator::setup::Setup;
 
@@ -32,10 +33,14 @@ struct Flown {
     places: BTreeMap<u16, [f64; 2]>,
 }
 
-/// Flies a chain over wires, whose ground station at Tx watches. Relay 2 is switched off at `kill_s`.
-fn fly(relays: u16, seconds: u64, kill_s: Option<u64>) -> Flown {
+/// Flies a chain whose ground station at Tx watches: over wires, or on a shared channel. Relay 2 is switched off at `kill_s`.
+fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown {
     let (mission, _) = mission(&Scenario::default(), relays, 1e-4).unwrap();
-    let mut setup = Setup::new(mission);
+    let mut setup = if is_shared {
+        Setup::on_air(mission, Access::Csma)
+    } else {
+        Setup::new(mission)
+    };
     setup.link = LinkSpec {
         baud: 57_600,
         latency: uav_relay::Duration::from_millis(LATENCY_MS),
@@ -97,12 +102,13 @@ fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) ->
     let mut capture = Capture::new(std::fs::File::create(&path).unwrap(), "a test", "").unwrap();
     let port = capture.interface("port", "").unwrap();
     for (number, frame) in flown.frames.iter().enumerate() {
-        let Link::After(before) = frame.link else {
-            panic!()
-        };
         let end = frame.at.as_micros() as f64 / 1e6;
         let sender = sender(&frame.bytes);
-        if (node != before && node != before + 1) || end >= end_s {
+        let hears = match frame.link {
+            Link::After(before) => node == before || node == before + 1,
+            Link::Shared => sender.abs_diff(node) <= 4,
+        };
+        if !hears || end >= end_s {
             continue;
         }
         let (time, direction) = if sender == node {
@@ -142,7 +148,7 @@ const EPOCH: f64 = 1.8e9;
 
 #[test]
 fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
-    let flown = fly(3, 150, None);
+    let flown = fly(3, false, 150, None);
     let folder = tempfile::tempdir().unwrap();
     let clocks = [
         Clock {
@@ -206,7 +212,176 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
             "{relay:?}, but {x} {y}"
         );
     }
-    assert!(shown.available.unwrap().1 > 0.9, "{:?}", shown.available);
+    assert!(shown.available.unwrap().1[0] > 0.9, "{:?}", shown.available);
     // The mission of the default scenario is known by its digest.
     assert!(shown.worst_db.last().unwrap().is_some());
+}
+
+/// Returns the captures of all nodes, by one clock. Relay 2 is switched off at `kill_s`.
+fn captures(flown: &Flown, folder: &Path, relays: u16, kill_s: f64) -> Vec<PathBuf> {
+    let clock = Clock {
+        offset: EPOCH,
+        ..Clock::default()
+    };
+    let end_s = |node| if node == 2 { kill_s } else { f64::INFINITY };
+    let nodes = 0..=relays;
+    nodes
+        .map(|node| capture(flown, folder, node, clock, end_s(node)))
+        .collect()
+}
+
+#[test]
+fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let flown = fly(3, false, 40, None);
+    let files = captures(&flown, folder.path(), 3, f64::INFINITY);
+    let whole = std::fs::read(&files[1]).unwrap();
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    // Another link type in the description of the interface.
+    let mut ethernet = whole.clone();
+    let at = ethernet
+        .windows(4)
+        .position(|it| it == [147, 0, 0, 0])
+        .unwrap();
+    ethernet[at] = 1;
+    // A fault in the middle of each frame.
+    let mut noise = Capture::new(Vec::new(), "", "").unwrap();
+    let port = noise.interface("", "").unwrap();
+    for frame in &flown.frames {
+        let mut bytes = frame.bytes.clone();
+        bytes[9] ^= 0x55;
+        let frame = Frame {
+            at: Duration::ZERO,
+            bytes: &bytes,
+            len: bytes.len(),
+            direction: Direction::In,
+            comment: "",
+        };
+        noise.frame(port, &frame).unwrap();
+    }
+    let late = folder.path().join("late");
+    std::fs::create_dir(&late).unwrap();
+    let day = Clock {
+        offset: EPOCH + 86_400.0,
+        ..Clock::default()
+    };
+    let next_day = capture(&fly(3, false, 20, Some(15)), &late, 2, day, f64::INFINITY);
+    let fleet = folder.path().join("other");
+    std::fs::create_dir(&fleet).unwrap();
+    let other = captures(&fly(4, false, 20, None), &fleet, 4, f64::INFINITY);
+    for (file, why) in [
+        (write("empty.pcapng", &[]), "has no frames of relays"),
+        (
+            write("text.pcapng", b"x_m,y_m\n1,2\n"),
+            "is not a capture (pcapng)",
+        ),
+        (
+            write("cut.pcapng", &whole[..100]),
+            "is not a valid capture: the file ends inside a pcapng block",
+        ),
+        (
+            write("ethernet.pcapng", &ethernet),
+            "has no frames of relays",
+        ),
+        (
+            write("noise.pcapng", &noise.finish().unwrap()),
+            "is an intact frame of a relay",
+        ),
+        (
+            folder.path().join("absent.pcapng"),
+            "cannot be read: No such file or directory",
+        ),
+        (other[2].clone(), "the files are of different chains"),
+        (
+            next_day,
+            "24.0 h apart from them by its clock: not of the same flight",
+        ),
+    ] {
+        let error = replay(&[files[0].clone(), file.clone()], None).unwrap_err();
+        println!("{error}");
+        assert!(
+            error.starts_with(&*file.to_string_lossy()) && error.contains(why),
+            "{error}"
+        );
+    }
+    let text = uav_relay_scenario::DEFAULT.replace("distance_m = 1000", "distance_m = 900");
+    let scenario = write("other.toml", text.as_bytes());
+    let error = replay(&files, Some(&scenario)).unwrap_err();
+    assert!(
+        error.contains("other.toml: its mission of 3 relays is not the one"),
+        "{error}"
+    );
+    // A companion that lost its power: its frames until then are used.
+    let cut = write("lost_power.pcapng", &whole[..whole.len() / 2]);
+    let shown = replay(&[files[0].clone(), cut, files[2].clone()], None).unwrap();
+    assert!(
+        shown.warnings[0].contains("lost_power.pcapng: damaged after"),
+        "{:?}",
+        shown.warnings
+    );
+    assert_eq!(shown.warnings.len(), 1, "{:?}", shown.warnings);
+}
+
+#[test]
+fn ten_minutes_of_eight_relays_are_a_small_page_with_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let flown = fly(8, true, 600, Some(300));
+    let files = captures(&flown, folder.path(), 8, 300.0);
+    let shown = replay(&files, None).unwrap();
+    let (flight, html) = (&shown.flight, &shown.html);
+    println!(
+        "{} frames, page of {} bytes",
+        flown.frames.len(),
+        html.len()
+    );
+    assert!(html.len() < 5_000_000, "{}", html.len());
+    assert_eq!(shown.warnings, Vec::<String>::new());
+    let (from, [all, members]) = flight.available.unwrap();
+    assert!(
+        from < 60.0 && (0.3..0.6).contains(&all) && members > 0.9,
+        "{:?}",
+        flight.available
+    );
+    // Relay 2 is lost for good, and the others close up.
+    let [loss] = flight.losses.as_slice() else {
+        panic!("{:?}", flight.losses)
+    };
+    assert!(
+        loss.relay == 2 && (loss.from - 300.0).abs() < 2.0 && loss.until.is_none(),
+        "{loss:?}"
+    );
+    assert_eq!(flight.views.last().unwrap().2, 7);
+    assert!(
+        flight
+            .alarms
+            .iter()
+            .any(|it| it.text.starts_with("relay 2")),
+        "{:?}",
+        flight.alarms
+    );
+    let nearest = flight.nearest.unwrap();
+    assert!((10.0..100.0).contains(&nearest.distance_m), "{nearest:?}");
+    for (relay, [x, y]) in flown.places.iter().filter(|(relay, _)| **relay != 2) {
+        let shown = flight
+            .last
+            .relays
+            .iter()
+            .find(|it| it.number == *relay)
+            .unwrap();
+        let at = shown.position.unwrap();
+        assert!(
+            (at.x_m - x).hypot(at.y_m - y) < 1.0,
+            "{shown:?}, but {x} {y}"
+        );
+    }
+    // Nothing is loaded from elsewhere, and no text of a file becomes a part of the page.
+    assert!(
+        !html.contains("src=\"")
+            && !html.contains("href=\"/")
+            && html.contains("default-src 'none'")
+    );
 }
