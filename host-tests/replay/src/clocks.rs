@@ -109,18 +109,34 @@ fn add(aligned: &mut Aligned, frames: &[Frame]) {
     }
 }
 
-/// Merges the frames of all files: sorts them by the clock of the first one, each frame once. Also returns the relations of the clocks, in
-/// the order of the files, and warnings.
+/// Frames of all files.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// Frames, sorted by the clock of the first file, each once.
+    pub frames: Vec<Frame>,
+    /// Relations of the clocks, in the order of the files.
+    pub files: Vec<Alignment>,
+    /// Warnings, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Merges the frames of all files.
 ///
 /// # Errors
 /// One line that names a file of another chain or another flight.
-pub fn merge(
-    mut files: Vec<Recording>,
-) -> Result<(Vec<Frame>, Vec<Alignment>, Vec<String>), String> {
+pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     let mut warnings = Vec::new();
     if let Some(first) = files.first() {
         for other in &files {
             one_chain(first, other)?;
+        }
+        let pairs = first.frames.windows(2);
+        let steps = pairs.filter_map(|pair| Some(pair.last()?.at - pair.first()?.at));
+        if let Some(step) = { steps }.find(|step| *step < -STEP || *step > APART) {
+            warnings.push(format!(
+                "{}: its clock is that of the flight, but steps by {step:.1} s: name a file with a steady clock first",
+                first.name
+            ));
         }
     }
     for file in &files {
@@ -171,7 +187,11 @@ pub fn merge(
     // A frame that was captured by several nodes, or replayed by an attacker, counts once.
     let mut known = std::collections::HashSet::new();
     frames.retain(|frame| known.insert(frame.wire.clone()));
-    Ok((frames, alignments.into_iter().flatten().collect(), warnings))
+    Ok(Merged {
+        frames,
+        files: alignments.into_iter().flatten().collect(),
+        warnings,
+    })
 }
 
 fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
@@ -213,11 +233,23 @@ fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     ))
 }
 
+/// Returns the frame before which the file's clock changes most, after frame `from` and up to frame `to`.
+fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
+    let change = |index: &usize| {
+        let [one, other] =
+            [index.saturating_sub(1), *index].map(|it| frames.get(it).map_or(0.0, |it| it.at));
+        (other - one).abs()
+    };
+    let all = from + 1..=to;
+    all.max_by(|one, other| change(one).total_cmp(&change(other)))
+        .unwrap_or(to)
+}
+
 /// Converts the times of a file to the reference clock.
 fn align(file: &mut Recording, aligned: &Aligned, common: Option<usize>) -> Alignment {
     let own = once(&file.frames);
     let mut windows: Vec<(usize, Vec<Window>)> = Vec::new();
-    let (mut last, mut begun) = (f64::INFINITY, 0.0);
+    let (mut last, mut begun, mut before) = (f64::INFINITY, 0.0, 0);
     for (index, frame) in file.frames.iter().enumerate() {
         let is_once = own.get(frame.wire.as_slice()) == Some(&Some(index));
         let Some(other) = aligned.get(&frame.wire).filter(|_| is_once) else {
@@ -225,13 +257,15 @@ fn align(file: &mut Recording, aligned: &Aligned, common: Option<usize>) -> Alig
         };
         let offset = other.0 - frame.at;
         if (offset - last).abs() > STEP {
-            windows.push((
-                if windows.is_empty() { 0 } else { index },
-                vec![Window::default()],
-            ));
+            let from = if windows.is_empty() {
+                0
+            } else {
+                step_between(&file.frames, before, index)
+            };
+            windows.push((from, vec![Window::default()]));
             begun = frame.at;
         }
-        last = offset;
+        (last, before) = (offset, index);
         if let Some((_, windows)) = windows.last_mut() {
             if frame.at >= begun + WINDOW {
                 windows.push(Window::default());

@@ -438,11 +438,18 @@ fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
 /// Returns a snapshot as JSON with rounded numbers. A relay has the time of its report, `at_s`, in place of its age, which always changes.
 fn compact(snapshot: &Snapshot, now: f64) -> Value {
     let mut value = serde_json::to_value(snapshot).unwrap_or_default();
-    for relay in value["relays"].as_array_mut().into_iter().flatten() {
-        let age = relay["age_s"].take().as_f64();
-        relay["at_s"] = age.map_or(Value::Null, |age| (now - age).into());
+    if let Some(all) = value.as_object_mut() {
+        all.remove("time_s");
+        let relays = all.get_mut("relays").and_then(Value::as_array_mut);
+        for relay in relays
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_object_mut)
+        {
+            let age = relay.remove("age_s").and_then(|age| age.as_f64());
+            relay.insert("at_s".to_owned(), age.map(|age| now - age).into());
+        }
     }
-    value["time_s"].take();
     round(&mut value);
     value
 }

@@ -48,7 +48,11 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
         files.iter().map(|file| Recording::load(file)).collect();
     let recordings = recordings?;
     let digest = recordings.iter().find_map(|it| it.mission);
-    let (frames, files, mut warnings) = clocks::merge(recordings)?;
+    let clocks::Merged {
+        frames,
+        files,
+        mut warnings,
+    } = clocks::merge(recordings)?;
     let largest = flight::largest(&frames);
     if largest == 0 {
         let names: Vec<&str> = files.iter().map(|it| it.name.as_str()).collect();

@@ -19,22 +19,21 @@ const CHART: [f64; 4] = [1000.0, 180.0, 44.0, 22.0];
 
 /// Returns the page of a flight as HTML that loads nothing. `name` is the title of the report.
 pub fn page(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
-    let file = |name: &str| {
-        FILES
-            .iter()
-            .find(|(path, ..)| *path == name)
-            .map_or("", |(_, _, content)| *content)
+    let file = |name: Option<&str>| {
+        let mut files = FILES.iter();
+        let file = files.find(|(path, ..)| Some(*path) == name);
+        file.map_or(("", ""), |(_, media, content)| (*media, *content))
     };
     let (mut head, mut scripts, mut hashes) = (String::new(), String::new(), String::new());
     let (mut index, mut style) = (String::new(), String::new());
     // The page of the screen refers to its files one in a line.
-    for line in file("/").lines() {
-        let path = line.split('"').find(|part| part.starts_with('/'));
-        match path {
-            Some(path) if path.ends_with(".js") => script(file(path), &mut scripts, &mut hashes),
-            Some(path) if path.ends_with(".css") => style.push_str(file(path)),
-            Some(_) => head.push_str("<link rel=\"icon\" href=\"data:,\">\n"),
-            None => {
+    for line in file(Some("/")).1.lines() {
+        let (media, content) = file(line.split('"').find(|part| part.starts_with('/')));
+        match media.split(';').next() {
+            Some("text/javascript") => script(content, &mut scripts, &mut hashes),
+            Some("text/css") => style.push_str(content),
+            Some("image/svg+xml") => head.push_str("<link rel=\"icon\" href=\"data:,\">\n"),
+            _ => {
                 index.push_str(line);
                 index.push('\n');
             }

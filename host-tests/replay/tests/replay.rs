@@ -96,7 +96,8 @@ impl Clock {
     }
 }
 
-/// Writes the capture of `node`, by its clock, until it is switched off at `end_s`.
+/// Writes the capture of `node`, by its clock, until it is switched off at `end_s`. From second 70 to 71.5 it has received nothing, so that
+/// no frame connects the clocks just after a step.
 fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) -> PathBuf {
     let path = folder.join(format!("node{node}.pcapng"));
     let mut capture = Capture::new(std::fs::File::create(&path).unwrap(), "a test", "").unwrap();
@@ -113,7 +114,7 @@ fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) ->
         }
         let (time, direction) = if sender == node {
             (end - frame.bytes.len() as f64 / 5_760.0, Direction::Out)
-        } else if frame.note.is_empty() {
+        } else if frame.note.is_empty() && !(70.0..71.5).contains(&end) {
             // A program reads up to 8 ms after the last byte.
             let late = LATENCY_MS as f64 + (number * 7 % 9) as f64;
             (end + late / 1e3, Direction::In)
@@ -157,12 +158,12 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
         },
         Clock {
             offset: EPOCH + 7.25,
-            drift: 80e-6,
+            drift: 100e-6,
             step: None,
         },
         Clock {
             offset: EPOCH - 3_000.5,
-            drift: -60e-6,
+            drift: -100e-6,
             step: None,
         },
         Clock {
@@ -171,14 +172,14 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
             step: Some((70.0, EPOCH)),
         },
     ];
-    let files: Vec<PathBuf> = clocks
-        .iter()
-        .enumerate()
-        .map(|(node, clock)| capture(&flown, folder.path(), node as u16, *clock, f64::INFINITY))
+    let files: Vec<PathBuf> = (0..)
+        .zip(clocks)
+        .map(|(node, clock)| capture(&flown, folder.path(), node, clock, f64::INFINITY))
         .collect();
     let recordings = files.iter().map(|file| Recording::load(file).unwrap());
-    let (frames, alignments, warnings) = clocks::merge(recordings.collect()).unwrap();
-    assert_eq!(warnings, Vec::<String>::new());
+    let merged = clocks::merge(recordings.collect()).unwrap();
+    let (frames, alignments) = (merged.frames, merged.files);
+    assert_eq!(merged.warnings, Vec::<String>::new());
     assert!(
         alignments[1..].iter().all(|it| it.common > Some(100)),
         "{alignments:?}"
@@ -201,7 +202,7 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
         most * 1e3
     );
     assert!(errors.len() * 10 > flown.frames.len() * 9);
-    assert!(most < 0.05, "{most} s");
+    assert!(most < 0.01, "{most} s");
 
     let shown = replay(&files, None).unwrap().flight;
     for relay in &shown.last.relays {
