@@ -113,7 +113,12 @@ impl Flight {
     pub fn new(frames: &[Frame], relays: u16, loaded: Option<&Loaded>) -> Self {
         let begin = frames.first().map_or(0.0, |frame| frame.at);
         let duration = frames.last().map_or(0.0, |frame| frame.at - begin);
-        let period = PERIOD.max((duration / MOST).ceil());
+        let is_long = duration > MOST * PERIOD;
+        let period = if is_long {
+            (duration / MOST).ceil()
+        } else {
+            PERIOD
+        };
         let mut flight = Self {
             begin,
             duration,

@@ -339,6 +339,11 @@ fn ten_minutes_of_eight_relays_are_a_small_page_with_a_report() {
         flown.frames.len(),
         html.len()
     );
+    assert!(
+        (1_190..=1_201).contains(&flight.steps.len()),
+        "{}",
+        flight.steps.len()
+    );
     assert!(html.len() < 5_000_000, "{}", html.len());
     assert_eq!(shown.warnings, Vec::<String>::new());
     let (from, [all, members]) = flight.available.unwrap();
