@@ -15,7 +15,7 @@ local messages = {
         { name = "reach_m", kind = "list", most = 16, of = { kind = "f32" }, unit = "m from Tx", text = "reach for target 0, 1, ...: the sender's position" },
     } },
     [0x01] = { name = "Verdict", fields = {
-        { name = "number", kind = "u16", unit = "", text = "number of the sweep" },
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "own", kind = "bool", unit = "", text = "true if the sender or a relay after it has a profile of its own: another power than the mission's common one, or a fixed altitude where relays choose theirs" },
         { name = "commit", kind = "option", of = { kind = "u8" }, unit = "", text = "index of the target for which every relay now takes its position" },
@@ -85,7 +85,7 @@ local messages = {
         { name = "sir", kind = "f32", unit = "linear SIR", text = "SIR of the chain before this pass; 0 if unknown" },
     } },
     [0x09] = { name = "Moved", fields = {
-        { name = "number", kind = "u16", unit = "", text = "number of the pass" },
+        { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "x_m", kind = "f32", unit = "m from Tx", text = "current x of the sender" },
         { name = "altitude_m", kind = "f32", unit = "m", text = "current altitude of the sender" },
@@ -174,9 +174,9 @@ local messages = {
         { name = "tx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Tx, positive north", per = 10000000, base = "degrees" },
         { name = "tx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Tx, positive east", per = 10000000, base = "degrees" },
         { name = "tx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Tx above mean sea level" },
-        { name = "rx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "latitude of Rx, positive north", per = 10000000, base = "degrees" },
-        { name = "rx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "longitude of Rx, positive east", per = 10000000, base = "degrees" },
-        { name = "rx_amsl_mm", kind = "i32", unit = "mm", text = "height of the ground at Rx above mean sea level" },
+        { name = "rx_lat_e7", kind = "i32", unit = "1e-7 degrees", text = "that of Rx", per = 10000000, base = "degrees" },
+        { name = "rx_lon_e7", kind = "i32", unit = "1e-7 degrees", text = "that of Rx", per = 10000000, base = "degrees" },
+        { name = "rx_amsl_mm", kind = "i32", unit = "mm", text = "that at Rx" },
         { name = "offer_number", kind = "u16", unit = "", text = "number of the receiver's hello that the offer answers; 0 for none" },
     } },
     [0x0f] = { name = "Pulse", fields = {
@@ -185,7 +185,7 @@ local messages = {
         { name = "lease_ds", kind = "u16", unit = "0.1 s", text = "duration of the lease after a member has taken part in a renewal", per = 10, base = "s" },
     } },
     [0x10] = { name = "Pulsed", fields = {
-        { name = "number", kind = "u16", unit = "", text = "number of the renewal" },
+        { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: it has reached the last relay, and the acknowledgement has come back from there" },
     } },
@@ -236,6 +236,28 @@ local messages = {
         { name = "other_number", kind = "u32", unit = "", text = "last claim number that the claiming node has received from another node of its number; 0 for none" },
         { name = "flags", kind = "flags", words = { "passive", "echo" }, unit = "", text = "flags" },
     } },
+    [0x15] = { name = "Watch", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the request, wrapping" },
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the relays were loaded with" },
+    } },
+    [0x16] = { name = "Report", fields = {
+        { name = "number", kind = "u16", unit = "", text = "number of the request, wrapping" },
+        { name = "mission", kind = "digest", unit = "", text = "digest of the mission that the relays were loaded with" },
+        { name = "detail", kind = "option", of = { kind = "group", fields = {
+            { name = "setpoint", kind = "array", size = 3, of = { kind = "i24" }, unit = "0.25 m", text = "x, y, altitude of the setpoint", per = 4, base = "m" },
+            { name = "agreed", kind = "array", size = 3, of = { kind = "i24" }, unit = "0.25 m", text = "the same of the agreed position", per = 4, base = "m" },
+            { name = "before", kind = "u8", unit = "", text = "distance to the neighbour toward Tx, in numbers; 0 for none" },
+            { name = "after", kind = "u8", unit = "", text = "the same toward Rx" },
+            { name = "interference", kind = "u16", unit = "", text = "upper half of an f32: measured interference in W; 0 for none" },
+            { name = "version", kind = "u16", unit = "", text = "version of the flown mission" },
+        } }, unit = "", text = "details of the relay in the first entry:" },
+        { name = "entries", kind = "list", most = 4, of = { kind = "group", fields = {
+            { name = "relay", kind = "u16", unit = "", text = "number of the relay" },
+            { name = "age_ds", kind = "u8", unit = "0.1 s", text = "age of the state; 255: 25.5 s or more", per = 10, base = "s" },
+            { name = "state", kind = "u16", unit = "", text = "phase + 8 h + 64 k + 512 s + 1024 t + 4096 c" },
+            { name = "position", kind = "array", size = 3, of = { kind = "i24" }, unit = "0.25 m", text = "x, y, altitude of the drone", per = 4, base = "m" },
+        } }, unit = "", text = "states" },
+    } },
 }
 
 local handshake = { name = "Handshake", fields = {
@@ -278,6 +300,7 @@ local plain = {
     u16 = { 2, ProtoField.uint16 },
     u32 = { 4, ProtoField.uint32 },
     u64 = { 8, ProtoField.uint64 },
+    i24 = { 3, ProtoField.int24 },
     i32 = { 4, ProtoField.int32 },
     f32 = { 4, ProtoField.float },
     f64 = { 8, ProtoField.double },
@@ -424,7 +447,7 @@ function read(tree, field, body)
             item:append_text(field.per and string.format(" x %s", field.unit) or " " .. field.unit)
         end
         if field.per then
-            local number = kind == "i32" and range:le_int() or range:le_uint()
+            local number = (kind == "i24" or kind == "i32") and range:le_int() or range:le_uint()
             item:append_text(string.format(" = %.10g %s", number / field.per, field.base))
         elseif kind == "view" and range:le_uint() > 0 then
             local view = range:le_uint()

@@ -61,7 +61,7 @@ pub type Delivery = Box<dyn FnMut(&mut Frame) -> bool>;
 pub struct Bench {
     pub relays: Vec<Relay>,
     /// Ground stations at the transmitter and at the receiver; `None` where there is none.
-    pub grounds: [Option<Ground>; 2],
+    pub grounds: [Option<Box<Ground>>; 2],
     /// Index in the chain, from 1, of each entry of `relays`. A copy of a relay has the same index.
     places: Vec<usize>,
     pub now: Instant,
@@ -123,7 +123,7 @@ impl Bench {
     ///
     /// `base` is the mission loaded into it before flight, `auth` authenticates its frames.
     pub fn ground(&mut self, base: &Mission, end: Side, auth: Auth) -> &mut Ground {
-        let ground = || Ground::new(base, end, NETWORK, Wiring::Pair, auth);
+        let ground = || Box::new(Ground::new(base, end, NETWORK, Wiring::Pair, auth));
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
@@ -147,7 +147,7 @@ impl Bench {
                 .grounds
                 .iter()
                 .flatten()
-                .filter_map(Ground::poll_timeout);
+                .filter_map(|ground| ground.poll_timeout());
             let arrival = self.flying.front().map(|frame| frame.at);
             let next = timers.chain(grounds).chain(arrival).min();
             let Some(next) = next.filter(|next| *next <= until) else {

@@ -9,8 +9,6 @@
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
 //! | `Outdated` | holds a newer mission | done: the upload needs a larger version |
 
-#[cfg(feature = "telemetry")]
-use crate::mission::MAX_RELAYS;
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
@@ -38,6 +36,10 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
+
+/// Maximum number of relays whose reports are stored, 11 KB in all.
+#[cfg(feature = "telemetry")]
+const REPORTED: usize = 128;
 
 /// Time between two requests to one relay for the reports of all relays.
 #[cfg(feature = "telemetry")]
@@ -230,15 +232,15 @@ impl Ground {
 
     /// Requests the reports of all relays from now on, or no longer.
     ///
-    /// The station repeats the request every 5 s. Relays report for 30 s after the last request.
+    /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
     #[cfg(feature = "telemetry")]
     pub fn watch(&mut self, now: Instant, is_on: bool) {
         let now = self.clock.advance(now);
         self.watching.repeat_at = is_on.then_some(now);
-        self.watching.request(now, self.reach);
+        self.watching.request(now, self.reach, self.node.into());
     }
 
-    /// Returns the newest report of every relay, by number: of up to 1000 relays.
+    /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
     ///
     /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
     /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
@@ -448,7 +450,7 @@ impl Ground {
         #[cfg(feature = "telemetry")]
         {
             self.watching.apply(now);
-            self.watching.request(now, self.reach);
+            self.watching.request(now, self.reach, self.node.into());
         }
         if self.repeat_at.is_none_or(|again| again > now) {
             return;
@@ -592,7 +594,7 @@ struct Watching {
     /// Entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
     /// Newest report of every relay, by rising number.
-    reports: heapless::Vec<Report, { MAX_RELAYS as usize }>,
+    reports: heapless::Vec<Report, REPORTED>,
 }
 
 #[cfg(feature = "telemetry")]
@@ -612,9 +614,10 @@ impl Watching {
     }
 
     /// Schedules the request to the next of the `reach` nearest relays, the farthest first, if it is due.
-    fn request(&mut self, now: Instant, reach: u16) {
+    fn request(&mut self, now: Instant, reach: u16, node: u64) {
         if self.repeat_at.is_some_and(|at| at <= now) {
-            let turn = WATCH_EVERY.as_micros() / u64::from(reach.max(1));
+            // Two stations do not request at the same time again and again.
+            let turn = (WATCH_EVERY.as_micros() + 100_000 * (node % 7)) / u64::from(reach.max(1));
             self.repeat_at = Some(now + Duration::from_micros(turn));
             if self.distance <= 1 {
                 self.number = self.number.wrapping_add(1);

@@ -35,6 +35,7 @@ pub(crate) mod duplicate;
 mod lease;
 pub(crate) mod mission_update;
 pub(crate) mod neighbour;
+#[cfg_attr(not(feature = "telemetry"), path = "handing_on.rs")]
 pub(crate) mod reports;
 pub(crate) mod round;
 pub(crate) mod sample;

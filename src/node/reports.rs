@@ -2,16 +2,16 @@
 //!
 //! | event | action |
 //! | --- | --- |
-//! | new Watch received from a side | report toward that side for 30 s; hand the Watch on to the other side |
+//! | new Watch received from a side | report toward that side for 60 s; hand the Watch on to the other side |
 //! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 25 s |
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
-//! On a shared channel a Watch is handed on to the relay four numbers away, and every other one to the neighbour, too: reports
+//! On a shared channel a Watch is handed on to the relay four numbers away, and every fourth one to the neighbour, too: reports
 //! then skip relays. Without a destination reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
-//! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry` a relay hands on each Watch
-//! and each Report to its other neighbour, the latest only, and stores nothing.
+//! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
+//! `handing_on` takes the place of this file.
 
 use heapless::Vec;
 
@@ -24,11 +24,8 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
-/// True if the crate is built with the feature `telemetry`.
-const TELEMETRY: bool = cfg!(feature = "telemetry");
-
 /// Time after the last Watch for which a relay reports.
-const WATCHED: Duration = Duration::from_millis(30_000);
+const WATCHED: Duration = Duration::from_millis(60_000);
 
 /// Time after a Watch for which its sender is the destination of reports: four lost ones do not change it.
 const DESTINED: Duration = Duration::from_millis(25_000);
@@ -58,15 +55,8 @@ const FRAME: u32 = 32;
 const SHARE: u32 = 24;
 
 /// Reports of one relay, and those that it hands on.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting {
-    state: [State; TELEMETRY as usize],
-    /// Message that is handed on, and the side of its destination. Only without the feature `telemetry`.
-    handed: [Option<(Side, Message)>; !TELEMETRY as usize],
-}
-
-#[derive(Clone, Debug)]
-struct State {
     /// Last position of the drone, and when it was measured.
     position: Option<(Instant, Placement)>,
     /// Control state of the drone, from 1; 0 without an autopilot.
@@ -92,7 +82,7 @@ struct Stored {
 }
 
 /// Side with a ground station that watches.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Watched {
     number: u16,
     until: Instant,
@@ -114,53 +104,20 @@ struct Watched {
     is_fed: bool,
 }
 
-impl Watched {
-    const NONE: Self = Self {
-        number: 0,
-        until: Instant::ZERO,
-        to: None,
-        to_until: Instant::ZERO,
-        hand_on: 0,
-        hand_on_at: Instant::ZERO,
-        due: Instant::ZERO,
-        free: Instant::ZERO,
-        own_from: Instant::ZERO,
-        count: 0,
-        is_fed: false,
-    };
-}
-
-/// State of the relay that its own entry contains.
-#[derive(Clone, Copy)]
-pub(crate) struct Own {
-    /// Phase, hold reasons and flags, as in an entry.
-    pub(crate) state: u16,
-    /// Setpoint and agreed position.
-    pub(crate) places: [Option<Placement>; 2],
-}
+/// State of the relay for its own entry: phase, hold reasons and flags, as in an entry; setpoint and agreed position.
+pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
-    pub(crate) const NONE: Self = Self {
-        state: [const { State::NONE }; TELEMETRY as usize],
-        handed: [const { None }; !TELEMETRY as usize],
-    };
-
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
-        if let Some(state) = self.state.first_mut() {
-            state.position = Some((at, place));
-        }
+        self.position = Some((at, place));
     }
 
     pub(crate) fn handle_measured(&mut self, power_w: f32) {
-        if let Some(state) = self.state.first_mut() {
-            state.power_w = power_w;
-        }
+        self.power_w = power_w;
     }
 
     pub(crate) fn handle_control(&mut self, control: u16) {
-        if let Some(state) = self.state.first_mut() {
-            state.control = control;
-        }
+        self.control = control;
     }
 
     /// Handles a Watch or a Report from node `from` at `side`. Returns false if an entry is of a relay that is not
@@ -172,15 +129,9 @@ impl Reporting {
         (side, from): (Side, u16),
         message: &Message,
     ) -> bool {
-        if let Some(handed) = self.handed.first_mut() {
-            *handed = Some((side.other(), message.clone()));
-        }
-        let Some(state) = self.state.first_mut() else {
-            return true;
-        };
         match message {
-            Message::Watch { number, .. } => state.on_watch(now, member, (side, from), *number),
-            Message::Report(report) => return state.on_report(now, member, (side, from), report),
+            Message::Watch { number, .. } => self.on_watch(now, member, (side, from), *number),
+            Message::Report(report) => return self.on_report(now, member, (side, from), report),
             _ => {}
         }
         true
@@ -196,16 +147,8 @@ impl Reporting {
         wait: Duration,
         own: Own,
     ) -> Option<(Side, u16, Message)> {
-        if let Some(handed) = self.handed.first_mut()
-            && let Some((side, message)) = handed.take()
-        {
-            let is_watch = matches!(message, Message::Watch { .. });
-            let to = next(member, neighbours, side).filter(|to| !is_watch || is_relay(member, *to));
-            return Some((side, to?, message));
-        }
-        let state = self.state.first_mut()?;
         for side in [Side::Upstream, Side::Downstream] {
-            let watched = state.at(side);
+            let watched = self.at(side);
             watched.expire(now);
             let is_ready = |at| now >= at + wait;
             while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
@@ -230,7 +173,7 @@ impl Reporting {
             if let Some(at) = watched.report_at()
                 && is_ready(at)
                 && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
-                && let Some(report) = state.report(now, member, neighbours, side, own)
+                && let Some(report) = self.report(now, member, neighbours, side, own)
             {
                 return Some((side, to, Message::Report(report)));
             }
@@ -240,26 +183,22 @@ impl Reporting {
 
     /// Records that the relay's timers have been handled up to `now`.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
-        if let Some(state) = self.state.first_mut() {
-            state.checked = now;
-        }
+        self.checked = now;
     }
 
     /// Returns true if a Watch or a Report may be due.
     pub(crate) fn is_due(&self, now: Instant, wait: Duration) -> bool {
-        self.handed.iter().any(Option::is_some) || self.times(wait).any(|at| at <= now)
+        self.times(wait).any(|at| at <= now)
     }
 
     /// Returns the time of the next Watch or Report.
     pub(crate) fn next_timeout(&self, wait: Duration) -> Option<Instant> {
-        let checked = self.state.first()?.checked;
-        self.times(wait).filter(|at| *at > checked).min()
+        self.times(wait).filter(|at| *at > self.checked).min()
     }
 
     /// Returns the times at which a Watch or a Report is due.
     fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
-        let sides = self.state.iter().flat_map(|state| &state.watched);
-        let times = sides.flat_map(|watched| {
+        let times = self.watched.iter().flat_map(|watched| {
             let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
             [watched.report_at(), hand_on]
         });
@@ -289,10 +228,10 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 30 s after the last request, and forgets a destination that has sent none for 25 s.
+    /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s.
     fn expire(&mut self, now: Instant) {
         if now >= self.until {
-            *self = Self::NONE;
+            *self = Self::default();
         } else if now >= self.to_until {
             self.to = None;
         }
@@ -304,16 +243,7 @@ impl Watched {
     }
 }
 
-impl State {
-    const NONE: Self = Self {
-        position: None,
-        control: 0,
-        power_w: 0.0,
-        stored: Vec::new(),
-        watched: [Watched::NONE; 2],
-        checked: Instant::ZERO,
-    };
-
+impl Reporting {
     const fn at(&mut self, side: Side) -> &mut Watched {
         let [upstream, downstream] = &mut self.watched;
         match side {
@@ -340,7 +270,7 @@ impl State {
             watched.hand_on_at = now + turn;
             watched.hand_on |= match member.settings.wiring {
                 Wiring::Pair => mask(1),
-                Wiring::Shared if begins || number.is_multiple_of(2) => mask(1) | mask(CANDIDATES),
+                Wiring::Shared if begins || number.is_multiple_of(4) => mask(1) | mask(CANDIDATES),
                 Wiring::Shared => mask(CANDIDATES),
             };
         } else if ahead != 0 {
@@ -438,7 +368,7 @@ impl State {
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
             let age = position.map_or(0, |(at, _)| age(now, at));
-            let entry = Entry::new(member.node, age, own.state + 4096 * control, at);
+            let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }
         self.stored
@@ -469,7 +399,7 @@ impl State {
         if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
             let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
             let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
-            let places = own.places.map(Coarse::of);
+            let places = own.1.map(Coarse::of);
             report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
             watched.count = 1;
         } else if is_due && !watched.count.is_multiple_of(8) {
@@ -477,11 +407,13 @@ impl State {
         }
         let entries = u32::try_from(report.entries.len()).unwrap_or(0);
         let detail = report.detail.map_or(0, |_| SHARE);
-        // Half a period's share may be sent at once.
         let half = micros(period) / 2;
-        let saved = now.as_micros().saturating_sub(half.into());
-        watched.free = watched.free.max(Instant::from_micros(saved))
-            + byte.times(FRAME + 14 * entries + detail);
+        // On a shared channel half a period's share may be sent at once. On wires that would overflow the stores of relays nearer to the station.
+        let saved = match member.settings.wiring {
+            Wiring::Pair => now,
+            Wiring::Shared => Instant::from_micros(now.as_micros().saturating_sub(half.into())),
+        };
+        watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
         let late = Duration::from_micros((half / 4).into());
         if is_due {
             watched.own_from = now + late.times(6);
@@ -490,20 +422,24 @@ impl State {
             (true, _) => now,
             // The reports of relays behind come first.
             (false, true) => now + period + late,
-            (false, false) => now + period,
+            (false, false) => {
+                now + period
+                    + Duration::from_micros(late.as_micros() / 8)
+                        .times(micros(now.since(Instant::ZERO)) & 7)
+            }
         };
         watched.is_fed = false;
         (entries > 0).then_some(report)
     }
 
-    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take a twelfth of
+    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take an eleventh of
     /// the data rate.
     ///
     /// The data rate is at least a sweep in a `hop_time`. On a shared channel a relay may also take a twentieth of what its messages of an
     /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = micros(settings.hop_time) / 10;
+        let hop = micros(settings.hop_time) / 120 * 11;
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
             Wiring::Shared => {
@@ -513,7 +449,7 @@ impl State {
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);
-        Duration::from_micros(alone << u32::from(is_both))
+        Duration::from_micros(if is_both { alone * 9 / 4 } else { alone })
     }
 }
 
@@ -546,7 +482,7 @@ const fn all_loads(member: &Member) -> u32 {
 /// Returns the time between two reports of a relay. On wires it is that of the relay nearest to the station, which has the most to send.
 fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     let bytes = match member.settings.wiring {
-        Wiring::Pair => SHARE * (u32::from(member.all) + 1),
+        Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve
         Wiring::Shared => load(member, from_end(member, side)),
     };
     byte.times(bytes).max(LEAST_PERIOD)

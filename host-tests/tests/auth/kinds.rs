@@ -161,7 +161,7 @@ impl Attacker {
         let mut kinds: Vec<u8> = messages.iter().map(|message| message.0[0]).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        let all: Vec<u8> = (0..=20).collect();
+        let all: Vec<u8> = (0..=22).collect();
         assert_eq!(kinds, all);
         let mut rng = ChaCha8Rng::seed_from_u64(seed(1));
         rng.set_stream(stream);

@@ -69,7 +69,7 @@ fn messages_that_the_ground_may_not_send_are_misaddressed() {
         let mut after = met.clone();
         after.receive(0, &message);
         let expected = match message.name() {
-            "Hello" | "Offer" | "Level" => "received",
+            "Hello" | "Offer" | "Level" | "Watch" => "received",
             _ => "misaddressed",
         };
         assert_eq!(after.counted(), [expected], "{message:?}");

@@ -108,7 +108,7 @@ impl Node {
                 round: Round::new(leads, number, profile, settings, seed, now),
             },
             steering: Steering::NONE,
-            reporting: Reporting::NONE,
+            reporting: Reporting::default(),
             duplicate: IndexClaims::new(seed.rotate_left(24), now, settings),
             no_quorum_timer: NoQuorumTimer::NONE,
             echo: None,

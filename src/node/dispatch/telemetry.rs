@@ -24,7 +24,11 @@ impl Node {
         if !self.reporting.is_due(now, wait) {
             return None;
         }
-        let own = self.own();
+        let own = if cfg!(feature = "telemetry") {
+            self.own()
+        } else {
+            Own::default()
+        };
         let (member, neighbours) = (&self.member, &self.layers.neighbours);
         self.reporting.poll(now, member, neighbours, wait, own)
     }
@@ -36,7 +40,9 @@ impl Node {
             Phase::Holding | Phase::Infeasible | Phase::NoQuorum
         );
         match self.agreed_place() {
-            _ if is_idle || !self.searches() => Duration::from_micros(0),
+            _ if is_idle || !self.searches() || !cfg!(feature = "telemetry") => {
+                Duration::from_micros(0)
+            }
             Some(_) => PATIENCE,
             None => FIRST_PATIENCE,
         }
@@ -47,9 +53,7 @@ impl Node {
         let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
         let sides = [Side::Upstream, Side::Downstream];
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
-        Own {
-            state: self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d),
-            places: [self.setpoint(), self.agreed_place()],
-        }
+        let state = self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d);
+        (state, [self.setpoint(), self.agreed_place()])
     }
 }

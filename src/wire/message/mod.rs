@@ -15,7 +15,7 @@ mod view;
 
 pub use self::link::{Claim, Hello};
 pub use self::parts::MessageError;
-pub use self::report::{Coarse, Detail, Entry, MOST_ENTRIES, Reports};
+pub use self::report::{Coarse, Detail, Entry, Reports};
 pub use self::round::{
     AdjustStep, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, SweepVerdict, Token,
 };
@@ -130,7 +130,7 @@ pub enum Message {
 impl Message {
     /// Returns the digest in the message; `None` for a message without one. The receiver uses it to check that both
     /// nodes have the same mission, view or x axis.
-    pub const fn digest(&self) -> Option<u16> {
+    pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
             Self::Verdict(answer) => Some(answer.view_digest),

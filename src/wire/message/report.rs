@@ -9,7 +9,7 @@ use crate::node::neighbour::hearing::CANDIDATES;
 use crate::place::Placement;
 
 /// Maximum number of entries in one report. A relay without any feature then has room for the message.
-pub const MOST_ENTRIES: usize = 4;
+const MOST_ENTRIES: usize = 4;
 
 /// Coordinate of an unknown position, in quarters of a metre.
 const UNKNOWN: i32 = -(1 << 23);
@@ -124,6 +124,7 @@ impl Detail {
 }
 
 /// Report: states of relays, on their way to the ground station.
+#[cfg(feature = "telemetry")]
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Reports {
     pass: PassId,
@@ -133,6 +134,7 @@ pub struct Reports {
     pub entries: Vec<Entry, MOST_ENTRIES>,
 }
 
+#[cfg(feature = "telemetry")]
 impl Reports {
     /// Creates a report without entries, which answers the request `number`.
     pub const fn new(number: u16, mission: u16) -> Self {
@@ -176,5 +178,32 @@ impl Reports {
         } else {
             Err(MessageError::Value)
         }
+    }
+}
+
+/// Report whose content a relay without the feature `telemetry` hands on without decoding it.
+#[cfg(not(feature = "telemetry"))]
+#[derive(Clone, PartialEq, Debug)]
+pub struct Reports(Vec<u8, 86>);
+
+#[cfg(not(feature = "telemetry"))]
+impl Reports {
+    /// Returns the digest of the mission that the sender loaded before flight.
+    pub fn mission(&self) -> u16 {
+        let digest = self.0.get(2..4).and_then(<[u8]>::first_chunk);
+        digest.map_or(0, |digest| u16::from_le_bytes(*digest))
+    }
+
+    pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
+        let (first, rest) = buffer.split_first_mut()?;
+        *first = tag::REPORT;
+        rest.get_mut(..self.0.len())?.copy_from_slice(&self.0);
+        Some(1 + self.0.len())
+    }
+
+    pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
+        let is_long = body.len() >= 6;
+        let body = Vec::from_slice(body).ok().filter(|_| is_long);
+        body.map(Self).ok_or(MessageError::Encoding)
     }
 }

@@ -1,0 +1,73 @@
+//! Telemetry without the feature `telemetry`: the last Watch or Report is handed on to the other neighbour, and nothing is stored.
+
+use super::context::Member;
+use super::neighbour::Neighbours;
+use crate::place::Placement;
+use crate::side::Side;
+use crate::time::{Duration, Instant};
+use crate::wire::message::Message;
+
+pub(crate) const PATIENCE: Duration = Duration::from_micros(0);
+pub(crate) const FIRST_PATIENCE: Duration = PATIENCE;
+
+pub(crate) type Own = (u16, [Option<Placement>; 2]);
+
+/// Message that is handed on, and the side of its destination.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Reporting(Option<(Side, Message)>);
+
+impl Reporting {
+    pub(crate) fn handle_position(&mut self, _: Instant, _: Placement) {}
+
+    pub(crate) fn handle_measured(&mut self, _: f32) {}
+
+    pub(crate) fn handle_timeout(&mut self, _: Instant) {}
+
+    pub(crate) fn handle(
+        &mut self,
+        _: Instant,
+        _: &Member,
+        (side, _): (Side, u16),
+        message: &Message,
+    ) -> bool {
+        let copy = match message {
+            Message::Watch { number, mission } => Message::Watch {
+                number: *number,
+                mission: *mission,
+            },
+            Message::Report(report) => Message::Report(report.clone()),
+            _ => return false,
+        };
+        self.0 = Some((side.other(), copy));
+        true
+    }
+
+    pub(crate) fn is_due(&self, _: Instant, _: Duration) -> bool {
+        self.0.is_some()
+    }
+
+    pub(crate) fn next_timeout(&self, _: Duration) -> Option<Instant> {
+        None
+    }
+
+    pub(crate) fn poll(
+        &mut self,
+        _: Instant,
+        member: &Member,
+        neighbours: &Neighbours,
+        _: Duration,
+        _: Own,
+    ) -> Option<(Side, u16, Message)> {
+        let (side, message) = self.0.take()?;
+        let end = match side {
+            Side::Upstream if member.node == 1 => 0,
+            Side::Downstream if member.node == member.all => member.all.saturating_add(1),
+            _ => 1,
+        };
+        match (neighbours.at(side).node(), &message) {
+            (0, Message::Report(_)) if end != 1 => Some((side, end, message)),
+            (0, _) => None,
+            (to, _) => Some((side, to, message)),
+        }
+    }
+}
