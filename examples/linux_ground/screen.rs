@@ -1,4 +1,4 @@
-//! Screen of a station that stands: snapshots of the relays' reports for a page in a browser, five times a second.
+//! Screen of a station that stands: five snapshots a second of the relays' reports.
 
 use std::net::SocketAddr;
 

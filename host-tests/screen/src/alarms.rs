@@ -1,4 +1,4 @@
-//! Alarms of a chain: each has a reason, a relay that it is about, and the relays that have reported it.
+//! Alarms of a chain. Each has a reason, a relay that it is about, and the relays that have reported it.
 //!
 //! A program that receives events begins and ends alarms by [`Alarms::begin`] and [`Alarms::end`]. A program that knows which alarms
 //! last passes all of them to [`Alarms::settle`].

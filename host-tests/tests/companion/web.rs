@@ -1,4 +1,4 @@
-//! Screen of a ground station that stands: its page, its snapshots, and a serial loop that no browser disturbs.
+//! Screen of a ground station: its page, its snapshots, and a serial loop that no browser disturbs.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Shutdown, TcpStream};
