@@ -18,7 +18,7 @@ const WINDOW: f64 = 20.0;
 /// Change of the offset between two consecutive frames that is a step of a clock, s.
 const STEP: f64 = 2.0;
 
-/// Time between the frames of two files from which files without a common frame are not of one flight, s.
+/// Largest time between files of one flight that have no frame in common, s.
 const APART: f64 = 3_600.0;
 
 /// Relation of a file's clock to that of the first file.
@@ -32,7 +32,7 @@ pub struct Alignment {
     pub offset_s: [f64; 2],
 }
 
-/// Time that is added to the times of a file, from a frame of the file on: offsets in s at times of the file's clock.
+/// Offsets of a file's clock from one frame of the file on, s: each at a time of that clock.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -233,7 +233,7 @@ fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     ))
 }
 
-/// Returns the frame before which the file's clock changes most, after frame `from` and up to frame `to`.
+/// Returns the frame before which the clock changes most, after frame `from` and up to frame `to`.
 fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
     let change = |index: &usize| {
         let [one, other] =

@@ -17,7 +17,7 @@ use crate::recording::Frame;
 const PERIOD: f64 = 0.5;
 const MOST: f64 = 7_200.0;
 
-/// Longest time between two reported positions of a relay between which its position is interpolated, s.
+/// Longest time between two reported positions between which a position is interpolated, s.
 const GAP: f64 = 5.0;
 
 /// Mission that the chain loaded before flight, as the scenario describes it.
@@ -70,12 +70,13 @@ pub struct Flight {
     pub last: Snapshot,
     /// Log of the flight.
     pub log: Vec<LogLine>,
-    /// All alarms of the flight.
+    /// Alarms of the flight.
     pub alarms: Vec<Alarm>,
     /// Number of relays.
     pub relays: u16,
-    /// First time when every relay had agreed and reported, and the share of the time since then in which that was so: for all relays, and for
-    /// as many as the last agreed view had then.
+    /// First agreement of all relays, and the shares of the time since then in which they had agreed.
+    ///
+    /// The first share is that of all relays, the second that of as many as the last agreed view had then.
     pub available: Option<(f64, [f64; 2])>,
     /// Lowest SIR of a known hop at each snapshot, dB.
     pub worst_db: Vec<Option<f64>>,
@@ -240,7 +241,7 @@ struct Recorder<'a> {
     open: BTreeMap<u16, Loss>,
     /// Last time when no relay reported.
     silent_at: Instant,
-    /// First agreement of all relays, number of snapshots since then, and of these with all relays and with all members agreed.
+    /// First agreement, and numbers of snapshots: since then, with all relays, with all members.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 

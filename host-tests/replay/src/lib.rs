@@ -33,8 +33,6 @@ pub struct Replay {
     pub html: String,
     /// Warnings, one line each.
     pub warnings: Vec<String>,
-    /// Relations of the files' clocks.
-    pub files: Vec<clocks::Alignment>,
 }
 
 /// Reads the captures `files` of one flight, and creates its page. The first file has the reference clock.
@@ -88,11 +86,10 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
         flight,
         html,
         warnings,
-        files,
     })
 }
 
-/// Returns the mission of a scenario with equal or fitted slots; `None` if neither has the digest that the frames have.
+/// Returns the mission of a scenario, with equal or fitted slots; `None` if neither has this digest.
 fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Option<Loaded>, String> {
     let (plain, profiles) =
         mission(scenario, relays, TOLERANCE).map_err(|error| error.to_string())?;

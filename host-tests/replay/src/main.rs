@@ -18,7 +18,7 @@ struct Options {
     /// Captures (pcapng) of one flight, by --capture of linux_ground, linux_companion or cargo chain. The clock of the first one counts
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// TOML file with the mission that the relays loaded before flight, for Rx, SIRs, interferer and geofence
+    /// TOML file with the mission loaded before flight, for Rx, SIRs, interferer and geofence
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// File of the page, replaced if it exists

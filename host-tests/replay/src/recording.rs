@@ -14,7 +14,7 @@ use uav_relay_decode::source::{Item, Packet, SourceError, read};
 /// Intact frame of a capture.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time of the frame, s since 1970: by the clock of its file, or after [`merge`](crate::clocks::merge) by that of the first file.
+    /// Time of the frame, s since 1970: by the clock of its file, and after a merge by that of the first.
     pub at: f64,
     /// Direction of the frame, relative to the node that wrote the file.
     pub direction: Direction,
@@ -33,8 +33,6 @@ pub struct Recording {
     pub name: String,
     /// Intact frames of the file's network.
     pub frames: Vec<Frame>,
-    /// Number of frames that are not intact.
-    pub damaged: usize,
     /// Network number of most frames.
     pub network: u16,
     /// Digest of the mission that the chain loaded before flight; `None` if no frame of the file has it.
@@ -81,13 +79,11 @@ impl Recording {
                 }
             });
         };
-        let damaged = all - frames.len();
         frames.retain(|it| it.header.network == network);
         let mission = most(frames.iter().filter_map(|it| loaded(it.message.as_ref()?)));
         Ok(Self {
             name,
             frames,
-            damaged,
             network,
             mission,
             fault,

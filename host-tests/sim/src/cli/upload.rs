@@ -27,8 +27,14 @@ pub struct Uploads {
     /// Discard uploads at a reboot: a rebooted relay starts with the scenario's mission
     #[arg(long)]
     no_store: bool,
-    /// A ground station at this end requests the relays' reports from second 1 on, so that `cargo replay` can show the capture
-    #[arg(long, value_name = "END", value_enum, requires = "fly", conflicts_with = "no_auth")]
+    /// End of the link whose ground station requests the relays' reports, for `cargo replay`
+    #[arg(
+        long,
+        value_name = "END",
+        value_enum,
+        requires = "fly",
+        conflicts_with = "no_auth"
+    )]
     watch: Option<End>,
 }
 
@@ -125,7 +131,8 @@ impl Uploads {
 
     /// Returns the end of the chain whose ground station watches, and since when.
     pub fn watches(&self) -> Option<(Side, Instant)> {
-        self.watch.map(|end| (end.side(), Instant::from_millis(1_000)))
+        self.watch
+            .map(|end| (end.side(), Instant::from_millis(1_000)))
     }
 
     /// Rejects upload options without `--upload`, and `--no-store` if no relay reboots (`boots` is false).
