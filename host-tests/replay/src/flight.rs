@@ -140,9 +140,8 @@ impl Flight {
         for step in 0..=count {
             let now = step as f64 * period;
             let received = frames.partition_point(|frame| frame.at - begin <= now);
-            let mut snapshot =
+            let snapshot =
                 recorder.advance(&mut flight, now, frames.get(..received).unwrap_or_default());
-            clean(&mut snapshot);
             let value = compact(&snapshot, now);
             flight
                 .steps
@@ -289,6 +288,7 @@ impl<'a> Recorder<'a> {
             .extend(new.iter().map(|report| (report.relay, *report)));
         let mut snapshot = self.snapshot(flight.relays, now, &new);
         flight.log.append(&mut snapshot.log);
+        clean(&mut snapshot);
         for alarm in &snapshot.alarms {
             match flight
                 .alarms
