@@ -79,7 +79,10 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 
 impl Report {
     /// Creates the report of an entry at time `at`, with the last details of the same relay.
-    pub(crate) fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
+    ///
+    /// Not part of the public interface: for captures, which tests and tools of this workspace decode.
+    #[doc(hidden)]
+    pub fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
         let state = entry.state();
         let digit = |unit: u16| state / unit % 8;
         let mut report = Self {

@@ -19,7 +19,7 @@ const LIMIT_DB: f64 = 99.9;
 const LONGEST_TEXT: usize = 300;
 
 /// Cleans all values of a snapshot but the log.
-pub(crate) fn clean(snapshot: &mut Snapshot) {
+pub fn clean(snapshot: &mut Snapshot) {
     for place in [&mut snapshot.tx, &mut snapshot.rx] {
         known(place);
     }

@@ -53,6 +53,8 @@ use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
 
 pub use alarms::{list, named};
+pub use clean::clean;
+pub use request::FILES;
 pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, Screen};
 pub use snapshot::{
     Alarm, Condition, Fence, Frame, Hop, InterfererSnapshot, LogLine, Node, Position,

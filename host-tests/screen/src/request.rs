@@ -18,8 +18,8 @@ const MAX_HEADERS: usize = 64;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
                       form-action 'none'; frame-ancestors 'none'";
 
-/// Files of the page: path, media type and content.
-const FILES: [(&str, &str, &str); 6] = [
+/// Files of the page: path, media type and content. The path of the page itself is `/`.
+pub const FILES: [(&str, &str, &str); 6] = [
     (
         "/",
         "text/html; charset=utf-8",

@@ -14,6 +14,9 @@ const LINES = 1000;
 /** Age from which it is shown as old, s. */
 const OLD = 5;
 
+/** True on the page of a recorded flight (uav-relay-replay), which has all its snapshots and no server. */
+const isRecorded = byId("flight") !== null;
+
 const map = new ChainMap(byId("canvas"));
 /** `at` is the time when the server wrote the last snapshot, and `age` how long before it was sent; both in ms. */
 const received = { snapshots: 0, first: 0, last: null, at: 0, age: 0, source: null, tried: 0 };
@@ -120,6 +123,7 @@ function addLines(lines) {
 
 /** Shows the state of the connection to the server, and lets all ages grow while no snapshot arrives. */
 function connection() {
+  if (isRecorded) return;
   const now = performance.now();
   const silent = now - received.at;
   const broken = received.last !== null && silent > SILENT;
@@ -160,5 +164,7 @@ function connect() {
 byId("closer").addEventListener("click", () => map.zoom(1.4));
 byId("farther").addEventListener("click", () => map.zoom(1 / 1.4));
 byId("fit").addEventListener("click", () => map.fit());
-setInterval(connection, 500);
-connect();
+if (!isRecorded) {
+  setInterval(connection, 500);
+  connect();
+}

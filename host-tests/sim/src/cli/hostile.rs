@@ -233,7 +233,8 @@ impl Hostile {
                 until: after(ATTACK_S),
             });
         }
-        let asks = self.is_attack() || self.uploads.are_planned();
+        setup.watches = self.uploads.watches().into_iter().collect();
+        let asks = self.is_attack() || self.uploads.are_planned() || !setup.watches.is_empty();
         setup.auth = self.auth || asks && !self.no_auth;
         setup.uploads = self.uploads.of(&setup.mission, sites)?;
         if !self.uploads.are_stored() {

@@ -27,6 +27,15 @@ pub struct Uploads {
     /// Discard uploads at a reboot: a rebooted relay starts with the scenario's mission
     #[arg(long)]
     no_store: bool,
+    /// End of the link whose ground station requests the relays' reports, for `cargo replay`
+    #[arg(
+        long,
+        value_name = "END",
+        value_enum,
+        requires = "fly",
+        conflicts_with = "no_auth"
+    )]
+    watch: Option<End>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -35,6 +44,15 @@ enum End {
     Tx,
     /// Receiver
     Rx,
+}
+
+impl End {
+    const fn side(self) -> Side {
+        match self {
+            Self::Tx => Side::Upstream,
+            Self::Rx => Side::Downstream,
+        }
+    }
 }
 
 #[derive(Clone, PartialEq, Debug)]
@@ -111,6 +129,12 @@ impl Uploads {
         !self.no_store
     }
 
+    /// Returns the end of the chain whose ground station watches, and since when.
+    pub fn watches(&self) -> Option<(Side, Instant)> {
+        self.watch
+            .map(|end| (end.side(), Instant::from_millis(1_000)))
+    }
+
     /// Rejects upload options without `--upload`, and `--no-store` if no relay reboots (`boots` is false).
     pub fn agree(&self, boots: bool) -> Result<(), Failure> {
         let given = match (self.upload_from, self.no_store) {
@@ -146,10 +170,7 @@ impl Uploads {
     /// `base` is the mission that the relays have at the start. `sites` are the geographic positions of Tx and Rx,
     /// `None` if the scenario has none.
     pub fn of(&self, base: &Mission, sites: Option<Sites>) -> Result<Vec<UploadSpec>, Failure> {
-        let end = match self.upload_from {
-            None | Some(End::Tx) => Side::Upstream,
-            Some(End::Rx) => Side::Downstream,
-        };
+        let end = self.upload_from.unwrap_or(End::Tx).side();
         let mut planned: Vec<&Planned> = self.upload.iter().collect();
         planned.sort_by_key(|one| one.at);
         let specs = (1_u16..).zip(planned).map(|(version, one)| {

@@ -7,6 +7,7 @@
 //! | `hand` | mouse, finger and keyboard input, and error messages |
 //! | `played` | playing a run |
 //! | `ways` | both directions of every hop |
+//! | `recorded` | the page of a recorded flight |
 //! | `screen` | the screen of a flight, `cargo chain --fly --web` |
 //! | `layout` | wide and narrow, light and dark, accessibility, and response times |
 #![allow(
@@ -22,5 +23,6 @@ mod hand;
 mod layout;
 mod opened;
 mod played;
+mod recorded;
 mod screen;
 mod ways;

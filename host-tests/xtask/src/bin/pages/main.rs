@@ -141,13 +141,14 @@ fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
 const PROGRAMS: [(&str, &str); 2] = [("linux_companion", "companion"), ("linux_ground", "ground")];
 
 /// Cargo aliases of programs that are built beforehand and run without the compiler.
-const ALIASES: [&str; 6] = [
+const ALIASES: [&str; 7] = [
     "chain",
     "companion",
     "decode",
     "ground",
     "plan",
     "provision",
+    "replay",
 ];
 
 /// Exit statuses that show that a program has accepted its options.

@@ -126,11 +126,12 @@ fn block(line: usize, heading: usize, info: &str) -> Result<Block, String> {
 }
 
 /// Packages of this workspace whose programs the pages use.
-const PACKAGES: [&str; 4] = [
+const PACKAGES: [&str; 5] = [
     "uav-relay-sim",
     "uav-relay-tools",
     "uav-relay-decode",
     "uav-relay-linux",
+    "uav-relay-replay",
 ];
 
 /// Time limit for the commands of one block, s. Blocks marked as slow have a limit of their own.

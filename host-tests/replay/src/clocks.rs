@@ -1,0 +1,297 @@
+//! Merges the frames of several files by their clocks.
+//!
+//! The clock of the first file is the reference. A frame that occurs in two files connects their clocks: it was sent in one and received
+//! in the other, or received in both. A received frame is later than the sent one by its delay. In each [`WINDOW`] the largest
+//! lower bound of the offset, from frames in one direction, and the smallest upper bound, from frames in the other, are closest to the
+//! offset; in their mean the shortest delays of both directions cancel. Between windows the offset is interpolated, which follows
+//! the drift. A step of a clock ends an interpolation.
+
+use std::collections::HashMap;
+
+use uav_relay_capture::Direction;
+
+use crate::recording::{Frame, Recording};
+
+/// Time for which one offset is determined, s. Clocks drift by 100 ppm at most, 2 ms in this time.
+const WINDOW: f64 = 20.0;
+
+/// Change of the offset between two consecutive frames that is a step of a clock, s.
+const STEP: f64 = 2.0;
+
+/// Largest time between files of one flight that have no frame in common, s.
+const APART: f64 = 3_600.0;
+
+/// Relation of a file's clock to that of the first file.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Alignment {
+    /// Name of the file.
+    pub name: String,
+    /// Number of frames that connect the clocks; `None` for the first file.
+    pub common: Option<usize>,
+    /// Smallest and largest time that is added to the times of the file, s.
+    pub offset_s: [f64; 2],
+}
+
+/// Offsets of a file's clock from one frame of the file on, s: each at a time of that clock.
+struct Segment {
+    from: usize,
+    offsets: Vec<(f64, f64)>,
+}
+
+impl Segment {
+    fn offset(&self, at: f64) -> f64 {
+        let after = self.offsets.partition_point(|(time, _)| *time < at);
+        let beside = [after.checked_sub(1), Some(after)].map(|index| self.offsets.get(index?));
+        match beside {
+            [Some((t0, one)), Some((t1, other))] => one + (other - one) * (at - t0) / (t1 - t0),
+            [Some((_, only)), None] | [None, Some((_, only))] => *only,
+            [None, None] => 0.0,
+        }
+    }
+}
+
+/// Bounds of an offset in one window, s, and the offsets by frames that were received in both files.
+#[derive(Default)]
+struct Window {
+    times: Vec<f64>,
+    least: Option<f64>,
+    most: Option<f64>,
+    equal: Vec<f64>,
+}
+
+impl Window {
+    fn add(&mut self, own: &Frame, other: (f64, Direction)) {
+        let offset = other.0 - own.at;
+        self.times.push(own.at);
+        match (own.direction, other.1) {
+            (Direction::In, Direction::Out) => {
+                self.least = Some(self.least.map_or(offset, |it| it.max(offset)));
+            }
+            (Direction::Out, Direction::In) => {
+                self.most = Some(self.most.map_or(offset, |it| it.min(offset)));
+            }
+            _ => self.equal.push(offset),
+        }
+    }
+
+    fn offset(mut self) -> Option<(f64, f64)> {
+        let at = self.times.iter().sum::<f64>() / self.times.len() as f64;
+        self.equal.sort_by(f64::total_cmp);
+        let middle = self.equal.get(self.equal.len() / 2).copied();
+        let offset = match (self.least, self.most) {
+            (Some(least), Some(most)) => Some(f64::midpoint(least, most)),
+            (one, other) => middle.or(one).or(other),
+        };
+        Some((at, offset?))
+    }
+}
+
+/// Frames of a file that occur once in it, by their bytes.
+fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
+    let mut known = HashMap::new();
+    for (index, frame) in frames.iter().enumerate() {
+        let entry = known.entry(frame.wire.as_slice());
+        entry.and_modify(|it| *it = None).or_insert(Some(index));
+    }
+    known
+}
+
+/// Frames of aligned files: time by the reference clock, and direction. Sent frames replace received ones.
+type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
+
+fn add(aligned: &mut Aligned, frames: &[Frame]) {
+    for index in once(frames).into_values().flatten() {
+        if let Some(frame) = frames.get(index)
+            && (frame.direction == Direction::Out || !aligned.contains_key(&frame.wire))
+        {
+            aligned.insert(frame.wire.clone(), (frame.at, frame.direction));
+        }
+    }
+}
+
+/// Frames of all files.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// Frames, sorted by the clock of the first file, each once.
+    pub frames: Vec<Frame>,
+    /// Relations of the clocks, in the order of the files.
+    pub files: Vec<Alignment>,
+    /// Warnings, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Merges the frames of all files.
+///
+/// # Errors
+/// One line that names a file of another chain or another flight.
+pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
+    let mut warnings = Vec::new();
+    if let Some(first) = files.first() {
+        for other in &files {
+            one_chain(first, other)?;
+        }
+        let pairs = first.frames.windows(2);
+        let steps = pairs.filter_map(|pair| Some(pair.last()?.at - pair.first()?.at));
+        if let Some(step) = { steps }.find(|step| *step < -STEP || *step > APART) {
+            warnings.push(format!(
+                "{}: its clock is that of the flight, but steps by {step:.1} s: name a file with a steady clock first",
+                first.name
+            ));
+        }
+    }
+    for file in &files {
+        if let Some(fault) = &file.fault {
+            warnings.push(format!(
+                "{}: damaged after {} frames, the rest is left out: {fault}",
+                file.name,
+                file.frames.len()
+            ));
+        }
+    }
+    let mut alignments: Vec<Option<Alignment>> = vec![None; files.len()];
+    let mut aligned = Aligned::new();
+    let mut span = [f64::INFINITY, f64::NEG_INFINITY];
+    while alignments.contains(&None) {
+        let waiting = alignments.iter().enumerate().filter(|(_, it)| it.is_none());
+        // The first file, then always the file with most frames in common with those that are aligned.
+        let counted = waiting.map(|(index, _)| {
+            let frames = files.get(index).map_or(&[][..], |it| &it.frames);
+            let own = once(frames);
+            let common = own
+                .iter()
+                .filter(|(wire, it)| it.is_some() && aligned.contains_key(**wire));
+            (common.count(), index)
+        });
+        let best = counted.max_by_key(|(common, index)| (*common, usize::MAX - index));
+        let Some((common, index)) = best else { break };
+        let (Some(file), Some(alignment)) = (files.get_mut(index), alignments.get_mut(index))
+        else {
+            break;
+        };
+        let is_first = aligned.is_empty();
+        if common == 0 && !is_first {
+            own_clock(file, span)?;
+            warnings.push(format!(
+                "{}: no frame in common with the other files: placed by its own clock",
+                file.name
+            ));
+        }
+        *alignment = Some(align(file, &aligned, (!is_first).then_some(common)));
+        for frame in &file.frames {
+            span = [span[0].min(frame.at), span[1].max(frame.at)];
+        }
+        add(&mut aligned, &file.frames);
+    }
+    let mut frames: Vec<Frame> = files.into_iter().flat_map(|file| file.frames).collect();
+    frames.sort_by(|one, other| one.at.total_cmp(&other.at));
+    // A frame that was captured by several nodes, or replayed by an attacker, counts once.
+    let mut known = std::collections::HashSet::new();
+    frames.retain(|frame| known.insert(frame.wire.clone()));
+    Ok(Merged {
+        frames,
+        files: alignments.into_iter().flatten().collect(),
+        warnings,
+    })
+}
+
+fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
+    let differ = |what: &str, own: String, others: String| {
+        Err(format!(
+            "{}: {what} {own}, but {} has {others}: the files are of different chains",
+            other.name, first.name
+        ))
+    };
+    if other.network != first.network {
+        return differ(
+            "network",
+            other.network.to_string(),
+            first.network.to_string(),
+        );
+    }
+    match (first.mission, other.mission) {
+        (Some(one), Some(own)) if one != own => {
+            differ("mission digest", format!("{own:04x}"), format!("{one:04x}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Checks that a file without common frames is of the time `span` of the others, by its own clock.
+fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
+    let times = file.frames.iter().map(|frame| frame.at);
+    let [first, last] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
+        [least.min(at), most.max(at)]
+    });
+    let apart = (first - span[1]).max(span[0] - last);
+    if apart <= APART {
+        return Ok(());
+    }
+    Err(format!(
+        "{}: no frame in common with the other files, and {:.1} h apart from them by its clock: not of the same flight",
+        file.name,
+        apart / 3_600.0
+    ))
+}
+
+/// Returns the frame before which the clock changes most, after frame `from` and up to frame `to`.
+fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
+    let change = |index: &usize| {
+        let [one, other] =
+            [index.saturating_sub(1), *index].map(|it| frames.get(it).map_or(0.0, |it| it.at));
+        (other - one).abs()
+    };
+    let all = from + 1..=to;
+    all.max_by(|one, other| change(one).total_cmp(&change(other)))
+        .unwrap_or(to)
+}
+
+/// Converts the times of a file to the reference clock.
+fn align(file: &mut Recording, aligned: &Aligned, common: Option<usize>) -> Alignment {
+    let own = once(&file.frames);
+    let mut windows: Vec<(usize, Vec<Window>)> = Vec::new();
+    let (mut last, mut begun, mut before) = (f64::INFINITY, 0.0, 0);
+    for (index, frame) in file.frames.iter().enumerate() {
+        let is_once = own.get(frame.wire.as_slice()) == Some(&Some(index));
+        let Some(other) = aligned.get(&frame.wire).filter(|_| is_once) else {
+            continue;
+        };
+        let offset = other.0 - frame.at;
+        if (offset - last).abs() > STEP {
+            let from = if windows.is_empty() {
+                0
+            } else {
+                step_between(&file.frames, before, index)
+            };
+            windows.push((from, vec![Window::default()]));
+            begun = frame.at;
+        }
+        (last, before) = (offset, index);
+        if let Some((_, windows)) = windows.last_mut() {
+            if frame.at >= begun + WINDOW {
+                windows.push(Window::default());
+                begun = frame.at;
+            }
+            if let Some(window) = windows.last_mut() {
+                window.add(frame, *other);
+            }
+        }
+    }
+    drop(own);
+    let segments = windows.into_iter().map(|(from, windows)| Segment {
+        from,
+        offsets: windows.into_iter().filter_map(Window::offset).collect(),
+    });
+    let segments: Vec<Segment> = segments.collect();
+    let mut offset_s = [f64::INFINITY, f64::NEG_INFINITY];
+    for (index, frame) in file.frames.iter_mut().enumerate() {
+        let segment = segments.iter().rev().find(|it| it.from <= index);
+        let offset = segment.map_or(0.0, |it| it.offset(frame.at));
+        offset_s = [offset_s[0].min(offset), offset_s[1].max(offset)];
+        frame.at += offset;
+    }
+    Alignment {
+        name: file.name.clone(),
+        common,
+        offset_s,
+    }
+}

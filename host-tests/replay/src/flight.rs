@@ -1,0 +1,504 @@
+//! Flight from merged frames: snapshots as on the screen, log, and the figures of the report.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::flight::axis::Axis;
+use uav_relay::wire::message::{Detail, Entry, Message};
+use uav_relay::{GuardConfig, Instant, Mission, Phase, Placement, Profile, Report, Upload};
+use uav_relay_screen::chain::{Chain, SILENT_AFTER, seconds};
+use uav_relay_screen::station::{Frames, StationView};
+use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
+
+use crate::recording::Frame;
+
+/// Time between two snapshots, s, of a flight with at most [`MOST`] of them. A longer flight has as many, farther apart.
+const PERIOD: f64 = 0.5;
+const MOST: f64 = 7_200.0;
+
+/// Longest time between two reported positions between which a position is interpolated, s.
+const GAP: f64 = 5.0;
+
+/// Mission that the chain loaded before flight, as the scenario describes it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// Mission with all parameters.
+    pub mission: Mission,
+    /// Relays with an altitude or a power of their own.
+    pub profiles: Vec<(u16, Profile)>,
+    /// Line on earth from Tx to Rx, if the scenario has one.
+    pub axis: Option<Axis>,
+}
+
+/// Time in which a relay did not report.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Loss {
+    /// Number of the relay; 0 for all relays at once.
+    pub relay: u16,
+    /// Time of the last report before, s.
+    pub from: f64,
+    /// Time of the next report, s; `None` if there is none.
+    pub until: Option<f64>,
+    /// True if another relay has reported the relay as lost.
+    pub is_reported: bool,
+}
+
+/// Least distance of two relays in the air.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Nearest {
+    /// Distance, m.
+    pub distance_m: f64,
+    /// Numbers of the relays.
+    pub relays: [u16; 2],
+    /// Time, s.
+    pub time_s: f64,
+}
+
+/// Recorded flight. Times are in s since its first frame.
+#[derive(Debug, Default)]
+pub struct Flight {
+    /// Time of the first frame, s since 1970.
+    pub begin: f64,
+    /// Duration of the flight, s.
+    pub duration: f64,
+    /// Time between two snapshots, s.
+    pub period: f64,
+    /// Snapshots, each as its difference from the one before.
+    pub steps: Vec<Value>,
+    /// Last snapshot.
+    pub last: Snapshot,
+    /// Log of the flight.
+    pub log: Vec<LogLine>,
+    /// Alarms of the flight.
+    pub alarms: Vec<Alarm>,
+    /// Number of relays.
+    pub relays: u16,
+    /// First agreement of all relays, and the shares of the time since then in which they had agreed.
+    ///
+    /// The first share is that of all relays, the second that of as many as the last agreed view had then.
+    pub available: Option<(f64, [f64; 2])>,
+    /// Lowest SIR of a known hop at each snapshot, dB.
+    pub worst_db: Vec<Option<f64>>,
+    /// Times in which relays did not report.
+    pub losses: Vec<Loss>,
+    /// Agreed views: time, number of the view, and number of its relays.
+    pub views: Vec<(f64, u32, u16)>,
+    /// Least distance of two relays in the air.
+    pub nearest: Option<Nearest>,
+}
+
+/// Returns the largest number of a relay in the reports; 0 without reports.
+pub fn largest(frames: &[Frame]) -> u16 {
+    let entries = frames.iter().flat_map(entries);
+    entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
+}
+
+/// Returns the entries of a frame with their details.
+fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
+    let report = match &frame.message {
+        Some(Message::Report(report)) => Some(report),
+        _ => None,
+    };
+    report.into_iter().flat_map(|report| {
+        let mut detail = report.detail;
+        let entries = report.entries.iter();
+        entries.map(move |entry| (*entry, detail.take()))
+    })
+}
+
+impl Flight {
+    /// Computes the flight of `relays` relays from frames that are sorted by time.
+    pub fn new(frames: &[Frame], relays: u16, loaded: Option<&Loaded>) -> Self {
+        let begin = frames.first().map_or(0.0, |frame| frame.at);
+        let duration = frames.last().map_or(0.0, |frame| frame.at - begin);
+        let is_long = duration > MOST * PERIOD;
+        let period = if is_long {
+            (duration / MOST).ceil()
+        } else {
+            PERIOD
+        };
+        let mut flight = Self {
+            begin,
+            duration,
+            period,
+            relays,
+            ..Self::default()
+        };
+        let reports = reports(frames, begin, relays);
+        flight.follow_frames(frames);
+        let mut recorder = Recorder::new(&reports, loaded);
+        let mut shown = json!({});
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at most 7200"
+        )]
+        let count = (duration / period).ceil() as usize;
+        for step in 0..=count {
+            let now = step as f64 * period;
+            let received = frames.partition_point(|frame| frame.at - begin <= now);
+            let snapshot =
+                recorder.advance(&mut flight, now, frames.get(..received).unwrap_or_default());
+            let value = compact(&snapshot, now);
+            flight
+                .steps
+                .push(difference(&shown, &value).unwrap_or_else(|| json!({})));
+            shown = value;
+            flight.last = snapshot;
+        }
+        recorder.finish(&mut flight);
+        flight
+            .log
+            .sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
+        flight
+    }
+
+    /// Finds the agreed views, and the missions that a ground station uploads.
+    fn follow_frames(&mut self, frames: &[Frame]) {
+        let mut offered = Vec::new();
+        for frame in frames {
+            let time_s = frame.at - self.begin;
+            let mut say = |text| self.log.push(LogLine { time_s, text });
+            match &frame.message {
+                Some(Message::Decision(decision)) => {
+                    if let Some(view) = decision.accepted
+                        && !self
+                            .views
+                            .iter()
+                            .any(|(_, number, _)| *number == view.id.number())
+                    {
+                        let number = view.id.number();
+                        say(format!(
+                            "membership agreed: {} relays (view {number})",
+                            view.relays
+                        ));
+                        self.views.push((time_s, number, view.relays));
+                    }
+                }
+                Some(Message::Offer { upload, .. }) => {
+                    let sender = frame.header.sender;
+                    let is_ground = sender == 0 || sender > self.relays;
+                    if is_ground && !offered.contains(&upload.version()) {
+                        offered.push(upload.version());
+                        let end = if sender == 0 { "Tx" } else { "Rx" };
+                        say(format!(
+                            "ground station at {end} uploads version {} of the mission",
+                            upload.version()
+                        ));
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Returns the states of all relays, sorted by their times. A state is as old as its entry says when the frame was captured.
+fn reports(frames: &[Frame], begin: f64, relays: u16) -> Vec<Report> {
+    let mut all: Vec<_> = frames
+        .iter()
+        .flat_map(|frame| entries(frame).map(move |entry| (frame.at - begin, entry)))
+        .filter(|(_, (entry, _))| entry.relay() <= relays)
+        .map(|(at, (entry, detail))| ((at - f64::from(entry.age) / 10.0).max(0.0), entry, detail))
+        .collect();
+    all.sort_by(|(one, ..), (other, ..)| one.total_cmp(other));
+    let mut details = BTreeMap::<u16, Detail>::new();
+    all.into_iter()
+        .map(|(at, entry, detail)| {
+            if let Some(detail) = detail {
+                details.insert(entry.relay(), detail);
+            }
+            let last = details.get(&entry.relay()).copied();
+            Report::of(&entry, last, instant(at))
+        })
+        .collect()
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "times of a flight"
+)]
+fn instant(at: f64) -> Instant {
+    Instant::from_micros((at * 1e6).round() as u64)
+}
+
+/// State of the computation between two snapshots.
+struct Recorder<'a> {
+    reports: &'a [Report],
+    loaded: Option<&'a Loaded>,
+    view: StationView,
+    uploads: BTreeMap<u16, Upload>,
+    /// Number of reports and of frames that have been used.
+    used: [usize; 2],
+    received: u32,
+    newest: BTreeMap<u16, Report>,
+    tracks: BTreeMap<u16, Vec<(f64, Placement)>>,
+    /// Times in which relays do not report now, by relay.
+    open: BTreeMap<u16, Loss>,
+    /// Last time when no relay reported.
+    silent_at: Instant,
+    /// First agreement, and numbers of snapshots: since then, with all relays, with all members.
+    agreed: Option<(f64, u32, [u32; 2])>,
+}
+
+impl<'a> Recorder<'a> {
+    fn new(reports: &'a [Report], loaded: Option<&'a Loaded>) -> Self {
+        let mut tracks = BTreeMap::<u16, Vec<_>>::new();
+        for report in reports {
+            let is_up = report.control != Some(State::Grounded);
+            if let Some(place) = report.position.filter(|_| is_up) {
+                let track = tracks.entry(report.relay).or_default();
+                track.push((seconds(report.at), place));
+            }
+        }
+        Self {
+            reports,
+            loaded,
+            view: StationView::default(),
+            uploads: BTreeMap::new(),
+            used: [0; 2],
+            received: 0,
+            newest: BTreeMap::new(),
+            tracks,
+            open: BTreeMap::new(),
+            silent_at: Instant::ZERO,
+            agreed: None,
+        }
+    }
+
+    /// Returns the snapshot at `now`, and adds its figures to those of the flight. `frames` are all frames up to then.
+    fn advance(&mut self, flight: &mut Flight, now: f64, frames: &[Frame]) -> Snapshot {
+        for frame in frames.get(self.used[1]..).unwrap_or_default() {
+            match &frame.message {
+                Some(Message::Offer { upload, .. }) => {
+                    self.uploads.insert(upload.version(), *upload);
+                }
+                Some(Message::Report(_)) => self.received += 1,
+                _ => {}
+            }
+        }
+        let rest = self.reports.get(self.used[0]..).unwrap_or_default();
+        let new = rest.iter().take_while(|report| report.at <= instant(now));
+        let new: Vec<Report> = new.copied().collect();
+        self.used = [self.used[0] + new.len(), frames.len()];
+        self.newest
+            .extend(new.iter().map(|report| (report.relay, *report)));
+        let mut snapshot = self.snapshot(flight.relays, now, &new);
+        flight.log.append(&mut snapshot.log);
+        clean(&mut snapshot);
+        for alarm in &snapshot.alarms {
+            match flight
+                .alarms
+                .iter_mut()
+                .find(|it| it.number == alarm.number)
+            {
+                Some(known) => known.clone_from(alarm),
+                None => flight.alarms.push(alarm.clone()),
+            }
+        }
+        let hops = snapshot.hops.iter();
+        let sirs = hops.flat_map(|hop| {
+            [
+                hop.measured_db.or(hop.sir_db),
+                hop.measured_back_db.or(hop.sir_back_db),
+            ]
+        });
+        flight.worst_db.push(sirs.flatten().reduce(f64::min));
+        self.losses(flight, now, &snapshot);
+        self.nearest(flight, now);
+        snapshot
+    }
+
+    fn snapshot(&mut self, relays: u16, now: f64, new: &[Report]) -> Snapshot {
+        let version = self.view.version().unwrap_or(0);
+        let upload = self.uploads.get(&version);
+        let uploaded = upload.and_then(|it| Mission::try_new(*it.config()).ok());
+        let sites = upload.and_then(Upload::sites);
+        let uploaded_axis = sites.and_then(|sites| Axis::between(sites).ok());
+        let base = self
+            .loaded
+            .filter(|_| version == 0 || upload.is_some() && sites.is_none());
+        let chain = Chain {
+            mission: uploaded.as_ref().or(base.map(|it| &it.mission)),
+            relays,
+            profiles: self.loaded.map_or(&[], |it| it.profiles.as_slice()),
+            is_estimated: false,
+            axis: uploaded_axis
+                .as_ref()
+                .or(base.and_then(|it| it.axis.as_ref())),
+            geofence: base
+                .map(|it| GuardConfig::of(&it.mission, it.mission.config().common).geofence),
+        };
+        let frames = Frames {
+            received: self.received,
+            rejected: 0,
+        };
+        self.view.snapshot(instant(now), &chain, new, frames)
+    }
+
+    /// Follows availability and losses.
+    fn losses(&mut self, flight: &mut Flight, now: f64, snapshot: &Snapshot) {
+        let is_fresh = |report: &Report| instant(now).since(report.at) < SILENT_AFTER;
+        let reporting: Vec<&Report> = self.newest.values().filter(|it| is_fresh(it)).collect();
+        let have_agreed = reporting
+            .iter()
+            .filter(|it| it.phase == Phase::Holding)
+            .count();
+        let views = flight.views.iter().take_while(|(at, ..)| *at <= now);
+        let members = views.last().map_or(flight.relays, |(.., members)| *members);
+        let is_available = [flight.relays, members].map(|all| have_agreed >= usize::from(all));
+        if is_available[0] && self.agreed.is_none() {
+            self.agreed = Some((now, 0, [0; 2]));
+        }
+        if let Some((_, all, [every, members])) = &mut self.agreed {
+            *all += 1;
+            *every += u32::from(is_available[0]);
+            *members += u32::from(is_available[1]);
+        }
+        let last = self.newest.values().map(|it| it.at).max();
+        if reporting.is_empty() {
+            self.silent_at = instant(now);
+        }
+        let is_late = instant(now).since(self.silent_at) >= SILENT_AFTER;
+        for (number, at) in self
+            .newest
+            .values()
+            .map(|it| (it.relay, it.at))
+            .chain(last.map(|at| (0, at)))
+        {
+            let is_old = instant(now).since(at) >= SILENT_AFTER;
+            if !is_old {
+                if let Some(mut loss) = self.open.remove(&number) {
+                    loss.until = Some(seconds(at));
+                    flight.losses.push(loss);
+                }
+            } else if number == 0 || is_late || self.open.contains_key(&number) {
+                let reported = snapshot
+                    .relays
+                    .iter()
+                    .any(|it| it.lost_neighbours.contains(&number));
+                let loss = self.open.entry(number).or_insert_with(|| Loss {
+                    relay: number,
+                    from: seconds(at),
+                    until: None,
+                    is_reported: false,
+                });
+                loss.is_reported |= reported;
+            }
+        }
+    }
+
+    fn nearest(&self, flight: &mut Flight, now: f64) {
+        let places = self.tracks.iter();
+        let places: Vec<(u16, Placement)> = places
+            .filter_map(|(relay, track)| Some((*relay, between(track, now)?)))
+            .collect();
+        for (index, (one, at)) in places.iter().enumerate() {
+            for (other, beside) in places.iter().skip(index + 1) {
+                let [x, y, up] = [
+                    at.x_m - beside.x_m,
+                    at.y_m - beside.y_m,
+                    at.altitude_m - beside.altitude_m,
+                ];
+                let distance_m = f64::from(x).hypot(y.into()).hypot(up.into());
+                if flight.nearest.is_none_or(|it| distance_m < it.distance_m) {
+                    flight.nearest = Some(Nearest {
+                        distance_m,
+                        relays: [*one, *other],
+                        time_s: now,
+                    });
+                }
+            }
+        }
+    }
+
+    fn finish(self, flight: &mut Flight) {
+        flight.losses.extend(self.open.into_values());
+        flight
+            .losses
+            .sort_by(|one, other| one.from.total_cmp(&other.from));
+        flight.available = self
+            .agreed
+            .map(|(at, all, agreed)| (at, agreed.map(|it| f64::from(it) / f64::from(all))));
+    }
+}
+
+/// Returns the position of a relay at `now`, between two reported ones that are at most [`GAP`] apart.
+fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
+    let after = track.partition_point(|(at, _)| *at < now);
+    let (t0, one) = track.get(after.checked_sub(1)?)?;
+    let (t1, other) = track.get(after).filter(|(at, _)| at - t0 <= GAP)?;
+    #[expect(clippy::cast_possible_truncation, reason = "a share")]
+    let share = ((now - t0) / (t1 - t0).max(1e-9)) as f32;
+    let mix = |from: f32, to: f32| from + share * (to - from);
+    Some(Placement {
+        x_m: mix(one.x_m, other.x_m),
+        y_m: mix(one.y_m, other.y_m),
+        altitude_m: mix(one.altitude_m, other.altitude_m),
+    })
+}
+
+/// Returns a snapshot as JSON with rounded numbers. A relay has the time of its report, `at_s`, in place of its age, which always changes.
+fn compact(snapshot: &Snapshot, now: f64) -> Value {
+    let mut value = serde_json::to_value(snapshot).unwrap_or_default();
+    if let Some(all) = value.as_object_mut() {
+        all.remove("time_s");
+        let relays = all.get_mut("relays").and_then(Value::as_array_mut);
+        for relay in relays
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_object_mut)
+        {
+            let age = relay.remove("age_s").and_then(|age| age.as_f64());
+            relay.insert("at_s".to_owned(), age.map(|age| now - age).into());
+        }
+    }
+    round(&mut value);
+    value
+}
+
+/// Rounds all numbers to two decimals.
+fn round(value: &mut Value) {
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            let rounded = number.as_f64().map(|it| (it * 100.0).round() / 100.0);
+            *value = rounded.into();
+        }
+        Value::Array(all) => all.iter_mut().for_each(round),
+        Value::Object(all) => all.values_mut().for_each(round),
+        _ => {}
+    }
+}
+
+/// Returns what changes `old` to `new`, as the page applies it; `None` for no change.
+///
+/// The changes of an object or an array are an object of the changed values by key or index; `#` is the new length of an array.
+fn difference(old: &Value, new: &Value) -> Option<Value> {
+    let mut changes = serde_json::Map::new();
+    match (old, new) {
+        (Value::Object(old), Value::Object(new)) => {
+            for (key, value) in new {
+                let change = old
+                    .get(key)
+                    .map_or_else(|| Some(value.clone()), |it| difference(it, value));
+                changes.extend(change.map(|change| (key.clone(), change)));
+            }
+        }
+        (Value::Array(old), Value::Array(new)) => {
+            if old.len() != new.len() {
+                changes.insert("#".to_owned(), new.len().into());
+            }
+            for (index, value) in new.iter().enumerate() {
+                let change = old
+                    .get(index)
+                    .map_or_else(|| Some(value.clone()), |it| difference(it, value));
+                changes.extend(change.map(|change| (index.to_string(), change)));
+            }
+        }
+        _ if old == new => return None,
+        _ => return Some(new.clone()),
+    }
+    (!changes.is_empty()).then_some(changes.into())
+}

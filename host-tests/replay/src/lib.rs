@@ -1,0 +1,104 @@
+//! Replay of a recorded flight: one page with the screen of the flight, a time bar, and a report.
+//!
+//! | module | content |
+//! | --- | --- |
+//! | [`recording`] | frames of one capture file |
+//! | [`clocks`] | frames of all files, by one clock |
+//! | [`flight`] | snapshots, log and figures of the flight, from the relays' reports |
+//! | [`page`](mod@page) | the page |
+
+pub mod clocks;
+pub mod flight;
+pub mod page;
+pub mod recording;
+
+use std::path::{Path, PathBuf};
+
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::deployment::Deployment;
+use uav_relay_scenario::mission::{mission, with_access};
+
+use flight::{Flight, Loaded};
+use recording::Recording;
+
+/// Tolerance of missions: that of the Linux programs, and the default of the simulator.
+const TOLERANCE: f64 = 1e-4;
+
+/// Replay of a flight: its page, and lines that describe it.
+#[derive(Debug)]
+pub struct Replay {
+    /// The flight.
+    pub flight: Flight,
+    /// Page as HTML.
+    pub html: String,
+    /// Warnings, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the captures `files` of one flight, and creates its page. The first file has the reference clock.
+///
+/// Without a `scenario` the mission is the default scenario's, if the relays report that they fly it, or else unknown.
+///
+/// # Errors
+/// One line that names the file and the fault.
+pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, String> {
+    let recordings: Result<Vec<Recording>, String> =
+        files.iter().map(|file| Recording::load(file)).collect();
+    let recordings = recordings?;
+    let digest = recordings.iter().find_map(|it| it.mission);
+    let clocks::Merged {
+        frames,
+        files,
+        mut warnings,
+    } = clocks::merge(recordings)?;
+    let largest = flight::largest(&frames);
+    if largest == 0 {
+        let names: Vec<&str> = files.iter().map(|it| it.name.as_str()).collect();
+        return Err(format!(
+            "{}: no reports of relays: a ground station has to request them during the flight (linux_ground --web, cargo chain --watch)",
+            names.join(", ")
+        ));
+    }
+    let loaded = match scenario {
+        Some(file) => {
+            let (scenario, sections) = Deployment::load(file).map_err(|error| error.to_string())?;
+            let planned = scenario.plan.as_ref().map(|plan| plan.uavs);
+            let relays = sections.network.relays.or(planned).unwrap_or(largest);
+            let name = file.display();
+            let loaded =
+                loaded(&scenario, relays, digest).map_err(|why| format!("{name}: {why}"))?;
+            Some(loaded.ok_or_else(|| {
+                let flown = digest.unwrap_or_default();
+                format!("{name}: its mission of {relays} relays is not the one that the chain loaded (digest {flown:04x})")
+            })?)
+        }
+        None => loaded(&Scenario::default(), largest, digest).ok().flatten(),
+    };
+    if loaded.is_none() {
+        warnings.push(
+            "mission unknown: give --scenario FILE for Rx, SIRs and the interferer".to_owned(),
+        );
+    }
+    let relays = loaded.as_ref().map_or(largest, |it| it.mission.relays());
+    let flight = Flight::new(&frames, relays, loaded.as_ref());
+    let html = page::page(&flight, &files, &warnings);
+    Ok(Replay {
+        flight,
+        html,
+        warnings,
+    })
+}
+
+/// Returns the mission of a scenario, with equal or fitted slots; `None` if neither has this digest.
+fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Option<Loaded>, String> {
+    let (plain, profiles) =
+        mission(scenario, relays, TOLERANCE).map_err(|error| error.to_string())?;
+    let fitted = with_access(scenario, &plain).ok();
+    let mut missions = [Some(plain), fitted].into_iter().flatten();
+    let found = missions.find(|it| digest.is_none_or(|digest| it.digest() == digest));
+    Ok(found.map(|mission| Loaded {
+        mission,
+        profiles,
+        axis: scenario.line.map(|line| line.axis),
+    }))
+}
