@@ -7,7 +7,7 @@ use uav_relay::{Duration, GuardConfig, Instant, Mission, Phase, Placement, Side}
 use uav_relay_decode::envelope::unstuffed;
 use uav_relay_sim::simulator::chain::Chain;
 use uav_relay_sim::simulator::drones::{FlightSpec, Point};
-use uav_relay_sim::simulator::faults::{Faults, LinkSpec};
+use uav_relay_sim::simulator::faults::LinkSpec;
 use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::OnAir;
 use uav_relay_sim::simulator::setup::Setup;
