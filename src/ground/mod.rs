@@ -589,7 +589,7 @@ struct Watching {
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Distance of the relay that the last request is for, and true if it is to be sent; 0 before the first one.
+    /// Distance of the relay that the last request is for; 0 before the first one. `is_due` is true until it is sent.
     distance: u16,
     is_due: bool,
     /// Entries that have arrived since the last call with a time.

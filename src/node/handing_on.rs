@@ -1,4 +1,6 @@
-//! Telemetry without the feature `telemetry`: the last Watch or Report is handed on to the other neighbour, and nothing is stored.
+//! Watches and Reports in a build without the feature `telemetry`: handed on, and not stored.
+//!
+//! Only the last one is kept until it can be sent to the other neighbour.
 //!
 //! Without the feature `auth` there is nothing to hand on, because ground stations sign all frames.
 

@@ -27,10 +27,10 @@ use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 /// Time after the last Watch for which a relay reports.
 const WATCHED: Duration = Duration::from_millis(60_000);
 
-/// Time after a Watch for which its sender is the destination of reports: four lost ones do not change it.
+/// Time after a Watch for which its sender is the destination of reports. Four lost ones do not change it.
 const DESTINED: Duration = Duration::from_millis(25_000);
 
-/// Time without a report from the relay four numbers farther from the station after which a Watch to it is repeated.
+/// Time without a report from a relay after which a Watch to it is repeated.
 const UNCONFIRMED: Duration = Duration::from_millis(8_000);
 
 /// Maximum number of doublings of the time between two such repetitions.
@@ -82,7 +82,7 @@ struct Stored {
     detail: Option<Detail>,
     /// Time of the relay's state.
     at: Instant,
-    /// Time from which the entry may be sent: at once, or again after the time in which a newer one should arrive.
+    /// Time from which the entry may be sent. After it has been sent, a newer one should arrive before.
     from: Instant,
     is_new: bool,
 }
@@ -98,7 +98,8 @@ struct Watched {
     /// Bit mask of the distances of nodes to which the Watch is to be handed on, and when.
     hand_on: u8,
     hand_on_at: Instant,
-    /// Time of the last report from the relay four numbers farther from the station, and number of Watches to it since then.
+    /// Time of the last report from the relay four numbers farther from the station. `unconfirmed` counts Watches to it
+    /// since then.
     confirmed: Instant,
     unconfirmed: u8,
     /// Time of the next report, at least `free`.
@@ -113,7 +114,7 @@ struct Watched {
     is_fed: bool,
 }
 
-/// State of the relay for its own entry: phase, hold reasons and flags, as in an entry; setpoint and agreed position.
+/// State of the relay for its own entry: the number of an entry's state, setpoint and agreed position.
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
@@ -483,8 +484,9 @@ const fn from_end(member: &Member, side: Side) -> u16 {
     }
 }
 
-/// Returns the assumed bytes that a relay sends in a period: own entry, and those of the relays four, eight, ... numbers
-/// farther from the station, which it is `distance` numbers away from.
+/// Returns the assumed bytes that a relay sends in a period. `distance` is its distance from the station, in numbers.
+///
+/// These are its own entry, and those of the relays four, eight and so on numbers farther from the station.
 const fn load(member: &Member, distance: u16) -> u32 {
     let behind = member.all.saturating_sub(distance) / CANDIDATES;
     SHARE * (behind as u32 + 2)

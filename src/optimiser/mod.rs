@@ -10,11 +10,11 @@
 //!
 //! The node calls the same functions, one hop per relay.
 
-mod from_rx;
+pub mod from_rx;
 pub mod joint;
 pub mod ladder;
 pub mod local;
-mod noisy_hop;
+pub mod noisy_hop;
 pub mod pass;
 pub mod plan;
 pub mod retreat;

@@ -13,7 +13,7 @@ use parts::Body;
 
 pub use parts::RelayState;
 
-/// Builds a message body of one of the kinds 0 to 22, except 20, with fuzzed fields, or arbitrary bytes.
+/// Builds a message body with fuzzed fields, of one of the kinds 0 to 22 except 20, or arbitrary bytes.
 ///
 /// Some fields are drawn near the values in `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {

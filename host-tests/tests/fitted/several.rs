@@ -1,4 +1,6 @@
-//! Plans with free altitudes in fitted slots against several interferers, which relays replace by a hypothetical one.
+//! Plans with free altitudes in fitted slots against several interferers.
+//!
+//! Relays replace the interferers by a hypothetical one.
 
 use rand::{RngExt, SeedableRng};
 use uav_relay::Placement;

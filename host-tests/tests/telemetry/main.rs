@@ -19,7 +19,9 @@ const fn s(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Returns the setup of `relays` signing relays with the paper's mission, and a watching station at Tx from `from` on.
+/// Returns the setup of `relays` signing relays with the paper's mission, and a station at Tx.
+///
+/// The station watches from the time `from` on.
 fn setup(relays: u16, access: Option<Access>, from: Instant, until: Instant) -> Setup {
     let mission = Mission::try_new(paper(relays)).unwrap();
     let mut setup = access.map_or_else(
@@ -104,13 +106,13 @@ impl Figures {
         }
     }
 
-    /// Returns the age that the reports of each relay do not exceed for this share of the time, s; the worst relay's.
+    /// Returns the age that reports do not exceed for this share of the time, s, of the worst relay.
     fn age_s(&self, share: f64) -> f64 {
         let all = self.ages_s.iter().map(|ages| quantile(ages, share));
         all.fold(0.0, f64::max)
     }
 
-    /// Returns the share of the rate that Watch and Report take on the most loaded link in any 30 s, in bytes per second.
+    /// Returns the bytes per second of Watches and Reports on the most loaded link, in any 30 s.
     fn most_bytes(&self, between: [Instant; 2]) -> f64 {
         let mut most: f64 = 0.0;
         let links: std::collections::BTreeSet<String> = self
@@ -177,8 +179,9 @@ fn is_telemetry(wire: &[u8]) -> bool {
     is_message && matches!(plain.get(10), Some(0x15 | 0x16))
 }
 
-/// Returns the least distance of `place` from the positions of a drone from 0.4 s before `at` to 0.4 s after it: times of
-/// reports are in tenths of a second per hop, and positions are reported every 0.2 s.
+/// Returns the least distance of `place` from the positions of a drone within 0.4 s of `at`, m.
+///
+/// Times of reports are in tenths of a second per hop, and positions are reported every 0.2 s.
 fn error(track: &[(Instant, Placement)], at: Instant, place: Placement) -> f64 {
     let near = Duration::from_millis(400);
     let axes = |of: Placement| [of.x_m, of.y_m, of.altitude_m].map(f64::from);
@@ -249,7 +252,7 @@ fn eight_relays_on_a_channel_report_within_two_seconds() {
     }
 }
 
-/// Returns the figures of all seeds together: the ages of each relay's reports in all runs, and the most bytes of any run.
+/// Returns the figures of all seeds together, and the most bytes per second of any run.
 fn runs(seeds: u64, span: [Instant; 2], end: Side, change: impl Fn(&mut Setup)) -> (Figures, f64) {
     let mut all_runs = Figures::default();
     let mut most = 0.0_f64;

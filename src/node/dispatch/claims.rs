@@ -110,8 +110,9 @@ impl Node {
         self.duplicate.number()
     }
 
-    /// Returns the number of the lease renewal in which a handshake must be sent after `message`; `None` if none must.
+    /// Returns the number of the lease renewal that requires a handshake after `message`.
     ///
+    /// `None` if `message` requires none.
     /// On a shared channel this is so once in each lease renewal. From the handshake another node with the same
     /// number detects this relay, even if the chain sends nothing else.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {

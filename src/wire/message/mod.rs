@@ -116,14 +116,14 @@ pub enum Message {
     },
     /// Either direction: claim to the sender's node number, or the echo of another node's claim.
     Claim(Claim),
-    /// Away from a ground station: request for the reports of all relays.
+    /// Request for the reports of all relays, away from a ground station.
     Watch {
         /// Number of the request, wrapping. The station raises it every five seconds.
         number: u16,
         /// Digest of the mission that the sender loaded before flight.
         mission: u16,
     },
-    /// Toward a ground station that watches: states of relays.
+    /// States of relays, toward a ground station that watches.
     Report(Reports),
 }
 

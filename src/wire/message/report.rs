@@ -34,7 +34,9 @@ impl Coarse {
         Self::new(if is_known { quarters } else { [UNKNOWN; 3] })
     }
 
-    /// Creates a position from its coordinates in quarters of a metre, -2^23 to 2^23 - 1; -2^23 for an unknown one.
+    /// Creates a position from its coordinates in quarters of a metre, -2^23 to 2^23 - 1.
+    ///
+    /// A position with a coordinate of -2^23 is unknown.
     pub fn new(quarters: [i32; 3]) -> Self {
         Self(quarters.map(|axis| {
             let [a, b, c, _] = axis.to_le_bytes();
@@ -83,7 +85,9 @@ impl Entry {
         self.relay.number()
     }
 
-    /// Returns the state: the phase, and in units of 8, 64, 512 and 4096 the hold reasons, flags and the control state.
+    /// Returns the number of the state. Its digits are the phase, two hold reasons, flags and the control state.
+    ///
+    /// Their units are 1, 8, 64, 512 and 4096.
     pub const fn state(&self) -> u16 {
         self.state.number()
     }
