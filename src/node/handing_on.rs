@@ -4,6 +4,11 @@
 //!
 //! Without the feature `auth` there is nothing to hand on, because ground stations sign all frames.
 
+#![expect(
+    clippy::unused_self,
+    reason = "the same interface as that of `reports`"
+)]
+
 use super::context::Member;
 use super::neighbour::Neighbours;
 use crate::place::Placement;

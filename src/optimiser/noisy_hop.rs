@@ -32,7 +32,7 @@
 //! g falls with rho and, at a given position, with the distance of the sender. So the reach falls with the target and rises with
 //! the sender's x, as without noise. Accuracy: `reaches_in_noise_agree_with_the_reference` in `host-tests/tests/noise/`.
 //!
-//! [`closest`] finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed form in
+//! `closest` finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed form in
 //! [`from_rx`](super::from_rx).
 
 use crate::root::sqrt;
