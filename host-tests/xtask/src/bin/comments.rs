@@ -205,8 +205,8 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Ok((count, faults)) => {
-            eprintln!("{}", faults.join("\n"));
-            eprintln!(
+            println!("{}", faults.join("\n"));
+            println!(
                 "{} of {count} doc comments do not follow the rule: begin the summary with a noun, an article or a verb; at most {LONGEST} characters",
                 faults.len()
             );
