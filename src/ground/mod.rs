@@ -105,8 +105,7 @@ pub struct Ground {
     offer_number: Option<u16>,
     due: bool,
     repeat_at: Option<Instant>,
-    /// Clock of the station's timers, which never runs backwards. Every upload and every query sets it to the
-    /// caller's time.
+    /// Clock of the station's timers, which never runs backwards.
     clock: MonotonicClock,
     reports: PendingReports,
     #[cfg(feature = "telemetry")]
@@ -199,8 +198,7 @@ impl Ground {
         self.offer_number = None;
         self.unanswered = 0;
         self.due = true;
-        self.clock = MonotonicClock::new(now);
-        self.repeat_at = Some(now + REPEAT_AFTER);
+        self.repeat_at = Some(self.clock.advance(now) + REPEAT_AFTER);
     }
 
     /// Sends the interference measured at this station to the relays in reach. Returns false, and does nothing, if
@@ -248,7 +246,7 @@ impl Ground {
     #[cfg(feature = "telemetry")]
     pub fn reports(&self) -> impl Iterator<Item = Report> {
         let known = self.watching.known.iter();
-        known.map(|known| Report::of(&known.entry, known.detail, known.at))
+        known.map(|known| Report::of(&known.entry, known.detail, self.clock.external(known.at)))
     }
 
     /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
@@ -609,7 +607,10 @@ struct KnownState {
 
 #[cfg(feature = "telemetry")]
 impl Watching {
-    /// Creates a station that requests nothing. A start with a larger `epoch` has larger request numbers.
+    /// Creates a station that requests nothing. A start with the next `epoch` has larger request numbers.
+    ///
+    /// After a run of more than 85 minutes the numbers of the next start may be smaller. Relays then ignore requests
+    /// until 60 s after the last one of that run.
     #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
     const fn new(epoch: u32, all: u16) -> Self {
         Self {
@@ -660,8 +661,9 @@ impl Watching {
     /// Makes the newest report of every relay of the entries that have arrived, at `now`.
     fn apply(&mut self, now: Instant) {
         for (entry, detail) in &self.arrived {
-            let age = Duration::from_millis(100).times(entry.age.into());
-            let at = Instant::from_micros(now.as_micros().saturating_sub(age.as_micros()));
+            let Some(at) = entry.time(now) else {
+                continue;
+            };
             let (entry, detail) = (*entry, *detail);
             match (self.known).binary_search_by_key(&entry.relay(), |known| known.entry.relay()) {
                 Ok(index) => {

@@ -5,7 +5,7 @@
 //! | new Watch received from a side | report toward that side for 60 s; hand the Watch on to the other side |
 //! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 25 s |
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
-//! | that Report answers an older Watch | hand the newest Watch on to its sender again, at most every second |
+//! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -50,6 +50,9 @@ const OLD: Duration = Duration::from_millis(2_000);
 
 /// Minimum time between two reports of a relay.
 const LEAST_PERIOD: Duration = Duration::from_millis(500);
+
+/// Age from which an entry is not handed on. An age of 255 tenths of a second has no upper limit.
+const OLDEST: Duration = Duration::from_millis(25_000);
 
 /// Number of stored entries of other relays.
 const STORED: usize = 16;
@@ -331,9 +334,10 @@ impl Reporting {
         watched.is_fed = true;
         let mut detail = report.detail;
         for entry in &report.entries {
-            let age = Duration::from_millis(100).times(entry.age.into());
-            let micros = now.as_micros().saturating_sub(age.as_micros());
-            self.store(now, *entry, detail.take(), Instant::from_micros(micros));
+            let detail = detail.take();
+            if let Some(at) = entry.time(now) {
+                self.store(now, *entry, detail, at);
+            }
         }
         true
     }
@@ -390,8 +394,10 @@ impl Reporting {
             let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }
-        self.stored
-            .retain(|stored| stored.is_new || now.since(stored.at) < period.times(3));
+        self.stored.retain(|stored| {
+            let age = now.since(stored.at);
+            age < OLDEST && (stored.is_new || age < period.times(3))
+        });
         let mut is_left = false;
         for are_new in [true, false] {
             for stored in &mut self.stored {
@@ -444,7 +450,7 @@ impl Reporting {
             (false, false) => {
                 now + period
                     + Duration::from_micros(late.as_micros() / 8)
-                        .times(micros(now.since(Instant::ZERO)) & 7)
+                        .times((5 * u32::from(member.node) + 3 * u32::from(watched.count)) & 7)
             }
         };
         watched.is_fed = false;
@@ -458,7 +464,8 @@ impl Reporting {
     /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = micros(settings.hop_time) / 1_200 * 106;
+        let hop = (settings.hop_time.as_micros() * 106 / 1_200).clamp(1, 1 << 24);
+        let hop = u32::try_from(hop).unwrap_or(u32::MAX);
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
             Wiring::Shared => {

@@ -7,6 +7,7 @@ use super::parts::{MessageError, PassId, Word, read, tag, write};
 use crate::mission::MAX_RELAYS;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::place::Placement;
+use crate::time::{Duration, Instant};
 
 /// Maximum number of entries in one report. A relay without any feature then has room for the message.
 const MOST_ENTRIES: usize = 4;
@@ -78,6 +79,15 @@ impl Entry {
             state: Word::new(state),
             at,
         }
+    }
+
+    /// Returns the time of the state, for an entry received at `now`.
+    ///
+    /// `None` if it is older than an entry can say, or than the receiver's clock.
+    pub fn time(&self, now: Instant) -> Option<Instant> {
+        let age = Duration::from_millis(100).times(self.age.into());
+        let micros = now.as_micros().checked_sub(age.as_micros())?;
+        (self.age < u8::MAX).then(|| Instant::from_micros(micros))
     }
 
     /// Returns the number of the relay in the mission.
