@@ -30,6 +30,10 @@ impl Reporting {
 
     pub(crate) fn handle_measured(&mut self, _: f32) {}
 
+    pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
+        None
+    }
+
     pub(crate) fn handle_timeout(&mut self, _: Instant) {}
 
     pub(crate) fn handle(

@@ -105,6 +105,8 @@ struct Watched {
     /// since then.
     confirmed: Instant,
     unconfirmed: u8,
+    /// Node to which a handshake is due that requests a reply.
+    to_greet: Option<u16>,
     /// Time of the next report, at least `free`.
     due: Instant,
     /// Time from which the share of the channel allows a report.
@@ -181,6 +183,8 @@ impl Reporting {
                 if is_relay(member, to) {
                     let mission = member.digest;
                     if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
+                        // It may have restarted: then it accepts only handshakes.
+                        watched.to_greet = Some(to).filter(|_| watched.unconfirmed > 0);
                         watched.hand_on |= mask(CANDIDATES);
                         watched.hand_on_at = now + REPEAT_AFTER.times(1 << watched.unconfirmed);
                         watched.unconfirmed = (watched.unconfirmed + 1).min(MOST_DOUBLINGS);
@@ -197,6 +201,12 @@ impl Reporting {
             }
         }
         None
+    }
+
+    /// Returns the next node to which a handshake is due that requests a reply.
+    pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
+        let mut watched = self.watched.iter_mut();
+        watched.find_map(|watched| watched.to_greet.take())
     }
 
     /// Records that the relay's timers have been handled up to `now`.
@@ -464,7 +474,7 @@ impl Reporting {
     /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = (settings.hop_time.as_micros() * 106 / 1_200).clamp(1, 1 << 24);
+        let hop = (settings.hop_time.as_micros() * 103 / 1_200).clamp(1, 1 << 24);
         let hop = u32::try_from(hop).unwrap_or(u32::MAX);
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
@@ -475,7 +485,7 @@ impl Reporting {
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);
-        Duration::from_micros(if is_both { alone * 19 / 8 } else { alone })
+        Duration::from_micros(if is_both { alone * 5 / 2 } else { alone })
     }
 }
 

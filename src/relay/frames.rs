@@ -154,6 +154,9 @@ pub(super) fn poll_transmit(
         if let Some((_, to)) = node.poll_claim() {
             session.request_reply(to);
         }
+        if let Some(to) = node.poll_greeting() {
+            session.request_reply(to);
+        }
         session.pin(node.neighbours());
         let sent = endpoint.transmit_handshake(frame, node.stats_mut());
         if sent.is_some() {

@@ -21,6 +21,11 @@ impl Node {
         }
     }
 
+    /// Returns the next node to which a handshake is due because it has not reported.
+    pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
+        self.reporting.poll_greeting()
+    }
+
     /// Returns the next Watch or Report, with its side and its destination.
     pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let wait = self.telemetry_waits();
