@@ -234,7 +234,10 @@ fn the_page_shows_four_flying_relays_and_their_faults() {
 
     // The pilot takes over drone 3, and gives it back.
     flown[2].drone.order("mode pilot");
-    page.alarms(SOON, "relay 3 released: the pilot took control");
+    page.alarms(
+        SOON,
+        "relay 3 released: under the pilot's or the autopilot's control",
+    );
     flown[2].is_engaged();
     page.is_clear("released");
 
@@ -246,7 +249,12 @@ fn the_page_shows_four_flying_relays_and_their_faults() {
 
     // The companion of drone 2 ends, and starts again.
     flown[1].relay.signal(rustix::process::Signal::KILL);
+    let killed = Instant::now();
     page.alarms(LOST, "critical relay 2");
+    page.alarms(
+        LOST.saturating_sub(killed.elapsed()),
+        "relay 2 lost: reported by relay",
+    );
     flown[1].relay = restart(&chain, 2);
     page.is_clear("critical relay 2");
     station.stopped();
