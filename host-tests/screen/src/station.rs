@@ -40,7 +40,6 @@ pub struct Frames {
 
 /// Newest report of a relay, and the past that its alarms depend on.
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "one for each alarm")]
 struct Known {
     report: Report,
     /// True from the control by the relay until the pilot takes it, also without a link to the autopilot.

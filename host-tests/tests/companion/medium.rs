@@ -86,9 +86,9 @@ impl Medium {
     pub(crate) fn paced(ttys: usize, baud: u32) -> Self {
         let ptys: Vec<Pty> = (0..ttys).map(|_| Pty::new()).collect();
         let paths: Vec<PathBuf> = ptys.iter().map(|pty| pty.path().to_owned()).collect();
-        paths
-            .iter()
-            .for_each(|path| make_raw(path.to_str().unwrap()));
+        for path in &paths {
+            make_raw(path.to_str().unwrap());
+        }
         let ptys = ptys.into_iter().map(|pty| Some(Arc::new(pty))).collect();
         let byte = Duration::from_secs(10) / baud;
         let paced = move |_, sent: &[u8]| {
