@@ -208,7 +208,7 @@ fn a_ground_of_another_key_network_or_mission_is_ignored() {
         key: Key::new([8; 32]),
         epoch: 1,
     };
-    let grounds: [(Ground, Mission, Counter); 3] = [
+    let grounds: Vec<(Ground, Mission, Counter)> = vec![
         (
             Ground::new(&base, Side::Upstream, 7, Wiring::Pair, stranger),
             base,
