@@ -24,8 +24,8 @@ pub struct Report {
     pub agreed: Option<Placement>,
     /// Phase of the relay's protocol.
     pub phase: Phase,
-    /// True while the relay is passive because another node has its number.
-    pub is_passive: bool,
+    /// True while a lease covers the agreement, as [`Relay::lease`](crate::Relay::lease) does.
+    pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
     /// Reasons to hold the position, because of each neighbour.
@@ -92,7 +92,7 @@ impl Report {
             setpoint: None,
             agreed: None,
             phase: numbered(&PHASES, digit(1) + 1).unwrap_or(Phase::Idle),
-            is_passive: false,
+            holds_lease: state / 2048 % 2 == 1,
             control: numbered(&CONTROLS, state / 4096),
             hold_reasons: [8, 64].map(|unit| numbered(&HOLDS, digit(unit))),
             neighbours: [None; 2],
@@ -113,5 +113,34 @@ impl Report {
             report.version = detail.version();
         }
         report
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_of_a_state_is_independent() {
+        let report = |state| {
+            let entry = Entry::new(2, 0, state, Coarse::of(None));
+            Report::of(&entry, None, Instant::ZERO, None)
+        };
+        for holds_lease in [false, true] {
+            let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * 4;
+            let report = report(rest + 2048 * u16::from(holds_lease));
+            assert_eq!(
+                (report.holds_lease, report.phase),
+                (holds_lease, Phase::Holding)
+            );
+            assert_eq!(report.silent, [false, true]);
+            assert_eq!(
+                (report.hold_reasons, report.control),
+                (
+                    [Some(HoldReason::Order), Some(HoldReason::Halted)],
+                    Some(State::Engaged)
+                )
+            );
+        }
     }
 }

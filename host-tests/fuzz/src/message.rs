@@ -239,7 +239,7 @@ impl Body<'_, '_> {
         for _ in 0..self.small(0, 4) {
             self.relay();
             self.several(1);
-            self.word(4);
+            self.word(0x0804);
             self.several(9);
         }
     }

@@ -74,7 +74,9 @@ impl Reason {
             }
             Self::Infeasible => format!("{by}: no positions meet any target SIR, positions kept"),
             Self::ChainSilent => "nothing received from the chain".to_owned(),
-            Self::Released => format!("{by} released: the pilot took control"),
+            Self::Released => {
+                format!("{by} released: under the pilot's or the autopilot's control")
+            }
             Self::LeaseExpired => format!("last agreement expired, setpoint kept: {by}"),
             Self::NotReceived => format!("relay {subject} does not receive {by}"),
             Self::Mission => format!("relay {subject} has another mission: reported by {by}"),

@@ -196,8 +196,7 @@ fn is_flown(report: &Report) -> bool {
 }
 
 fn condition(report: &Report) -> Condition {
-    if report.is_passive
-        || matches!(report.phase, Phase::NoQuorum | Phase::Infeasible)
+    if matches!(report.phase, Phase::NoQuorum | Phase::Infeasible)
         || report.control == Some(State::Blind)
     {
         Condition::Fault
@@ -211,7 +210,6 @@ fn condition(report: &Report) -> Condition {
 /// Returns the phase of a relay's protocol in words.
 pub(crate) const fn phase(report: &Report) -> &'static str {
     match report.phase {
-        _ if report.is_passive => "passive",
         Phase::Idle => "idle",
         Phase::Planning => "planning",
         Phase::Waiting => "waiting for the chain",

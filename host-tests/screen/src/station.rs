@@ -5,10 +5,10 @@
 //! | a relay has not reported yet | notice |
 //! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`] | critical, one for the relay |
 //! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
-//! | no quorum, no feasible positions, a passive relay | critical |
+//! | no quorum, no feasible positions | critical |
 //! | autopilot without a position, or its link lost after it was there | critical |
 //! | drone not engaged any more, until it is engaged again | warning |
-//! | agreed position lost, setpoint kept | warning |
+//! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
 //! | frames rejected by the station in the last [`REJECTED_FOR`] | notice |
 //!
@@ -29,9 +29,6 @@ const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 /// Time for which the rejection of a frame is shown.
 const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 
-/// Time for which a relay counts as passive after the last report that says so. Two nodes of one number report in turn.
-const PASSIVE_FOR: Duration = Duration::from_millis(10_000);
-
 /// Frame counters of a station.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Frames {
@@ -43,15 +40,14 @@ pub struct Frames {
 
 /// Newest report of a relay, and the past that its alarms depend on.
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::struct_excessive_bools, reason = "one for each alarm")]
 struct Known {
     report: Report,
     /// True from the control by the relay until the pilot takes it, also without a link to the autopilot.
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
-    has_lost_agreement: bool,
-    passive_at: Option<Instant>,
+    /// Time of the first report of an agreed position without a lease; `None` while that is not so.
+    unleased_at: Option<Instant>,
 }
 
 impl Known {
@@ -61,8 +57,7 @@ impl Known {
             was_engaged: false,
             is_released: false,
             is_link_lost: false,
-            has_lost_agreement: false,
-            passive_at: None,
+            unleased_at: None,
         }
     }
 
@@ -81,17 +76,14 @@ impl Known {
         let was_linked = before.control.is_some_and(|it| it != State::Silent);
         self.is_link_lost =
             report.control == Some(State::Silent) && (self.is_link_lost || was_linked);
-        let has_setpoint_only = report.agreed.is_none() && report.setpoint.is_some();
-        self.has_lost_agreement =
-            has_setpoint_only && (self.has_lost_agreement || before.agreed.is_some());
-        if report.is_passive {
-            self.passive_at = Some(report.at);
-        }
+        let is_unleased = report.agreed.is_some() && !report.holds_lease;
+        self.unleased_at = is_unleased.then(|| self.unleased_at.unwrap_or(report.at));
     }
 
-    fn is_passive(&self, now: Instant) -> bool {
-        let is_recent = |at: Instant| now.since(at) < PASSIVE_FOR;
-        self.report.is_passive || self.passive_at.is_some_and(is_recent)
+    /// Returns true if the lease has expired. A new view has no lease before its agreement.
+    fn has_expired(&self) -> bool {
+        let is_long = |at: Instant| self.report.at.since(at) >= SILENT_AFTER;
+        self.unleased_at.is_some_and(is_long)
     }
 
     /// Returns true if the drone is in the air and its position is unknown.
@@ -281,7 +273,6 @@ impl StationView {
                 (Reason::Blind, known.is_blind()),
                 (Reason::LinkLost, known.is_link_lost),
                 (Reason::Released, known.is_released),
-                (Reason::Duplicate, known.is_passive(now)),
             ];
             for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
                 add(reason, number, vec![number], String::new());
@@ -300,7 +291,7 @@ impl StationView {
             let lasts = |it: &&Known| match reason {
                 Reason::NoQuorum => it.report.phase == Phase::NoQuorum,
                 Reason::Infeasible => it.report.phase == Phase::Infeasible,
-                _ => it.has_lost_agreement,
+                _ => it.has_expired(),
             };
             let by = self.known.values().filter(lasts);
             let by: Vec<u16> = by.map(|it| it.report.relay).collect();

@@ -37,7 +37,7 @@ fn healthy(relay: u16) -> Report {
         setpoint: place,
         agreed: place,
         phase: Phase::Holding,
-        is_passive: false,
+        holds_lease: true,
         control: Some(State::Engaged),
         hold_reasons: [None; 2],
         neighbours: [Some(relay - 1).filter(|it| *it > 0), next],
@@ -122,9 +122,8 @@ impl Watched {
             "nolink" => report.control = Some(State::Silent),
             "bench" => (report.control, report.position) = (None, None),
             "unlocated" => report.position = None,
-            "unagreed" => report.agreed = None,
+            "expired" => report.holds_lease = false,
             "restarted" => (report.agreed, report.setpoint) = (None, None),
-            "passive" => report.is_passive = true,
             "brief" => {
                 (report.agreed, report.setpoint, report.neighbours) = (None, None, [None; 2]);
                 report.version = 0;

@@ -15,6 +15,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     stranger, vehicle            heartbeats of no known autopilot; of its own kind again
     noise 150                    a SiK radio hears so much between frames
     clear 2                      a ground station clears relay 2: MAV_CMD_USER_1 to the companion, by way of this autopilot
+    track                        from now on its place is an output line, too, 50 times a second, with this computer's time
     unplug, plug                 the tty or the UDP port vanishes; another one is there
 """
 
@@ -129,7 +130,7 @@ class Drone:
     def __init__(self, kind, link, at, key):
         self.kind, self.home, self.key = kind, at, key
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
-        self.is_stranger = False
+        self.is_stranger = self.is_tracked = False
         self.port = port_of(link)
         self.start()
         self.plug()
@@ -180,6 +181,8 @@ class Drone:
                 self.silent = word == "mute"
             case ["stranger" | "vehicle" as word]:
                 self.is_stranger = word == "stranger"
+            case ["track"]:
+                self.is_tracked = True
             case ["noise", noise]:
                 self.noise(int(noise))
             case ["clear", *relays]:
@@ -204,6 +207,8 @@ class Drone:
 
     def step(self):
         now = time.monotonic()
+        if self.is_tracked:
+            print(json.dumps({"mavpackettype": "PLACE", "time_s": time.time(), "at": self.at}), flush=True)
         if self.landed == TAKEOFF:
             self.at[2] += 10.0 * STEP
             if now - self.took_off_at > 1.0:

@@ -46,7 +46,7 @@ pub(crate) struct Chain {
     /// Serial wire between relay 1 (tty 1) and the ground station at the transmitter (tty 0). `None` in a chain
     /// without a ground station.
     pub(crate) tx: Option<Medium>,
-    of: usize,
+    pub(crate) of: usize,
     pub(crate) files: Files,
     /// Command-line options of all relays.
     options: String,

@@ -24,6 +24,7 @@ mod peer;
 mod positions;
 mod process;
 mod pty;
+mod reported;
 mod signed;
 mod soak;
 mod stand;

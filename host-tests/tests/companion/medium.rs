@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -79,6 +80,22 @@ impl Medium {
         let paths = ptys.iter().map(|pty| pty.path().to_owned()).collect();
         let ptys = ptys.map(|pty| Some(Arc::new(pty)));
         Self::of(paths, ptys.into(), QUIET, Box::new(gate), None)
+    }
+
+    /// Creates a radio channel without noise that carries `baud` bit/s in all, from one sender at a time.
+    pub(crate) fn paced(ttys: usize, baud: u32) -> Self {
+        let ptys: Vec<Pty> = (0..ttys).map(|_| Pty::new()).collect();
+        let paths: Vec<PathBuf> = ptys.iter().map(|pty| pty.path().to_owned()).collect();
+        for path in &paths {
+            make_raw(path.to_str().unwrap());
+        }
+        let ptys = ptys.into_iter().map(|pty| Some(Arc::new(pty))).collect();
+        let byte = Duration::from_secs(10) / baud;
+        let paced = move |_, sent: &[u8]| {
+            std::thread::sleep(byte * u32::try_from(sent.len()).unwrap());
+            true
+        };
+        Self::of(paths, ptys, QUIET, Box::new(paced), None)
     }
 
     /// Creates a medium without noise whose ttys can be unplugged.

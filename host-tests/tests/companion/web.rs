@@ -17,7 +17,7 @@ use crate::pty::Pty;
 const LATE: Duration = Duration::from_millis(1_500);
 
 /// Returns the address of the page, which the station logs.
-fn address(station: &mut Relay) -> String {
+pub(crate) fn address(station: &mut Relay) -> String {
     let line = station.line("screen: open http://127.0.0.1:");
     let url = line.split("http://").nth(1).unwrap();
     url.split('/').next().unwrap().to_owned()
@@ -36,7 +36,7 @@ fn get(address: &str, path: &str) -> TcpStream {
 }
 
 /// Returns the snapshots of a stream of events.
-fn snapshots(address: &str) -> impl Iterator<Item = Value> {
+pub(crate) fn snapshots(address: &str) -> impl Iterator<Item = Value> {
     let lines = BufReader::new(get(address, "/events")).lines();
     let data = lines.map_while(Result::ok).filter_map(|line| {
         let text = line.strip_prefix("data: {")?.to_owned();

@@ -61,7 +61,8 @@ impl Node {
         let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
         let sides = [Side::Upstream, Side::Downstream];
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
-        let state = self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d);
+        let holds_lease = u16::from(self.lease().is_some());
+        let state = self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d + 4 * holds_lease);
         (state, [self.setpoint(), self.agreed_place()])
     }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Geofence, Instant, Report};
 use uav_relay_screen::alarms::Alarms;
-use uav_relay_screen::{LogLine, Snapshot, chain};
+use uav_relay_screen::{Condition, LogLine, Snapshot, chain};
 
 use crate::report::{seconds, timeline};
 use crate::simulator::chain::Chain;
@@ -53,9 +53,13 @@ impl LiveView {
                 text: timeline::line(moment),
             });
         }
-        let (mut profiles, mut is_estimated) = (Vec::new(), false);
+        let (mut profiles, mut passive) = (Vec::new(), Vec::new());
+        let mut is_estimated = false;
         for relay in chain.live(now) {
             profiles.push((relay.report.relay, relay.profile));
+            if relay.is_passive {
+                passive.push(relay.report.relay);
+            }
             if relay.is_on {
                 is_estimated |= relay.estimates;
                 self.known.insert(relay.report.relay, relay.report);
@@ -70,10 +74,17 @@ impl LiveView {
             axis: self.axis.as_ref(),
             geofence: self.geofence,
         };
-        Snapshot {
+        let mut snapshot = Snapshot {
             name: Some(format!("Simulated chain of {} relays", reports.len())),
             log,
             ..state.snapshot(now, &reports, &self.alarms)
+        };
+        for relay in &mut snapshot.relays {
+            if passive.contains(&relay.number) {
+                relay.phase = Some("passive".to_owned());
+                relay.condition = Some(Condition::Fault);
+            }
         }
+        snapshot
     }
 }

@@ -13,6 +13,8 @@ pub struct LiveRelay {
     pub report: Report,
     /// True while the relay is switched on.
     pub is_on: bool,
+    /// True while the relay is passive because another node has its number.
+    pub is_passive: bool,
     /// Altitude and power of the relay.
     pub profile: Profile,
     /// True if the relay has an interference estimate of its own, instead of that of the mission.
@@ -67,7 +69,7 @@ impl Chain {
                 setpoint: relay.setpoint(),
                 agreed: relay.agreed_place(),
                 phase: relay.phase(),
-                is_passive: relay.is_passive(),
+                holds_lease: relay.lease().is_some(),
                 control: vehicle.map(|vehicle| vehicle.link.state()),
                 hold_reasons: [Side::Upstream, Side::Downstream]
                     .map(|side| relay.hold_reason(side)),
@@ -79,6 +81,7 @@ impl Chain {
             LiveRelay {
                 report,
                 is_on: member.killed.is_none(),
+                is_passive: relay.is_passive(),
                 profile: relay.profile(),
                 estimates: relay.interference_estimate().number > 0,
             }
