@@ -13,8 +13,10 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two snapshots, s, of a flight with at most [`MOST`] of them. A longer flight has as many, farther apart.
+/// Time between two computed snapshots, s. Alarms compare times of seconds, so it is the same in a flight of any duration.
 const PERIOD: f64 = 0.5;
+
+/// Number of stored snapshots, besides the last one. Of a flight with more, only every k-th is stored.
 const MOST: f64 = 7_200.0;
 
 /// Longest time between two reported positions between which a position is interpolated, s.
@@ -62,7 +64,7 @@ pub struct Flight {
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
-    /// Time between two snapshots, s.
+    /// Time between two stored snapshots, s. The last one is at the end of the flight.
     pub period: f64,
     /// Snapshots, each as its difference from the one before.
     pub steps: Vec<Value>,
@@ -78,7 +80,7 @@ pub struct Flight {
     ///
     /// The first share is that of all relays, the second that of as many as the last agreed view had then.
     pub available: Option<(f64, [f64; 2])>,
-    /// Lowest SIR of a known hop at each snapshot, dB.
+    /// Lowest SIR of a known hop since the stored snapshot before, for each stored one, dB.
     pub worst_db: Vec<Option<f64>>,
     /// Times in which relays did not report.
     pub losses: Vec<Loss>,
@@ -112,12 +114,14 @@ impl Flight {
     pub fn new(frames: &[Frame], relays: u16, loaded: Option<&Loaded>) -> Self {
         let begin = frames.first().map_or(0.0, |frame| frame.at);
         let duration = frames.last().map_or(0.0, |frame| frame.at - begin);
-        let is_long = duration > MOST * PERIOD;
-        let period = if is_long {
-            (duration / MOST).ceil()
-        } else {
-            PERIOD
-        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "number of snapshots"
+        )]
+        let [count, every] =
+            [1.0, MOST].map(|most| (duration / (most * PERIOD)).ceil().max(1.0) as usize);
+        let period = every as f64 * PERIOD;
         let mut flight = Self {
             begin,
             duration,
@@ -129,17 +133,15 @@ impl Flight {
         flight.follow_frames(frames);
         let mut recorder = Recorder::new(&reports, loaded);
         let mut shown = json!({});
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at most 7200"
-        )]
-        let count = (duration / period).ceil() as usize;
         for step in 0..=count {
-            let now = step as f64 * period;
+            let now = (step as f64 * PERIOD).min(duration);
             let received = frames.partition_point(|frame| frame.at - begin <= now);
             let snapshot =
                 recorder.advance(&mut flight, now, frames.get(..received).unwrap_or_default());
+            if step % every != 0 && step != count {
+                continue;
+            }
+            flight.worst_db.push(recorder.worst_db.take());
             let value = compact(&snapshot, now);
             flight
                 .steps
@@ -152,6 +154,11 @@ impl Flight {
             .log
             .sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
         flight
+    }
+
+    /// Returns the time of a stored snapshot, s.
+    pub fn time_of(&self, step: usize) -> f64 {
+        (step as f64 * self.period).min(self.duration)
     }
 
     /// Finds the agreed views, and the missions that a ground station uploads.
@@ -235,6 +242,8 @@ struct Recorder<'a> {
     received: u32,
     newest: BTreeMap<u16, Report>,
     tracks: BTreeMap<u16, Vec<(f64, Placement)>>,
+    /// Lowest SIR since the last stored snapshot, dB.
+    worst_db: Option<f64>,
     /// Times in which relays do not report now, by relay.
     open: BTreeMap<u16, Loss>,
     /// Last time when no relay reported.
@@ -262,6 +271,7 @@ impl<'a> Recorder<'a> {
             received: 0,
             newest: BTreeMap::new(),
             tracks,
+            worst_db: None,
             open: BTreeMap::new(),
             silent_at: Instant::ZERO,
             agreed: None,
@@ -305,9 +315,12 @@ impl<'a> Recorder<'a> {
                 hop.measured_back_db.or(hop.sir_back_db),
             ]
         });
-        flight.worst_db.push(sirs.flatten().reduce(f64::min));
+        self.worst_db = sirs.flatten().chain(self.worst_db).reduce(f64::min);
         self.losses(flight, now, &snapshot);
-        self.nearest(flight, now);
+        for report in &new {
+            self.nearest(flight, seconds(report.at), Some(report.relay));
+        }
+        self.nearest(flight, now, None);
         snapshot
     }
 
@@ -390,13 +403,20 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    fn nearest(&self, flight: &mut Flight, now: f64) {
+    /// Compares the distances of all relays at a time, or of relay `only` from all others.
+    fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
-            .filter_map(|(relay, track)| Some((*relay, between(track, now)?)))
+            .filter_map(|(relay, track)| Some((*relay, between(track, time_s)?)))
             .collect();
-        for (index, (one, at)) in places.iter().enumerate() {
-            for (other, beside) in places.iter().skip(index + 1) {
+        let own = places
+            .iter()
+            .filter(|(one, _)| only.is_none_or(|only| *one == only));
+        for (one, at) in own {
+            let others = places
+                .iter()
+                .filter(|(other, _)| other > one || only.is_some() && other < one);
+            for (other, beside) in others {
                 let [x, y, up] = [
                     at.x_m - beside.x_m,
                     at.y_m - beside.y_m,
@@ -406,8 +426,8 @@ impl<'a> Recorder<'a> {
                 if flight.nearest.is_none_or(|it| distance_m < it.distance_m) {
                     flight.nearest = Some(Nearest {
                         distance_m,
-                        relays: [*one, *other],
-                        time_s: now,
+                        relays: [*one.min(other), *one.max(other)],
+                        time_s,
                     });
                 }
             }
