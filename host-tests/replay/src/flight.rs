@@ -46,6 +46,17 @@ pub struct Loss {
     pub is_reported: bool,
 }
 
+impl Loss {
+    /// Returns true if a relay was silent only in an outage of all relays: 5 s earlier at most, and 5 s longer.
+    fn is_part_of(&self, all: &Self) -> bool {
+        let margin = seconds(Instant::ZERO + SILENT_AFTER);
+        let ends = all
+            .until
+            .is_none_or(|end| self.until.is_some_and(|it| it <= end + margin));
+        ends && (0.0..=margin).contains(&(all.from - self.from))
+    }
+}
+
 /// Least distance of two relays in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
@@ -348,7 +359,11 @@ impl<'a> Recorder<'a> {
             received: self.received,
             rejected: 0,
         };
-        self.view.snapshot(instant(now), &chain, new, frames)
+        let mut snapshot = self.view.snapshot(instant(now), &chain, new, frames);
+        for alarm in &mut snapshot.alarms {
+            alarm.text = replayed(std::mem::take(&mut alarm.text));
+        }
+        snapshot
     }
 
     /// Follows availability and losses.
@@ -436,12 +451,30 @@ impl<'a> Recorder<'a> {
 
     fn finish(self, flight: &mut Flight) {
         flight.losses.extend(self.open.into_values());
+        // At an outage of all relays some of them are silent first, and some report later again.
+        let outages = flight.losses.iter().filter(|it| it.relay == 0);
+        let outages: Vec<Loss> = outages.cloned().collect();
+        flight
+            .losses
+            .retain(|it| it.relay == 0 || !outages.iter().any(|all| it.is_part_of(all)));
         flight
             .losses
             .sort_by(|one, other| one.from.total_cmp(&other.from));
         flight.available = self
             .agreed
             .map(|(at, all, agreed)| (at, agreed.map(|it| f64::from(it) / f64::from(all))));
+    }
+}
+
+/// Returns the text of a station's alarm without what the station knows of received frames. A replay knows only reports.
+fn replayed(text: String) -> String {
+    match text.split_once("nothing received from the chain") {
+        Some(("", rest)) => {
+            let time = rest.split(':').next().unwrap_or_default();
+            format!("no report of any relay{time}")
+        }
+        Some((before, _)) => before.trim_end_matches("; ").to_owned(),
+        None => text,
     }
 }
 
@@ -479,7 +512,7 @@ fn compact(snapshot: &Snapshot, now: f64) -> Value {
     value
 }
 
-/// Rounds all numbers to two decimals.
+/// Rounds all numbers to two decimals, except small powers and degrees.
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
@@ -487,7 +520,10 @@ fn round(value: &mut Value) {
             *value = rounded.into();
         }
         Value::Array(all) => all.iter_mut().for_each(round),
-        Value::Object(all) => all.values_mut().for_each(round),
+        Value::Object(all) => all
+            .iter_mut()
+            .filter(|(key, _)| !matches!(key.as_str(), "power_w" | "origin_deg"))
+            .for_each(|(_, value)| round(value)),
         _ => {}
     }
 }
@@ -521,4 +557,18 @@ fn difference(old: &Value, new: &Value) -> Option<Value> {
         _ => return Some(new.clone()),
     }
     (!changes.is_empty()).then_some(changes.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_powers_and_degrees_are_not_rounded() {
+        let mut value =
+            json!({"origin_deg": [47.123_456_7], "all": [{"power_w": 0.001, "x_m": 1.234}]});
+        round(&mut value);
+        let exact = json!({"origin_deg": [47.123_456_7], "all": [{"power_w": 0.001, "x_m": 1.23}]});
+        assert_eq!(value, exact);
+    }
 }
