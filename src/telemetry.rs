@@ -124,7 +124,7 @@ mod tests {
     fn every_part_of_a_state_is_independent() {
         let report = |state| {
             let entry = Entry::new(2, 0, state, Coarse::of(None));
-            Report::of(&entry, None, Instant::ZERO, None)
+            Report::of(&entry, None, Instant::ZERO)
         };
         for holds_lease in [false, true] {
             let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * 4;

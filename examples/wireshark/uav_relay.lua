@@ -253,7 +253,7 @@ local messages = {
         } }, unit = "", text = "details of the relay in the first entry:" },
         { name = "entries", kind = "list", most = 4, of = { kind = "group", fields = {
             { name = "relay", kind = "u16", unit = "", text = "number of the relay" },
-            { name = "age_ds", kind = "u8", unit = "0.1 s", text = "age of the state; 255: 25.5 s or more", per = 10, base = "s" },
+            { name = "age_ds", kind = "u8", unit = "0.1 s", text = "age of the state; 255: more, ignored", per = 10, base = "s" },
             { name = "state", kind = "u16", unit = "", text = "phase + 8 h + 64 k + 512 s + 1024 t + 2048 l + 4096 c" },
             { name = "position", kind = "array", size = 3, of = { kind = "i24" }, unit = "0.25 m", text = "x, y, altitude of the drone", per = 4, base = "m" },
         } }, unit = "", text = "states" },

@@ -13,8 +13,10 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two snapshots, s, of a flight with at most [`MOST`] of them. A longer flight has as many, farther apart.
+/// Time between two computed snapshots, s. Alarms compare times of seconds, so it is the same in a flight of any duration.
 const PERIOD: f64 = 0.5;
+
+/// Number of stored snapshots, besides the last one. Of a flight with more, only every k-th is stored.
 const MOST: f64 = 7_200.0;
 
 /// Longest time between two reported positions between which a position is interpolated, s.
@@ -44,6 +46,17 @@ pub struct Loss {
     pub is_reported: bool,
 }
 
+impl Loss {
+    /// Returns true if a relay was silent only in an outage of all relays: 5 s earlier at most, and 5 s longer.
+    fn is_part_of(&self, all: &Self) -> bool {
+        let margin = seconds(Instant::ZERO + SILENT_AFTER);
+        let ends = all
+            .until
+            .is_none_or(|end| self.until.is_some_and(|it| it <= end + margin));
+        ends && (0.0..=margin).contains(&(all.from - self.from))
+    }
+}
+
 /// Least distance of two relays in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
@@ -62,7 +75,7 @@ pub struct Flight {
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
-    /// Time between two snapshots, s.
+    /// Time between two stored snapshots, s. The last one is at the end of the flight.
     pub period: f64,
     /// Snapshots, each as its difference from the one before.
     pub steps: Vec<Value>,
@@ -78,7 +91,7 @@ pub struct Flight {
     ///
     /// The first share is that of all relays, the second that of as many as the last agreed view had then.
     pub available: Option<(f64, [f64; 2])>,
-    /// Lowest SIR of a known hop at each snapshot, dB.
+    /// Lowest SIR of a known hop since the stored snapshot before, for each stored one, dB.
     pub worst_db: Vec<Option<f64>>,
     /// Times in which relays did not report.
     pub losses: Vec<Loss>,
@@ -112,12 +125,14 @@ impl Flight {
     pub fn new(frames: &[Frame], relays: u16, loaded: Option<&Loaded>) -> Self {
         let begin = frames.first().map_or(0.0, |frame| frame.at);
         let duration = frames.last().map_or(0.0, |frame| frame.at - begin);
-        let is_long = duration > MOST * PERIOD;
-        let period = if is_long {
-            (duration / MOST).ceil()
-        } else {
-            PERIOD
-        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "number of snapshots"
+        )]
+        let [count, every] =
+            [1.0, MOST].map(|most| (duration / (most * PERIOD)).ceil().max(1.0) as usize);
+        let period = every as f64 * PERIOD;
         let mut flight = Self {
             begin,
             duration,
@@ -129,17 +144,15 @@ impl Flight {
         flight.follow_frames(frames);
         let mut recorder = Recorder::new(&reports, loaded);
         let mut shown = json!({});
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at most 7200"
-        )]
-        let count = (duration / period).ceil() as usize;
         for step in 0..=count {
-            let now = step as f64 * period;
+            let now = (step as f64 * PERIOD).min(duration);
             let received = frames.partition_point(|frame| frame.at - begin <= now);
             let snapshot =
                 recorder.advance(&mut flight, now, frames.get(..received).unwrap_or_default());
+            if step % every != 0 && step != count {
+                continue;
+            }
+            flight.worst_db.push(recorder.worst_db.take());
             let value = compact(&snapshot, now);
             flight
                 .steps
@@ -152,6 +165,11 @@ impl Flight {
             .log
             .sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
         flight
+    }
+
+    /// Returns the time of a stored snapshot, s.
+    pub fn time_of(&self, step: usize) -> f64 {
+        (step as f64 * self.period).min(self.duration)
     }
 
     /// Finds the agreed views, and the missions that a ground station uploads.
@@ -235,6 +253,8 @@ struct Recorder<'a> {
     received: u32,
     newest: BTreeMap<u16, Report>,
     tracks: BTreeMap<u16, Vec<(f64, Placement)>>,
+    /// Lowest SIR since the last stored snapshot, dB.
+    worst_db: Option<f64>,
     /// Times in which relays do not report now, by relay.
     open: BTreeMap<u16, Loss>,
     /// Last time when no relay reported.
@@ -262,6 +282,7 @@ impl<'a> Recorder<'a> {
             received: 0,
             newest: BTreeMap::new(),
             tracks,
+            worst_db: None,
             open: BTreeMap::new(),
             silent_at: Instant::ZERO,
             agreed: None,
@@ -305,9 +326,12 @@ impl<'a> Recorder<'a> {
                 hop.measured_back_db.or(hop.sir_back_db),
             ]
         });
-        flight.worst_db.push(sirs.flatten().reduce(f64::min));
+        self.worst_db = sirs.flatten().chain(self.worst_db).reduce(f64::min);
         self.losses(flight, now, &snapshot);
-        self.nearest(flight, now);
+        for report in &new {
+            self.nearest(flight, seconds(report.at), Some(report.relay));
+        }
+        self.nearest(flight, now, None);
         snapshot
     }
 
@@ -335,7 +359,11 @@ impl<'a> Recorder<'a> {
             received: self.received,
             rejected: 0,
         };
-        self.view.snapshot(instant(now), &chain, new, frames)
+        let mut snapshot = self.view.snapshot(instant(now), &chain, new, frames);
+        for alarm in &mut snapshot.alarms {
+            alarm.text = replayed(std::mem::take(&mut alarm.text));
+        }
+        snapshot
     }
 
     /// Follows availability and losses.
@@ -390,13 +418,20 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    fn nearest(&self, flight: &mut Flight, now: f64) {
+    /// Compares the distances of all relays at a time, or of relay `only` from all others.
+    fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
-            .filter_map(|(relay, track)| Some((*relay, between(track, now)?)))
+            .filter_map(|(relay, track)| Some((*relay, between(track, time_s)?)))
             .collect();
-        for (index, (one, at)) in places.iter().enumerate() {
-            for (other, beside) in places.iter().skip(index + 1) {
+        let own = places
+            .iter()
+            .filter(|(one, _)| only.is_none_or(|only| *one == only));
+        for (one, at) in own {
+            let others = places
+                .iter()
+                .filter(|(other, _)| other > one || only.is_some() && other < one);
+            for (other, beside) in others {
                 let [x, y, up] = [
                     at.x_m - beside.x_m,
                     at.y_m - beside.y_m,
@@ -406,8 +441,8 @@ impl<'a> Recorder<'a> {
                 if flight.nearest.is_none_or(|it| distance_m < it.distance_m) {
                     flight.nearest = Some(Nearest {
                         distance_m,
-                        relays: [*one, *other],
-                        time_s: now,
+                        relays: [*one.min(other), *one.max(other)],
+                        time_s,
                     });
                 }
             }
@@ -416,12 +451,30 @@ impl<'a> Recorder<'a> {
 
     fn finish(self, flight: &mut Flight) {
         flight.losses.extend(self.open.into_values());
+        // At an outage of all relays some of them are silent first, and some report later again.
+        let outages = flight.losses.iter().filter(|it| it.relay == 0);
+        let outages: Vec<Loss> = outages.cloned().collect();
+        flight
+            .losses
+            .retain(|it| it.relay == 0 || !outages.iter().any(|all| it.is_part_of(all)));
         flight
             .losses
             .sort_by(|one, other| one.from.total_cmp(&other.from));
         flight.available = self
             .agreed
             .map(|(at, all, agreed)| (at, agreed.map(|it| f64::from(it) / f64::from(all))));
+    }
+}
+
+/// Returns the text of a station's alarm without what the station knows of received frames. A replay knows only reports.
+fn replayed(text: String) -> String {
+    match text.split_once("nothing received from the chain") {
+        Some(("", rest)) => {
+            let time = rest.split(':').next().unwrap_or_default();
+            format!("no report of any relay{time}")
+        }
+        Some((before, _)) => before.trim_end_matches("; ").to_owned(),
+        None => text,
     }
 }
 
@@ -459,7 +512,7 @@ fn compact(snapshot: &Snapshot, now: f64) -> Value {
     value
 }
 
-/// Rounds all numbers to two decimals.
+/// Rounds all numbers to two decimals, except small powers and degrees.
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
@@ -467,7 +520,10 @@ fn round(value: &mut Value) {
             *value = rounded.into();
         }
         Value::Array(all) => all.iter_mut().for_each(round),
-        Value::Object(all) => all.values_mut().for_each(round),
+        Value::Object(all) => all
+            .iter_mut()
+            .filter(|(key, _)| !matches!(key.as_str(), "power_w" | "origin_deg"))
+            .for_each(|(_, value)| round(value)),
         _ => {}
     }
 }
@@ -501,4 +557,18 @@ fn difference(old: &Value, new: &Value) -> Option<Value> {
         _ => return Some(new.clone()),
     }
     (!changes.is_empty()).then_some(changes.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_powers_and_degrees_are_not_rounded() {
+        let mut value =
+            json!({"origin_deg": [47.123_456_7], "all": [{"power_w": 0.001, "x_m": 1.234}]});
+        round(&mut value);
+        let exact = json!({"origin_deg": [47.123_456_7], "all": [{"power_w": 0.001, "x_m": 1.23}]});
+        assert_eq!(value, exact);
+    }
 }

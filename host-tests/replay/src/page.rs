@@ -149,7 +149,7 @@ fn report(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
         "Worst hop",
         worst.map_or_else(
             || "SIR unknown: needs the mission (<code>--scenario</code>)".to_owned(),
-            |(step, db)| format!("{db:.1} dB at {}", time(step as f64 * flight.period)),
+            |(step, db)| format!("{db:.1} dB at {}", time(flight.time_of(step))),
         ),
     );
     row(
@@ -282,12 +282,7 @@ fn chart(flight: &Flight, known: impl Iterator<Item = (usize, f64)> + Clone) -> 
         } else {
             'M'
         };
-        _ = write!(
-            line,
-            "{letter}{:.1} {:.1}",
-            x(step as f64 * flight.period),
-            y(db)
-        );
+        _ = write!(line, "{letter}{:.1} {:.1}", x(flight.time_of(step)), y(db));
         last = Some(step);
     }
     format!(

@@ -27,7 +27,10 @@ function snapshotAt(time) {
 /** Shows the flight at a time. Earlier snapshots are applied in their order, so that the map has the ways flown until then. */
 function seek(time) {
   replay.time = Math.min(Math.max(time, 0), flight.duration);
-  const step = Math.min(Math.floor(replay.time / flight.period + 1e-6), flight.steps.length - 1);
+  const last = flight.steps.length - 1;
+  const isEnd = replay.time >= flight.duration;
+  // The last snapshot is at the end, whatever the period.
+  const step = isEnd ? last : Math.min(Math.floor(replay.time / flight.period + 1e-6), last);
   if (step < replay.step) {
     Object.assign(replay, { step: -1, state: {}, lines: 0 });
     map.ways.clear();
@@ -40,13 +43,13 @@ function seek(time) {
       replay.state = changed(replay.state, structuredClone(flight.steps[replay.step]));
       map.take(replay.state);
     }
-    const now = step * flight.period;
+    const now = Math.min(step * flight.period, flight.duration);
     show(snapshotAt(now));
     const until = flight.log.filter(({ time_s: at }) => at <= now).length;
     addLines(flight.log.slice(Math.max(replay.lines, until - LINES), until));
     replay.lines = until;
   }
-  byId("bar").value = String(replay.time);
+  byId("bar").value = isEnd ? byId("bar").max : String(replay.time);
   byId("bar").setAttribute("aria-valuetext", clock(replay.time));
   byId("now").textContent = `${clock(replay.time)} of ${clock(flight.duration)}`;
   byId("cursor")?.setAttribute("transform", `translate(${44 + (replay.time / Math.max(flight.duration, 1)) * 946} 0)`);
@@ -89,7 +92,7 @@ document.addEventListener("click", ({ target }) => {
   const time = target.dataset?.time;
   if (time !== undefined) seek(Number(time));
 });
-byId("bar").max = String(flight.duration);
+byId("bar").max = String((flight.steps.length - 1) * flight.period);
 byId("bar").step = String(flight.period);
 byId("bar").addEventListener("input", () => seek(Number(byId("bar").value)));
 byId("play").addEventListener("click", () => play(!replay.playing));
@@ -99,7 +102,7 @@ for (const { time_s: time, urgency, text } of flight.alarms) {
   const mark = Object.assign(document.createElement("button"), { type: "button", className: urgency, textContent: MARKS[urgency], title: `${clock(time)} ${text}` });
   mark.dataset.time = String(time);
   mark.setAttribute("aria-label", `${clock(time)} ${urgency}: ${text}`);
-  mark.style.left = `${(100 * time) / Math.max(flight.duration, 1)}%`;
+  mark.style.left = `${Math.min((100 * time) / Math.max(flight.duration, 1), 100)}%`;
   byId("marks").append(mark);
 }
 const begin = flight.begin < 1e8 ? "virtual time 0" : new Date(flight.begin * 1000).toISOString().replace("T", " ").replace(/\..*/, " UTC");
