@@ -18,7 +18,7 @@ const WINDOW: f64 = 20.0;
 /// Change of the offset between two consecutive frames that is a step of a clock, s. So is as much time backward.
 const STEP: f64 = 2.0;
 
-/// Largest time between files of one flight that have no frame in common, and between two frames of a flight, s.
+/// Largest time between files without a common frame, and between two frames of a flight, s.
 const APART: f64 = 3_600.0;
 
 /// Relation of a file's clock to that of the first file.
@@ -203,7 +203,8 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
 /// Returns a description of them; `None` for no step.
 fn without_steps(frames: &mut [Frame]) -> Option<String> {
     let times: Vec<f64> = frames.iter().map(|frame| frame.at).collect();
-    let changes = times.array_windows().map(|[one, other]| other - one);
+    let pairs = times.iter().zip(times.iter().skip(1));
+    let changes = pairs.map(|(one, other)| other - one);
     let steps = (1..).zip(changes);
     let steps: Vec<(usize, f64)> = steps
         .filter(|(_, step)| *step < -STEP || *step > APART)
