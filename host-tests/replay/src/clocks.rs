@@ -4,7 +4,7 @@
 //! in the other, or received in both. A received frame is later than the sent one by its delay. In each [`WINDOW`] the largest
 //! lower bound of the offset, from frames in one direction, and the smallest upper bound, from frames in the other, are closest to the
 //! offset; in their mean the shortest delays of both directions cancel. Between windows the offset is interpolated, which follows
-//! the drift. A step of a clock ends an interpolation.
+//! the drift. A step of a clock ends an interpolation. Steps of the first file's clock are left out.
 
 use std::collections::HashMap;
 
@@ -15,10 +15,10 @@ use crate::recording::{Frame, Recording};
 /// Time for which one offset is determined, s. Clocks drift by 100 ppm at most, 2 ms in this time.
 const WINDOW: f64 = 20.0;
 
-/// Change of the offset between two consecutive frames that is a step of a clock, s.
+/// Change of the offset between two consecutive frames that is a step of a clock, s. So is as much time backward.
 const STEP: f64 = 2.0;
 
-/// Largest time between files of one flight that have no frame in common, s.
+/// Largest time between files without a common frame, and between two frames of a flight, s.
 const APART: f64 = 3_600.0;
 
 /// Relation of a file's clock to that of the first file.
@@ -130,14 +130,14 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
         for other in &files {
             one_chain(first, other)?;
         }
-        let pairs = first.frames.windows(2);
-        let steps = pairs.filter_map(|pair| Some(pair.last()?.at - pair.first()?.at));
-        if let Some(step) = { steps }.find(|step| *step < -STEP || *step > APART) {
-            warnings.push(format!(
-                "{}: its clock is that of the flight, but steps by {step:.1} s: name a file with a steady clock first",
-                first.name
-            ));
-        }
+    }
+    if let Some(first) = files.first_mut()
+        && let Some(steps) = without_steps(&mut first.frames)
+    {
+        warnings.push(format!(
+            "{}: its clock is that of the flight, but steps {steps}: left out; name a file with a steady clock first",
+            first.name
+        ));
     }
     for file in &files {
         if let Some(fault) = &file.fault {
@@ -187,11 +187,45 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     // A frame that was captured by several nodes, or replayed by an attacker, counts once.
     let mut known = std::collections::HashSet::new();
     frames.retain(|frame| known.insert(frame.wire.clone()));
+    // Another clock may step after its last common frame.
+    if let Some(steps) = without_steps(&mut frames) {
+        warnings.push(format!("the time of the flight steps {steps}: left out"));
+    }
     Ok(Merged {
         frames,
         files: alignments.into_iter().flatten().collect(),
         warnings,
     })
+}
+
+/// Removes steps of a clock: more than [`STEP`] backward or [`APART`] forward. The clock after the last step counts.
+///
+/// Returns a description of them; `None` for no step.
+fn without_steps(frames: &mut [Frame]) -> Option<String> {
+    let times: Vec<f64> = frames.iter().map(|frame| frame.at).collect();
+    let pairs = times.iter().zip(times.iter().skip(1));
+    let changes = pairs.map(|(one, other)| other - one);
+    let steps = (1..).zip(changes);
+    let steps: Vec<(usize, f64)> = steps
+        .filter(|(_, step)| *step < -STEP || *step > APART)
+        .collect();
+    let (first, size) = *steps.first()?;
+    let mut by: f64 = steps.iter().map(|(_, step)| step).sum();
+    let mut rest = steps.iter().peekable();
+    for (index, frame) in frames.iter_mut().enumerate() {
+        if let Some((_, step)) = rest.next_if(|(at, _)| *at == index) {
+            by -= step;
+        }
+        frame.at += by;
+    }
+    let all = match steps.len() {
+        1 => String::new(),
+        all => format!(" ({all} steps in all)"),
+    };
+    let after = times.get(first - 1)? - times.first()?;
+    Some(format!(
+        "by {size:+.1} s, {after:.0} s after its first frame{all}"
+    ))
 }
 
 fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {

@@ -47,7 +47,7 @@ pub struct Loss {
 }
 
 impl Loss {
-    /// Returns true if a relay was silent only in an outage of all relays: 5 s earlier at most, and 5 s longer.
+    /// Returns true if a relay was silent only in an outage of all, or up to 5 s before or after it.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all

@@ -1,5 +1,7 @@
 //! `cargo replay`: writes a page that shows a recorded flight, with a time bar and a report.
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -21,7 +23,7 @@ struct Options {
     /// TOML file with the mission loaded before flight, for Rx, SIRs, interferer and geofence
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// File of the page, replaced if it exists
+    /// File of the page, replaced if it exists. An input file or another capture is not replaced
     #[arg(long, value_name = "FILE", default_value = "flight.html", value_parser = uav_relay_command::file)]
     out: PathBuf,
 }
@@ -33,7 +35,32 @@ fn main() -> ExitCode {
     }
 }
 
+/// Checks that the page replaces neither an input file nor another capture.
+fn check_out(options: &Options) -> Result<(), String> {
+    // A file that does not exist has no such path.
+    let Ok(path) = options.out.canonicalize() else {
+        return Ok(());
+    };
+    let mut inputs = options.files.iter().chain(&options.scenario);
+    let mut start = [0; 4];
+    let what = if inputs.any(|it| it.canonicalize().is_ok_and(|it| it == path)) {
+        "an input file"
+    } else if path.is_file()
+        && File::open(&path).is_ok_and(|mut file| file.read_exact(&mut start).is_ok())
+        && start == [0x0A, 0x0D, 0x0D, 0x0A]
+    {
+        "a capture"
+    } else {
+        return Ok(());
+    };
+    let name = options.out.display();
+    Err(format!(
+        "{name}: --out is {what}: give another name, as flight.html"
+    ))
+}
+
 fn run(options: &Options) -> Result<(), Failure> {
+    check_out(options).map_err(Failure::input)?;
     let replay = uav_relay_replay::replay(&options.files, options.scenario.as_deref())
         .map_err(Failure::input)?;
     for warning in &replay.warnings {

@@ -264,7 +264,7 @@ fn chart(flight: &Flight, known: impl Iterator<Item = (usize, f64)> + Clone) -> 
     let every = [10.0, 30.0, 60.0, 300.0, 600.0, 1_800.0, 3_600.0]
         .into_iter()
         .find(|it| flight.duration / it <= 10.0)
-        .unwrap_or(7_200.0);
+        .unwrap_or_else(|| 7_200.0 * (flight.duration / 19.0 / 7_200.0).ceil());
     let mut at = 0.0;
     while at <= flight.duration {
         _ = write!(

@@ -12,7 +12,8 @@ use uav_relay::wire::frame::Header;
 use uav_relay::wire::message::{Coarse, Entry, Message, Reports};
 use uav_relay_capture::Direction;
 use uav_relay_replay::flight::Flight;
-use uav_relay_replay::recording::Frame;
+use uav_relay_replay::recording::{Frame, Recording};
+use uav_relay_replay::{clocks, page};
 
 /// State of a relay that its pilot flies.
 const FLOWN: u16 = 4_096;
@@ -87,4 +88,101 @@ fn a_near_pass_between_two_snapshots_is_found() {
     let nearest = Flight::new(&frames, 2, None).nearest.unwrap();
     assert!((nearest.distance_m - 1.0).abs() < 0.01, "{nearest:?}");
     assert_eq!(nearest.relays, [1, 2]);
+}
+
+/// Returns the recording of a relay whose frames have these times.
+fn recording(relay: u16, times: impl Iterator<Item = f64>) -> Recording {
+    let frames = (0..u64::MAX).zip(times).map(|(number, at)| Frame {
+        wire: [u64::from(relay).to_le_bytes(), number.to_le_bytes()].concat(),
+        ..report(at, relay, 100.0)
+    });
+    Recording {
+        name: format!("relay{relay}"),
+        frames: frames.collect(),
+        network: 1,
+        mission: None,
+        fault: None,
+    }
+}
+
+#[test]
+fn steps_of_the_first_clock_are_left_out_with_a_warning() {
+    // A companion that starts in 1970, gets the time at second 60, and is set back by 5 s at second 90.
+    let seconds = (0..120).map(f64::from);
+    let clock = seconds.map(|at| match at {
+        ..60.0 => at,
+        60.0..90.0 => 1.8e9 + at,
+        _ => 1.8e9 - 5.0 + at,
+    });
+    let merged = clocks::merge(vec![recording(1, clock)]).unwrap();
+    let [warning] = merged.warnings.as_slice() else {
+        panic!("{:?}", merged.warnings)
+    };
+    let expected =
+        "steps by +1800000001.0 s, 59 s after its first frame (2 steps in all): left out";
+    assert!(warning.contains(expected), "{warning}");
+    let [first, last] = [0, 119].map(|index| merged.frames[index].at);
+    assert!((last - first - 117.0).abs() < 1e-3, "{first} {last}");
+    assert!((last - 1.8e9 - 114.0).abs() < 1e-3, "{last}");
+    let flight = Flight::new(&merged.frames, 1, None);
+    assert!((234..=236).contains(&flight.steps.len()));
+}
+
+#[test]
+fn steps_of_another_clock_without_common_frames_are_left_out_with_a_warning() {
+    let seconds = |from: f64| (0..60).map(move |at| from + f64::from(at));
+    let other = recording(2, seconds(1e9).chain(seconds(2e9)));
+    let merged = clocks::merge(vec![recording(1, seconds(1e9)), other]).unwrap();
+    assert!(
+        merged.warnings.iter().any(|it| it
+            .starts_with("the time of the flight steps by +999999941.0 s, 59 s after its first")),
+        "{:?}",
+        merged.warnings
+    );
+    assert!(Flight::new(&merged.frames, 2, None).duration < 120.0);
+}
+
+#[test]
+fn a_chart_of_years_has_few_labels() {
+    let flight = Flight {
+        duration: 1.8e9,
+        period: 250_000.0,
+        worst_db: vec![Some(1.0); 7_200],
+        ..Flight::default()
+    };
+    let html = page::page(&flight, &[], &[]);
+    let labels = html.matches("text-anchor=\"middle\">").count();
+    assert!((5..=20).contains(&labels), "{labels}");
+}
+
+#[test]
+fn the_page_replaces_neither_an_input_nor_a_capture() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let capture = write("flight.pcapng", b"\n\r\r\n");
+    let input = write("input.pcapng", b"x");
+    let scenario = write("drone.toml", b"x");
+    let linked = folder.path().join("link.html");
+    std::os::unix::fs::symlink(&input, &linked).unwrap();
+    for (out, what) in [
+        (&input, "an input file"),
+        (&linked, "an input file"),
+        (&scenario, "an input file"),
+        (&capture, "a capture"),
+    ] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_replay"));
+        command.arg(&input).arg("--scenario").arg(&scenario);
+        let output = command.arg("--out").arg(out).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        let expected = format!(
+            "{}: --out is {what}: give another name, as flight.html",
+            out.display()
+        );
+        assert!(error.contains(&expected), "{error}");
+    }
+    assert_eq!(std::fs::read(&capture).unwrap(), b"\n\r\r\n");
 }

@@ -50,8 +50,11 @@ function seek(time) {
     replay.lines = until;
   }
   byId("bar").value = isEnd ? byId("bar").max : String(replay.time);
-  byId("bar").setAttribute("aria-valuetext", clock(replay.time));
-  byId("now").textContent = `${clock(replay.time)} of ${clock(flight.duration)}`;
+  const shown = clock(replay.time);
+  if (byId("bar").getAttribute("aria-valuetext") !== shown) {
+    byId("bar").setAttribute("aria-valuetext", shown);
+    byId("now").textContent = `${shown} of ${clock(flight.duration)}`;
+  }
   byId("cursor")?.setAttribute("transform", `translate(${44 + (replay.time / Math.max(flight.duration, 1)) * 946} 0)`);
 }
 
