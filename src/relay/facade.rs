@@ -711,7 +711,8 @@ impl Relay {
 
     /// Records the control state of the drone, for the reports to a ground station that watches.
     #[cfg(feature = "telemetry")]
-    pub(crate) fn report_control(&mut self, state: crate::flight::autopilot::state::State) {
+    #[doc(hidden)]
+    pub fn report_control(&mut self, state: crate::flight::autopilot::state::State) {
         self.node.reporting.handle_control(state as u16 + 1);
     }
 
