@@ -157,9 +157,11 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Returns the default settings: Algorithm 1 with a bracketed, predicted search for the target SIR.
+    /// Returns the default settings, for two links of 57 600 baud or faster.
     ///
-    /// They suit two links of 57 600 baud or faster. A neighbour is lost after 15 s of silence.
+    /// The relays compute their positions by [`Method::Align`], the paper's Algorithm 1. The leader predicts the
+    /// highest target SIR that the chain can meet, and searches by [`Schedule::Bracketed`] if the prediction is
+    /// wrong. A neighbour is lost after 15 s of silence.
     fn default() -> Self {
         Self::DEFAULT
     }
@@ -215,11 +217,13 @@ impl Settings {
         Self::DEFAULT.with_hop_time(alone, baud)
     }
 
-    /// Returns settings for a half-duplex radio channel of `baud` bit/s, shared by the relays in `load`.
+    /// Returns settings for relays that share one half-duplex radio channel of `baud` bit/s. `load` is the number of
+    /// relays in range of each other, with the overhead of a frame.
     ///
-    /// `probe_after` is 5 s, or the least that lets the channel carry the relays ([`ChannelLoad::carried`]), and `dead_after` three times
-    /// that. `hop_time` is at least 30 ms, and otherwise [`ChannelLoad::hop_time`] with a latency of 10 ms; set it for a radio that
-    /// buffers a frame longer. All relays of a chain have the same settings.
+    /// `probe_after` is 5 s, or longer if the channel would be overloaded with 5 s ([`ChannelLoad::carried`]).
+    /// `dead_after` is three times `probe_after`. `hop_time` is that of [`ChannelLoad::hop_time`] with a latency of
+    /// 10 ms, but at least 30 ms. Set a longer `hop_time` for a radio that buffers frames longer. All relays of a
+    /// chain need the same settings.
     ///
     /// ```
     /// use uav_relay::{ChannelLoad, Duration, Settings, Wiring};

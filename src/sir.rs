@@ -291,11 +291,14 @@ fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
     at
 }
 
-/// Returns the largest SIR of the first hop to a relay at `altitude_m`. The maximum is over all x in [0, D].
+/// Returns the largest SIR of the first hop to a relay at `altitude_m`, for any x from Tx to Rx.
 ///
-/// It is at x = 0 for an interferer at X >= 0 (the paper's Lemma 2 and `gamma_0`), and at the maximum of
-/// [`first_hop_turn`] for X < 0, with noise as well. For interference that the mission gives as a distribution along
-/// x, it is an upper bound: the largest Upsilon right above the transmitter. It is larger at lower altitudes.
+/// For an interferer at X >= 0, the SIR is largest at x = 0, right above Tx (the paper's Lemma 2 and `gamma_0`). For
+/// X < 0 the SIR has a single maximum along x, at the x that [`first_hop_turn`] returns; if that is beyond Rx, the
+/// SIR is largest at Rx. Both hold with noise as well.
+///
+/// If the mission gives the interference as a distribution along x, the result is an upper bound. It is the SIR of a
+/// relay right above Tx with the largest Upsilon of all x. The result is larger at lower altitudes.
 pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);

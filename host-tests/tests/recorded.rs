@@ -129,10 +129,11 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks that two records of the same forty optima agree. They are of searches with different random seeds.
+/// Checks that two recorded optimum SIRs agree for each of forty scenarios. The two were found by searches with
+/// different random seeds.
 ///
-/// One record has the optima of all 2 000 numbered scenarios, without positions. The other has the forty with
-/// positions.
+/// [`optima`] has the SIRs of all 2 000 numbered scenarios, without positions. [`optimum`] has the SIRs of forty of
+/// them, with positions.
 #[test]
 fn the_numbered_optima_are_reproduced() {
     let stored = optima().unwrap();

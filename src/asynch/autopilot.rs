@@ -70,8 +70,10 @@ impl AsyncAutopilot {
         self.exchange_signal.raise();
     }
 
-    /// Completes with the next event for the firmware. One task waits for it at a time; a second one replaces the first. Safe to
-    /// drop: an event that was not returned is returned next.
+    /// Waits for the next event of the autopilot link and returns it to the firmware.
+    ///
+    /// Only one task may wait: a second one takes its place, and the first one is no longer woken. The future may be
+    /// dropped: an event that it has not returned is kept for the next call.
     ///
     /// Constant work each time it is polled.
     pub fn next_event(&self) -> impl Future<Output = AutopilotEvent> + '_ {

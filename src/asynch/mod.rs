@@ -134,7 +134,8 @@ use crate::time::Instant;
 use crate::wire::frame::MAX_FRAME;
 use link::track_pending;
 
-/// Ports of a relay with two links, one to each neighbour; full duplex unless a link has a pin.
+/// Ports of a relay with two links, one to each neighbour. A link with a driver-enable pin is half duplex, and a link
+/// without one is full duplex.
 #[derive(Debug)]
 pub struct AsyncPair<UR, UW, DR, DW, UPin = NoPin, DPin = NoPin> {
     upstream: AsyncLink<UR, UW, UPin>,

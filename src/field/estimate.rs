@@ -68,9 +68,11 @@ pub struct Estimate {
     pub beta: f32,
     /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32, so it may be a point of a [`Field`](super::Field).
     pub upsilon_per_w: f32,
-    /// Standard error of `upsilon_per_w`, 1/W, above 0. The true Upsilon is within two standard errors with a
-    /// probability of about 95 %. The error covers sampling only, not a deviation of the interference from a Beta
-    /// distribution.
+    /// Standard error of `upsilon_per_w`, 1/W, above 0. The true Upsilon is within two standard errors of the
+    /// estimate with a probability of about 95 %.
+    ///
+    /// This assumes that the interference has a Beta distribution. The standard error covers the limited number of
+    /// samples only: with another distribution the estimate can be wrong by more.
     pub standard_error_per_w: f32,
     /// Number of accepted samples on which the estimate is based.
     pub samples: u32,

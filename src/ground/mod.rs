@@ -596,7 +596,8 @@ struct Watching {
     known: heapless::Vec<KnownState, REPORTED>,
 }
 
-/// Newest state of a relay at time `at`, and its last details.
+/// Newest state that the station knows of a relay, and the last details received. `at` is the time at which the relay
+/// was in that state, by the station's clock.
 #[cfg(feature = "telemetry")]
 #[derive(Clone, Debug)]
 struct KnownState {

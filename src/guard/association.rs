@@ -506,8 +506,9 @@ impl KeepOut {
         *self = Self::none();
     }
 
-    /// Adds an obstacle at `side`: relays that were never heard. They may hover anywhere beyond `limit_m`, until any
-    /// of them has sent a message. This relay must move `separation_m` away from `limit_m`.
+    /// Adds an obstacle for the relays at `side`, none of which has ever sent a message to this relay. They may hover
+    /// anywhere beyond the plane x = `limit_m`. This relay keeps at least `separation_m` away from that plane, until
+    /// one of them sends a message.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),

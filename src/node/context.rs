@@ -249,7 +249,8 @@ pub(crate) enum LayerEvent {
     ProposalDecided(ProposalOutcome),
 }
 
-/// Changes that new measurements of the interference have caused.
+/// Changes of the sensing results after a new measurement or sensing pass. The node applies a changed interference
+/// estimate, and reports the other changes to the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sensed {
     /// True if the interference estimate has changed.

@@ -75,7 +75,8 @@ pub(crate) struct Lease {
     accepted: (ViewId, Instant),
     /// Latest possible expiry of the leases granted before the accepted view; `None` if it is unknown.
     older_leases_end: Option<Instant>,
-    /// True once all members are known to have accepted the view, or to have taken part in a lease renewal.
+    /// True once this relay knows that all members have accepted the view. A completed lease renewal proves it, too,
+    /// because every member has to take part in it.
     is_whole: bool,
     /// True once this relay has agreed on its position in this view.
     is_agreed: bool,

@@ -23,5 +23,6 @@ pub mod search;
 pub mod spacing;
 
 /// List with one number for each target SIR of a pass along the chain: x, slack, or target. The x is the farthest one
-/// that meets the target; the slack is the chain's spare length.
+/// at which a relay meets the target, m. The slack is the maximum length of a chain that meets the target, less the
+/// distance from Tx to Rx, m.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

@@ -60,7 +60,8 @@ const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 /// Relative change of the hop length below which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
-/// Hop with one target SIR, as a function of its length along x.
+/// Parameters of a hop with receiver noise that has to meet one target SIR. Its methods compute the lengths of the
+/// hop along x at which it meets the target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times inverse interference over squared
@@ -165,8 +166,10 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest length in [`low`, `high`], m, at which the hop's margin g is 0, or `None`. g is at least 0
-    /// where the hop meets its target. g is concave in the interval, and below 0 at `high`, but for rounding.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if none does. It is a
+    /// root of the margin g, which is 0 or above at lengths that meet the target.
+    ///
+    /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
         let mut d = high;
         for _ in 0..STEPS {
@@ -189,8 +192,10 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the length in [`low`, `high`], m, at which the hop's margin g is 0. g is at least 0 where the hop
-    /// meets its target. g is convex in the interval, not negative at `low`, and negative at `high`.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. It is the root of the margin g,
+    /// which is 0 or above at lengths that meet the target.
+    ///
+    /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -93,11 +93,12 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends this relay's reaches for the rising `targets` to `reaches`, after those already there.
+    /// Appends to `reaches` this relay's reaches for those `targets` that have none in the list yet.
     ///
-    /// A reach is the farthest x in the direction of the pass that meets a target. `from` has the reaches of the relay
-    /// from which the pass arrives, m. The list ends before the first target that cannot be met. Bounded by a reach per
-    /// target; in a field by three for each of its points.
+    /// A reach is the farthest x in the direction of the pass, m, at which this relay can meet a target SIR.
+    /// `targets` rises, and entry i of each list belongs to target i. `from` has the reaches of the previous relay of
+    /// the pass, m. The list ends before the first target that cannot be met. Work for each target: one computation
+    /// of a hop; in an interference field, up to three for each point of the field.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -250,12 +251,14 @@ impl<'a> Link<'a> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the slack (spare length) of the chain for `target`, m, and the x of this last relay, m.
+    /// Returns the chain's slack (spare length) for `target`, m, and the x of this last relay, m.
     ///
-    /// A slack of 0 or more means that the chain meets the target. `reach` is the farthest x of this relay that meets
-    /// it, and `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere. Toward Rx the slack
-    /// is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at
-    /// the x that maximises it.
+    /// The slack is the maximum length of a chain that meets the target, less the distance D from Tx to Rx. It is
+    /// below 0 if the chain misses the target. `reach` is the farthest x of this relay that meets the target, and
+    /// `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere.
+    ///
+    /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less
+    /// this relay's x, at the x that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -427,8 +430,9 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of one pass of target SIRs along the chain (a sweep): slacks, and a target to commit. The slack is the
-/// chain's spare length, below 0 if the target is missed.
+/// Result of one pass of target SIRs along the chain (a sweep): slacks, and a target to commit. The slack for a
+/// target is the maximum length of a chain that meets it, less the distance from Tx to Rx. It is below 0 if the
+/// target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index of the target that the relays are to use; `None` if the search goes on. It is an index in the pass's
@@ -506,9 +510,12 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reach (farthest x that meets the target) of every relay. Calls `visit` with each relay's index
-    /// and reach, m. Returns the chain's spare length and the x of the last relay, m; `None` if a hop cannot meet the
-    /// target.
+    /// Computes the reach of every relay, and calls `visit` with each relay's index and reach, m. A reach is the
+    /// farthest x in the direction of the pass at which the relay meets the target.
+    ///
+    /// Returns the chain's spare length and the x of the last relay, m; `None` if a hop cannot meet the target. The
+    /// spare length is the maximum length of a chain that meets the target, less the distance from Tx to Rx. It is
+    /// below 0 if the chain misses the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();

@@ -68,9 +68,12 @@ pub struct Hop {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Constant term of the equation for the hop's maximum length, m^2: it does not depend on the target. With the
-    /// interferer at (X, Y) on the ground, the sender at (y0, h0) and the receiver at (y, h) across x, it is (Y - y0)
-    /// (Y + y0 - 2y) + h0 (2h - h0).
+    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is the receiver's distance from the
+    /// interferer, b its distance from the sender.
+    ///
+    /// The equation for the hop's maximum length contains it as a term that does not depend on the target. It is
+    /// computed without cancellation as (Y - y0) (Y + y0 - 2y) + h0 (2h - h0). The interferer is at the lateral
+    /// offset Y on the ground, the sender at the lateral offset y0 and altitude h0, the receiver at y and h.
     base: f32,
     /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,

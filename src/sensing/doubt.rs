@@ -63,8 +63,8 @@ const LEAST: f64 = 0.02;
 /// variance of a fit that excludes one relay. With a smaller ratio it remains unknown which relay is faulty.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of relative errors for measurements to count as consistent. Its square root is an error of some
-/// 1.5 dB.
+/// Maximum variance of a fit whose measurements count as consistent with each other. It is the variance of the
+/// relative differences between measurements and fit. This value is a standard deviation of 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
@@ -90,11 +90,12 @@ const LOST: f32 = 3e3;
 #[derive(Clone, Copy, Debug)]
 enum Stage {
     Normal,
-    /// Collection of measurements without the node of this number. It shows if the other nodes' measurements are
-    /// consistent.
+    /// Trial: a sensing pass that leaves out the measurements of the node with this number. If the measurements of
+    /// the other nodes fit far better then, that node is faulty.
     Trying(u16),
-    /// Collection that tells the node of this number that it is excluded. There are two in a row: the measurements of
-    /// the first one (`false`) are discarded, and those of the second one (`true`) give the estimate.
+    /// Notice: a sensing pass that informs the faulty node, which has this number, that it is excluded. There are two
+    /// in a row. In the first one the flag is false, and the measurements of the other nodes are discarded. In the
+    /// second one the flag is true, and their measurements give the estimate.
     Announcing(u16, bool),
 }
 

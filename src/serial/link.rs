@@ -275,7 +275,8 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Number of failed writes, and of failed queries for the end of a transmission. Failed writes are repeated.
+    /// Number of failed writes to the port, plus failed checks if all bytes have left the port. The check precedes
+    /// the change of the driver-enable pin to low. Failed writes are repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,

@@ -35,7 +35,8 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the lower halves of two nonces that one node uses in one epoch. A larger difference
+/// Maximum difference between the numbers in two nonces that one node uses in one epoch. A nonce's number is its
+/// lower half. A node draws a random first number at its start, and counts up from it. A larger difference therefore
 /// shows that two nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
@@ -133,11 +134,14 @@ pub(crate) struct Session {
 /// Result of the authentication of a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid new message of the node. `first` is true if it is the first proof that the node is present.
+    /// Valid message that was not received before. It proves that its sender is present. `first` is true if the
+    /// sender had not proved this before in the present session.
     Fresh { first: bool },
-    /// New handshake that proves that the node is present. `first` is true if it is the first such proof.
+    /// New handshake that contains this relay's current nonce, which proves that its sender is present. `first` is
+    /// true if the sender had not proved this before in the present session.
     Handshake { first: bool },
-    /// Handshake with the right tag but no proof that the node is present: it may have been recorded.
+    /// Handshake with the right tag but without this relay's current nonce. It may have been recorded earlier, so it
+    /// does not prove that its sender is present.
     Unproven,
     /// Received frame without an authentication tag.
     Unsigned,

@@ -23,7 +23,8 @@ const MAX_IN_TRANSIT: usize = 24;
 /// Maximum number of rounds in one operation. A round delivers a frame to each relay.
 const MAX_ROUNDS: u8 = 128;
 
-/// Rounding error of a position, as a fraction of the distance from Tx to Rx: one step of an f32.
+/// Tolerance for the minimum separation of two relays, as a fraction of the distance from Tx to Rx. Positions are f32
+/// numbers, so rounding may bring two relays closer by this much.
 const ROUNDING: f64 = 1.3e-7;
 
 /// Fuzz target. Reads `data` as a mission, settings of each relay, and operations on the frames between them.

@@ -35,11 +35,11 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Reads a mission of at most `most` relays from the fuzzer's bytes. `None` if the mission is refused, as when its
-/// relays do not fit.
+/// Creates a mission of 1 to `most` relays from the fuzzer's input bytes. Returns `None` if the mission's parameters
+/// are rejected, for example if its relays do not fit between Tx and Rx.
 ///
-/// Half of the missions are the paper's with small changes, with which few bytes reach many states. The other half
-/// draws every number from its whole range.
+/// Half of the missions are the paper's scenario with one change. Few input bytes define them, so the rest of the
+/// input reaches many states of the chain. The other half takes every parameter at random from its whole range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     let drawn = input.byte();
     let (kind, variant) = (drawn % 14, drawn / 14 % 8);

@@ -539,13 +539,14 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// Position near which a function changes rapidly, over a length of about `width`. Quadrature cells are smallest
-/// there.
+/// Coordinate of a grid near which the function sampled on the grid changes fastest. The grid's cells are smallest
+/// there, with a size that depends on `width`.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
-    /// Coordinate of the rapid change, in the unit of the grid.
+    /// Coordinate at which the sampled function changes fastest, m. It is an x or an altitude, like the other values
+    /// of the grid.
     pub at: f64,
-    /// Length over which the function changes at this position.
+    /// Length over which the sampled function changes noticeably at `at`, m.
     pub width: f64,
 }
 

@@ -16,16 +16,17 @@ pub struct Relay {
     pub holds: bool,
 }
 
-/// Limits on the altitudes and lateral positions of relays, m. Lateral positions are positive to the right.
+/// Limits on the altitudes and lateral positions of relays, m. A lateral position is the offset from the line Tx to
+/// Rx. It is positive to the right as seen from Tx toward Rx.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corridor {
     /// Lowest altitude of a relay, m, > 0.
     pub least_m: f64,
     /// Highest altitude of a relay, m.
     pub most_m: f64,
-    /// Lateral limit to the left of the line from Tx to Rx, m, <= 0.
+    /// Lateral limit to the left of the line, as seen from Tx toward Rx, m, <= 0.
     pub left_m: f64,
-    /// Lateral limit to the right of the line from Tx to Rx, m, >= 0.
+    /// Lateral limit to the right of the line, as seen from Tx toward Rx, m, >= 0.
     pub right_m: f64,
 }
 
@@ -76,7 +77,7 @@ pub struct Scene {
 pub struct Place {
     /// Distance of the relay from Tx along the line to Rx, m.
     pub x: f64,
-    /// Lateral position of the relay, m; positive to the right of the line.
+    /// Lateral position of the relay, m; positive to the right of the line, as seen from Tx toward Rx.
     pub y: f64,
     /// Height of the relay above ground, m, > 0.
     pub h: f64,

@@ -130,9 +130,11 @@ impl Screen {
         Ok(())
     }
 
-    /// Passes a snapshot to all browsers, in place of earlier ones that they have not received yet. It does not wait for them.
+    /// Passes a snapshot to the threads that serve the browsers, and does not wait for them. A snapshot that was not
+    /// sent yet is replaced; its log lines are kept.
     ///
-    /// Positions and SIRs that are not finite or beyond the limits of a map, and hidden characters of texts are not shown.
+    /// Values that the page cannot show are removed before the snapshot is sent: positions and SIRs that are not
+    /// finite or out of range, and invisible characters in texts.
     pub fn show(&self, mut snapshot: Snapshot) {
         let lines = std::mem::take(&mut snapshot.log);
         let mut inbox = lock(&self.shared.inbox);

@@ -148,7 +148,8 @@ fn the_set_speed_and_position_are_not_exceeded() {
     }
 }
 
-/// Checks that a drone whose setpoint is withdrawn decelerates as gently as it accelerated.
+/// Checks that a drone stops smoothly when its setpoint is withdrawn in flight. It flies at most 0.5 m past the old
+/// setpoint, and less than 1 m back to the position where it stops.
 #[test]
 fn a_drone_whose_setpoint_is_withdrawn_stops_gently_before_it() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -300,7 +301,8 @@ fn a_wrong_clock_stops_positions_for_seconds_at_most() {
     }
 }
 
-/// Checks that setpoint control survives a pause of the autopilot of 1.5 s, which its clock loses.
+/// Checks that the relay keeps control of the drone when the autopilot halts for 1.5 s. The autopilot's clock stands
+/// still meanwhile, so that it is 1.5 s late afterwards.
 #[test]
 fn a_short_pause_of_the_autopilot_ends_no_flight() {
     for echoes in [true, false] {

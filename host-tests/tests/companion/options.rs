@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use crate::process::Relay;
 
-/// Valid options of a relay. The wrong options in [`WRONG`] that have no `--index` are tried after these.
+/// Valid options of a relay, which the test puts before each entry of [`WRONG`]. An entry that is empty or begins
+/// with `--index` is tried without them.
 const GOOD: &str = "--index 2 --of 3 --upstream a --downstream b ";
 
 /// Options with the surveyed positions of transmitter and receiver, and their distance.

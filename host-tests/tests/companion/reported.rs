@@ -13,10 +13,11 @@ use crate::peer::{RX, text};
 use crate::process::{LIMIT, Relay};
 use crate::web::{address, snapshots};
 
-/// Time from a relay's death to its alarm: the chain notices it within 15 s.
+/// Maximum time from a relay's failure to its alarm on the page. The chain notices the failure within 15 s.
 const LOST: Duration = Duration::from_secs(17);
 
-/// Time from a change of a drone's control to its alarm.
+/// Maximum time from a change of a drone's control state until the page shows the change or its alarm. The control
+/// state states if the relay or the pilot controls the drone.
 const SOON: Duration = Duration::from_secs(2);
 
 /// Time after which a companion counts its autopilot as silent.

@@ -28,7 +28,7 @@ pub(crate) struct Flying {
 #[derive(Debug, Default)]
 struct Line {
     flying: VecDeque<Flying>,
-    /// Delayed frames, which frames sent later overtake.
+    /// Frames that a simulated fault delays. Frames sent later may arrive before them.
     late: Vec<Flying>,
     /// Bytes that the receiver got since the last delimiter.
     begun: Vec<u8>,

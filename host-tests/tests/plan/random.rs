@@ -120,8 +120,8 @@ fn random_request(rng: &mut impl Rng) -> PlanRequest {
     }
 }
 
-/// Returns the reference chain of `n` relays at the plan's altitude. Returns `None` unless the scenario has exactly
-/// one interferer.
+/// Returns a chain of `n` equal relays for the reference solver, which the plan is compared with. The relays have the
+/// altitude and the power of the scenario. `None` unless the scenario has exactly one interferer.
 fn judged(scenario: &Scenario, plan: &Plan, n: usize) -> Option<Link> {
     let Interference::Sources(sources) = &scenario.interference else {
         return None;

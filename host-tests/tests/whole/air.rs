@@ -123,9 +123,10 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<ObservedState>,
-    /// Largest number of groups of relays that used positions of different agreements at the same time.
+    /// Largest number of groups of relays at any time so far. The relays of a group use positions of one agreement,
+    /// which no other group uses.
     pub(crate) groups: usize,
-    /// Time at which the largest number of groups used positions of different agreements, µs.
+    /// Simulated time at which the number of groups first reached the maximum in `groups`, µs.
     pub(crate) groups_us: u64,
     /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
     /// the agreed membership of the chain.

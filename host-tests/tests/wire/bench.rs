@@ -159,7 +159,7 @@ pub(crate) fn frame_between(sender: u16, destination: u16, message: &WireMessage
     wire(header, message.body())
 }
 
-/// Names of the statistics counters of which each received frame increments one.
+/// Names of the statistics counters of received frames. Each received frame increments exactly one of them.
 pub(crate) const OF_FRAMES: [&str; 9] = [
     "received",
     "overheard",
@@ -182,7 +182,7 @@ const OF_MESSAGES: [&str; 6] = [
     "stale",
 ];
 
-/// Returns the counters of which each received frame increments one, with their names.
+/// Returns the names and values of the counters in [`OF_FRAMES`]. Each received frame increments exactly one of them.
 pub(crate) fn of_frames(stats: &Stats) -> Vec<(&'static str, u32)> {
     let mut all = named(stats).to_vec();
     all.retain(|(name, _)| OF_FRAMES.contains(name));

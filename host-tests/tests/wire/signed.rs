@@ -148,8 +148,8 @@ impl SignedBench {
         hello.unwrap().number("offer_number") as u16
     }
 
-    /// Returns the destinations and messages that the relay sends at `now`. Handshakes are left out, and numbers of
-    /// hellos are set to 0.
+    /// Returns the messages that the relay sends at `now`, each with its destination. Handshakes are left out. The
+    /// field `offer_number` of each hello is set to 0, so that tests can compare hellos.
     pub(crate) fn sent(&mut self, now: Instant) -> Vec<(u16, WireMessage)> {
         let unnumbered = |message: WireMessage| {
             if !message.is("Hello") {

@@ -135,7 +135,8 @@ fn hash(text: [&str; 2]) -> u32 {
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the sent lines, and the earliest time at which each may be sent again.
+    /// Hashes of the lines sent in the last 10 s. Each has the earliest time at which an equal line may be sent
+    /// again.
     recent: Vec<(u32, Instant), RECENT>,
     /// Last line sent on each topic. An equal line that would have to wait is dropped.
     newest_sent: [Option<Line>; Topic::COUNT],

@@ -630,7 +630,8 @@ pub(super) struct OffLineDetector {
 }
 
 impl OffLineDetector {
-    /// Records a position too far from the line Tx to Rx; returns true if it has to be reported.
+    /// Records a position of the drone that is too far from the line Tx to Rx. Returns true if a report is due: in
+    /// the air once in 10 s, on the ground only once until the drone is near the line again.
     pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;

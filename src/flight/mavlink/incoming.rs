@@ -137,11 +137,11 @@ pub enum Incoming {
         /// True while the vehicle is outside of its geofence.
         is_breached: bool,
     },
-    /// RADIO_STATUS of a SiK radio, in the units of [`noise_w`]; 255 is unknown.
+    /// RADIO_STATUS of a SiK radio: signal and noise. [`noise_w`] converts a noise level to W.
     RadioStatus {
-        /// Signal strength of the last received frame.
+        /// Signal strength of the last received frame, in steps of 1/1.9 dB above -127 dBm; 255 is unknown.
         rssi: u8,
-        /// Noise level between frames.
+        /// Noise level between frames, in steps of 1/1.9 dB above -127 dBm; 0 and 255 are unknown.
         noise: u8,
     },
 }

@@ -85,10 +85,11 @@ impl Node {
         Some((side, to, Message::Claim(claim)))
     }
 
-    /// Returns the destination of a due claim to this relay's node number, and marks the claim as sent.
+    /// Returns the node to which a claim is due, and marks the claim as sent; `None` if no claim is due.
     ///
-    /// `None` if no claim is due. Claims go to the two neighbours in turn. Without neighbours, on a shared channel,
-    /// they are addressed to this relay's own number, so that another node with this number receives them.
+    /// A claim is the message by which two nodes with the same node number detect each other. Claims go to the two
+    /// neighbours in turn. A relay without neighbours on a shared channel addresses them to its own number, so that
+    /// another node with that number receives them.
     pub(crate) fn poll_claim(&mut self) -> Option<(Side, u16)> {
         if !self.duplicate.poll_claim() {
             return None;

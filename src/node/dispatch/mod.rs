@@ -375,9 +375,11 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True if the expiry of a lease has been reported already in this view.
+    /// True if the expiry of the lease was reported to the firmware since the last accepted view. It is reported once
+    /// per view.
     pub(super) lapse_reported: bool,
-    /// True if a missing quorum has been reported already since the last accepted view.
+    /// True if a missing quorum was reported to the firmware since the last accepted view. It is reported once per
+    /// view.
     pub(super) no_quorum_reported: bool,
 }
 

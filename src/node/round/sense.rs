@@ -583,7 +583,10 @@ impl Findings {
     }
 }
 
-/// Adds a measurement of a ground station to `average`; returns false if it is not above the noise.
+/// Adds the power that a ground station (Tx or Rx) has measured to that station's `average`. Returns false if the
+/// power is not above the noise.
+///
+/// `heard_w` is the measured power less the receiver noise, W; `None` if it is not above the noise.
 fn take_level(
     average: &mut Average,
     now: Instant,

@@ -42,11 +42,11 @@ const LEAST_SPARE: f32 = 4e-5;
 /// two metres of spare length.
 const SHORT: f32 = 2.0;
 
-/// Increase of the target SIR below which an improvement step counts as idle, in ln(SIR). Two idle steps in a row end
-/// the ascent, the improvement of one chain.
+/// Increase of the target SIR below which an iteration counts as idle, in ln(SIR). An ascent improves one chain in
+/// iterations. Two idle ones in a row end it.
 const CLOSE: f32 = 3e-6;
 
-/// Expected increase of the target SIR below which the improvement of a chain ends, in ln(SIR).
+/// Expected increase of the target SIR below which an ascent ends, in ln(SIR). An ascent improves one chain.
 const SETTLED: f32 = 0.3 * CLOSE;
 
 /// Expected increase of the target SIR below which an ascent's final target is predicted, in ln(SIR). An ascent

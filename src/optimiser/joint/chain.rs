@@ -156,16 +156,17 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of a segment of the chain: the x of the relay before it, and derivatives at its end. The derivatives
-/// are those of the chain's spare length at Rx by the position of the segment's last relay.
+/// Stored state of a segment of the chain: x before the segment, and derivatives at its last relay. They are the
+/// derivatives of the chain's slack by that relay's position. The slack is the maximum length of a chain that meets
+/// the target, less the distance from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before the segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the slack (spare length at Rx) by the segment's last relay's position, m/m.
+    /// First derivatives of the chain's slack by the position of the segment's last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives of the slack (spare length at Rx) by the segment's last relay's position, 1/m. The order is
-    /// xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack by the position of the segment's last relay, 1/m. The order is xx, xy,
+    /// xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

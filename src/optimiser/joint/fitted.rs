@@ -173,13 +173,15 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of the positions of an initial chain. The field is the number of relays that are done.
+    /// Sets the positions of an initial chain, some relays at a time. The field is the number of relays already set.
     Begin(u16),
-    /// Pass over the relays toward Rx, which finds the best combination of moves. The field is the next node.
+    /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
+    /// the next node to process: 1 for the first relay, N + 1 for Rx.
     Pass(u16),
-    /// Way back toward Tx, on which the relays move. The fields are the next relay and its state.
+    /// Backward pass, from the last relay to the first: moves each relay as the best combination requires. The fields
+    /// are the next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
-    /// Summation of the best chain's time, and its worst SIR. The field is the next node.
+    /// Summation of the hop times of the best chain, and search for its worst SIR. The field is the next node.
     Sum(u16),
 }
 
@@ -279,7 +281,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Sets relays after the first `done` ones to their positions in the current initial chain.
+    /// Moves the next relays to their positions in the current initial chain. The first `done` relays are there
+    /// already, and one call moves at most [`OTHERS_AT_ONCE`]. After the last relay, the first pass over the chain is
+    /// due.
     fn begin(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.mission.relays();

@@ -345,7 +345,10 @@ const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
 
-/// Returns the best position at `altitude_m` with x in `along` and y in `across`. It is searched on lines along x.
+/// Returns the position of a single relay with the highest SIR at the altitude `altitude_m`. x is limited to `along`,
+/// and y to `across`. The function finds the best x on several lines of constant y, and then refines y near the best
+/// three lines.
+///
 /// Work: at most 243 lines of some 90 evaluations of both hops.
 pub(super) fn best_in_corridor(
     hops: &TwoHops<'_>,

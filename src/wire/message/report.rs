@@ -103,7 +103,8 @@ impl Entry {
     }
 }
 
-/// Details of the relay in the first entry of a report. The relay sends them with every eighth of its entries.
+/// Additional state of one relay in a report: the relay whose entry is the first one. A relay adds these details to
+/// every eighth entry that it sends about itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Detail {
     /// Setpoint of the drone, and the agreed position.

@@ -117,7 +117,8 @@ const SIR_SIZE: f64 = 10.0;
 /// It is larger than the largest radius of a relay's circle, so that the text touches neither relay of the hop.
 const GAP: f64 = 4.6;
 
-/// Positions along a hop at which the text with its SIR may be, as fractions of its length.
+/// Points of a hop beside which the text with its SIR may be drawn. Each is a fraction of the hop's length, and the
+/// first one where the text has enough space is used.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
 /// Distances, in picture units, by which the text with a hop's SIR may be moved away from the hop.
 ///

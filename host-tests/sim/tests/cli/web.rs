@@ -67,7 +67,8 @@ impl Drop for Running {
     }
 }
 
-/// Starts `cargo chain` with these options, and returns it with the address of its screen.
+/// Starts `cargo chain` with the options `arguments`. Returns the process, and the address (host and port) of its web
+/// page.
 fn started(arguments: &str) -> (Running, String) {
     let child = Command::new(env!("CARGO_BIN_EXE_chain"))
         .args(arguments.split(' '))

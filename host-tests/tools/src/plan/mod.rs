@@ -124,7 +124,8 @@ pub struct Theorem {
 /// Result of planning with one hypothetical interferer in place of several.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Fitted {
-    /// Power, position and error of the hypothetical interferer.
+    /// Hypothetical interferer: its power, its position and its error. The error is the difference between its
+    /// interference and that of all real interferers.
     pub hypothetical: Hypothetical,
     /// SIR, linear, against all interferers, at the best positions for the hypothetical interferer. `None` if no such
     /// positions were found.

@@ -293,10 +293,14 @@ pub struct PlanReport {
     /// Best SIR found, dB; present only if the request cannot be met and the SIR is above 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_sir_db: Option<f64>,
-    /// SIR of the plan's worst hop, linear. For both directions an SIR toward Tx is first divided by `reverse`.
+    /// SIR of the plan's worst hop, linear. If the plan is for both directions, the worst hop of either direction
+    /// counts, and each SIR toward Tx is first divided by `reverse`. `reverse` is the required SIR toward Tx as a
+    /// fraction of that toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
-    /// SIR of the plan's worst hop, dB. For both directions an SIR toward Tx is first divided by `reverse`.
+    /// SIR of the plan's worst hop, dB. If the plan is for both directions, the worst hop of either direction counts,
+    /// and each SIR toward Tx is first divided by `reverse`. `reverse` is the required SIR toward Tx as a fraction of
+    /// that toward Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir_db: Option<f64>,
     /// SIRs in the direction from Rx to Tx; absent if the interference at Tx is unknown.

@@ -36,7 +36,7 @@ const SAME: f64 = 1e-4;
 const SLIGHT: f64 = 1e-6;
 
 /// Number of halvings of a cell in the search for the farthest x at which a hop meets a rate step. A rate step is a
-/// least SINR, and the data rate that the radio has from there on.
+/// data rate of the radio, and the least SINR that it requires.
 const HALVINGS: u8 = 40;
 
 /// First hops of a chain, which end at a relay at `point`. They need `time` for one bit, in s Hz: the time in s for a
@@ -49,8 +49,8 @@ struct Label {
     before: usize,
 }
 
-/// Tables of one hop for the search of positions: limits of its sender's x and its time for a bit. The radio
-/// has rate steps: each is a least SINR with the data rate from there on.
+/// Tables of one hop for the search of positions: limits of its sender's x and its time for a bit. The radio has rate
+/// steps: data rates, each with the least SINR that it requires.
 struct Reaches {
     hop: Hop,
     /// Smallest x of the sender, m, at which the receiver has the SINR of a rate step. There is a row for each rate
@@ -282,8 +282,8 @@ impl Search<'_> {
     }
 
     /// Collects in `ends` the x of relay `node`, m, at which its hop from `from` just meets a rate step. A rate step
-    /// is a least SINR, and the data rate from there on. Both directions of the hop count. The x of Rx is included;
-    /// the list is not sorted.
+    /// is a data rate of the radio, and the least SINR that it requires. Both directions of the hop count. The x of
+    /// Rx is included; the list is not sorted.
     fn ends(&self, from: Point, node: usize, kind: &Reaches, ends: &mut Vec<f64>) {
         ends.clear();
         ends.push(self.times.scene.distance_m);
@@ -342,14 +342,15 @@ impl Search<'_> {
 }
 
 /// Table of the largest x of the next node from which a relay can receive. It is for the return direction (to Tx).
-/// The largest x depends on the relay's x and on the rate step: a least SINR of the radio, and the data rate from
-/// there on.
+/// The largest x depends on the relay's x and on the rate step. A rate step is a data rate of the radio, and the
+/// least SINR that it requires.
 ///
 /// The search uses the table to decide if a relay at a smaller x is worse than one at a larger x with no more time.
 struct Backward {
     hop: Hop,
-    /// Largest x of the next node, m, from which a relay at a grid point receives a rate step. There is a row for
-    /// each rate step, a least SINR of the radio, with a value for each grid point.
+    /// Largest x of the next node, m, from which a relay at a grid point receives a rate step. A rate step is a data
+    /// rate of the radio, and the least SINR that it requires. The table has a row for each rate step, with a value
+    /// for each grid point.
     ///
     /// The x is at most that of Rx.
     farthest: Vec<Vec<f64>>,
@@ -359,8 +360,8 @@ struct Backward {
 }
 
 impl Backward {
-    /// Creates the table for relay `node`, which receives from the next relay or Rx. It is empty for data in one
-    /// direction.
+    /// Creates the table of the hop by which relay `node` receives in the return direction, to Tx. The sender of that
+    /// hop is the next relay, or Rx for the last relay. The table is empty for data from Tx to Rx only.
     fn new(search: &Search<'_>, node: usize) -> Self {
         let times = search.times;
         let next = Some(node + 1).filter(|next| *next <= times.relays());
@@ -418,8 +419,8 @@ impl Backward {
     }
 }
 
-/// Returns the least x of a sender, m, whose signal has the SINR `sinr` at `to`. Infinite if it would be closer than
-/// the minimum separation.
+/// Returns the smallest x of a hop's sender, m, that gives the receiver at `to` the SINR `sinr`. The sender is the
+/// hop's node nearer to Tx. The result is infinite if the two nodes would be closer than the minimum separation.
 fn nearest(hop: &Hop, sinr: f64, to: Point) -> f64 {
     let squared = hop.powers_w[0] / (hop.factor * sinr * to.disturbance_w) - hop.climb_squared;
     if squared < hop.least_m * hop.least_m {

@@ -63,9 +63,9 @@ const NEAR_BOX: f32 = 0.98;
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor by which a Lagrange multiplier may differ from mu / s, its value at the optimum. Multipliers
-/// farther away are corrected to this factor. mu is the barrier weight, s the excess of the level (logarithm of a
-/// hop's SIR in one direction) over the target.
+/// Maximum factor between a Lagrange multiplier and mu / s, its value at the optimum for this mu. After each Newton
+/// step a multiplier outside these limits is set to the nearer limit. mu is the barrier weight. s is the amount by
+/// which the logarithm of a hop's SIR in one direction exceeds the target.
 const APART: f32 = 5.0;
 
 /// Number of Newton steps for the target T in one portion of the work. T, in ln(SIR), is slightly below the chain's

@@ -77,21 +77,23 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier divided by the slack, for both directions of the hop. A slack is the excess of
-    /// ln(SIR) over the target.
+    /// Returns the Lagrange multiplier divided by the slack, for each direction of the hop. The slack is the amount
+    /// by which the logarithm of the SIR in that direction exceeds the target.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the barrier weight mu divided by the slack, for both directions of the hop. At the optimum for one mu
-    /// the Lagrange multipliers have these values. A slack is the excess of ln(SIR) over the target.
+    /// Returns the barrier weight mu divided by the slack, for each direction of the hop. The slack is the amount by
+    /// which the logarithm of the SIR in that direction exceeds the target. At the optimum of the problem with the
+    /// barrier weight mu, the Lagrange multipliers are equal to these quotients.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the Lagrange multipliers after a Newton step that changes the two slacks by a and b. A slack is the
-    /// excess of ln(SIR) over the target.
+    /// Returns the Lagrange multipliers of both directions after a Newton step. The step changes the slacks of the
+    /// two directions by a and b. A slack is the amount by which the logarithm of the SIR in its direction exceeds
+    /// the target.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]

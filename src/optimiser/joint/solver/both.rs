@@ -23,9 +23,11 @@ use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use core::task::Poll;
 
-/// Number of relays that one portion of Algorithm 1 takes. The algorithm computes the x of all relays for one target.
+/// Number of relays for which one portion of the solver's work continues Algorithm 1. The algorithm computes the x of
+/// all relays for one target.
 const LINE: u16 = 2;
-/// Number of relays whose initial positions one portion of the work sets.
+/// Number of relays that get their initial positions in one portion of the solver's work. The work is done in
+/// portions so that each call of the solver is short.
 const PUT: u16 = 20;
 
 /// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays

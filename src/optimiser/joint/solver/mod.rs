@@ -128,8 +128,9 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Target at which the improvement of the current chain ended, in ln(SIR). The search for the highest target that
     /// the chain meets starts there. `None` before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
-    /// True if the current chain's improvement was not ended early for being worse than the best chain. A repetition
-    /// would then give the same chain, so that it can be omitted.
+    /// True unless the improvement of the current chain was cut short. It is cut short if the chain is not expected to
+    /// become better than the best one. If true, a repetition of the improvement would give the same chain, so it can
+    /// be omitted.
     is_whole: bool,
     /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
     /// relays try other positions.

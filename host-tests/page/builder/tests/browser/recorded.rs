@@ -71,6 +71,8 @@ fn a_recorded_flight_is_played_from_a_file() {
 
     // The end: each relay is where its drone is, except relay 3, which was switched off.
     browser.run("seek(1e9)");
+    let is_last = "received.last.time_s === flight.duration && replay.step === flight.steps.length - 1 && byId('bar').value === byId('bar').max";
+    assert_eq!(browser.value(is_last), true);
     for (index, [x, y]) in places.iter().enumerate().filter(|(index, _)| *index != 2) {
         let off = number(
             &mut browser,
