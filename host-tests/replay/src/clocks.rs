@@ -1,7 +1,7 @@
 //! Merges the frames of several files by their clocks.
 //!
 //! The clock of the first file is the reference. A frame that occurs in two files connects their clocks: it was sent in one and received
-//! in the other, or received in both. A received frame is later than the sent one by its delay. In each [`WINDOW`] the largest
+//! in the other, or received in both. A received frame is later than the sent one by its delay. In each `WINDOW` the largest
 //! lower bound of the offset, from frames in one direction, and the smallest upper bound, from frames in the other, are closest to the
 //! offset; in their mean the shortest delays of both directions cancel. Between windows the offset is interpolated, which follows
 //! the drift. A step of a clock ends an interpolation. Steps of the first file's clock are left out.

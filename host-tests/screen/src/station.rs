@@ -10,7 +10,7 @@
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
-//! | frames rejected by the station in the last [`REJECTED_FOR`] | notice |
+//! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
 //! An alarm of a relay that does not report any more stays as it was.
 
