@@ -11,8 +11,7 @@ use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::autopilot::trust::Mistrust;
 use uav_relay::flight::autopilot::{
-    Address, Autopilot, AutopilotEvent, FlightMode, Kind, RelayNumbers, ReleaseCause, Signing,
-    Stamp, WaitReason,
+    Address, Autopilot, AutopilotEvent, FlightMode, Kind, ReleaseCause, Signing, Stamp, WaitReason,
 };
 use uav_relay::flight::axis::Axis;
 use uav_relay::serial::SerialPort as _;
@@ -190,7 +189,7 @@ impl Companion {
                     continue;
                 }
                 AutopilotEvent::State(state) => self.state = Some(word(state)),
-                AutopilotEvent::LostCleared { relays, .. } => self.cleared.extend(numbers(relays)),
+                AutopilotEvent::LostCleared { relays, .. } => self.cleared.extend(numbers(&relays)),
                 _ => {}
             }
             log_event(now, log, event);
@@ -370,12 +369,12 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
         AutopilotEvent::Waits(reason) => format!("cannot be engaged: {}", wait_reason(reason)),
         AutopilotEvent::Ready => "ready: its pilot may choose OFFBOARD or GUIDED".to_owned(),
         AutopilotEvent::LostCleared { side, relays, from } => {
-            let text = lost::cleared(numbers(relays), side);
-            return log_command(now, log, Ok(text), relays, from);
+            let text = lost::cleared(numbers(&relays), side);
+            return log_command(now, log, Ok(text), &relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
             let text = "the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other";
-            return log_command(now, log, Err(text.to_owned()), relays, from);
+            return log_command(now, log, Err(text.to_owned()), &relays, from);
         }
         AutopilotEvent::FenceBreached => "the drone is outside the autopilot's fence".to_owned(),
         AutopilotEvent::Mistrusted(why) => mistrusted(why).to_owned(),
@@ -384,8 +383,8 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
     log.line(now, EVENT, text);
 }
 
-fn numbers(relays: RelayNumbers) -> impl Iterator<Item = u16> {
-    relays.into_iter().filter(|node| *node != 0)
+fn numbers(relays: &[u16]) -> impl Iterator<Item = u16> {
+    relays.iter().copied().filter(|node| *node != 0)
 }
 
 /// Logs an operator's MAVLink command, its sender and its result.
@@ -393,7 +392,7 @@ fn log_command(
     now: Instant,
     log: &Log,
     done: Result<String, String>,
-    relays: RelayNumbers,
+    relays: &[u16],
     from: Address,
 ) {
     let named: Vec<String> = numbers(relays).map(|node| node.to_string()).collect();

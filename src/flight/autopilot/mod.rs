@@ -23,7 +23,7 @@ pub mod trust;
 mod vehicle;
 
 pub use link::Autopilot;
-pub use report::{AutopilotEvent, RelayNumbers};
+pub use report::AutopilotEvent;
 pub use state::{FlightMode, Kind, Release, ReleaseCause, WaitReason};
 pub use vehicle::{OffLine, Position};
 

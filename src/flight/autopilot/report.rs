@@ -282,7 +282,7 @@ impl Report {
 pub(super) const MOST: usize = 7;
 
 /// Numbers of the relays that a command names; unused entries are 0.
-pub type RelayNumbers = [u16; MOST];
+pub(super) type RelayNumbers = [u16; MOST];
 
 /// Event of the link to an autopilot, for the firmware.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -318,7 +318,7 @@ pub enum AutopilotEvent {
         /// Side of this relay whose lost relays have landed.
         side: Side,
         /// Numbers of the relays, padded with zeros.
-        relays: RelayNumbers,
+        relays: [u16; MOST],
         /// Sender of the command.
         from: Address,
     },
@@ -326,7 +326,7 @@ pub enum AutopilotEvent {
     /// of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
-        relays: RelayNumbers,
+        relays: [u16; MOST],
         /// Sender of the command.
         from: Address,
     },
