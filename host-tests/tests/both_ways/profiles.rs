@@ -202,7 +202,7 @@ fn a_relay_that_stays_short_of_the_previous_ones_reach() {
     assert_eq!(tally.tight, 1);
 }
 
-/// Checks a chain of four relays whose first three stay next to Tx, and whose fourth is beyond the interferer.
+/// Checks four relays, of which three stay next to Tx and the fourth is beyond the interferer.
 ///
 /// The fourth goes farthest if the third is at x = 0, where the first two have no x of their own.
 #[test]

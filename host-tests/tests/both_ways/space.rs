@@ -150,8 +150,8 @@ fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     shares.remove("all").unwrap()
 }
 
-/// Checks that the joint method reaches 0.999 of the judge's SIR in 99.5 % of random scenes, and 0.98 in all. The judge
-/// is an independent search. The interferer is near the line Tx-Rx if `wild`.
+/// Checks that the joint method reaches 0.999 of the judge's SIR in 99.5 % of scenes, and 0.98 in all. The judge is an
+/// independent search. The interferer is near the line Tx-Rx if `wild`.
 fn near_the_best_places(seed: u64, scenes: usize, wild: bool) {
     let shares = compared(seed, scenes, wild);
     let short = shares.iter().filter(|share| **share < 0.999).count();

@@ -185,8 +185,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: Gains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Parts of the line Tx-Rx that are closed: to relay 1 this one next to Rx, and to relay N this one next to Tx.
-    /// In units of the distance from Tx to Rx.
+    /// Parts of the line Tx-Rx that are closed to two relays: next to Rx to relay 1, next to Tx to relay N. In units
+    /// of the distance from Tx to Rx.
     pub(super) closed: [f32; 2],
     nodes: [Node; RELAYS],
     last: Hop,
