@@ -61,16 +61,10 @@ impl Hello {
     /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The seven flags share one
     /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let Self {
-            requests_reply: ask,
-            requests_view: form,
-            fresh,
-            ..
-        } = *self;
         let flags = [
-            ask,
-            form,
-            fresh,
+            self.requests_reply,
+            self.requests_view,
+            self.fresh,
             self.ready,
             self.active,
             self.active_in_view,
