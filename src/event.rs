@@ -23,7 +23,8 @@ pub enum Event {
     Infeasible,
     /// The neighbour at `side` is lost.
     ///
-    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and at least 16 requests. On a channel that loses frames both take longer, at most eight times `dead_after`.
+    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and at least 16 requests. On a
+    /// channel that loses frames both take longer, at most eight times `dead_after`.
     /// With two links the relay keeps sending heartbeat requests to it; on a shared channel it searches for another
     /// node at that side. An operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space
     /// around its last position.
