@@ -106,6 +106,7 @@ function show(snapshot) {
   map.take(snapshot);
   table(snapshot);
   alarms.take(snapshot.alarms);
+  takeDesk(snapshot);
   received.first ||= performance.now();
   connection();
 }
@@ -166,5 +167,6 @@ byId("farther").addEventListener("click", () => map.zoom(1 / 1.4));
 byId("fit").addEventListener("click", () => map.fit());
 if (!isRecorded) {
   setInterval(connection, 500);
-  connect();
+  // All scripts have run then.
+  document.addEventListener("DOMContentLoaded", connect);
 }
