@@ -200,7 +200,7 @@ impl Uploading {
             .filter(|_| matches!(self.stage, Stage::Confirming));
         let Some(upload) = upload else {
             let why = if self.is_confirmed {
-                "was uploaded already"
+                "was used already: make a new preview"
             } else {
                 "is not ready"
             };

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::chain::{Chain, Place, simulated};
-use crate::files::status_of;
+use crate::files::{answer, status_of, until};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
 use crate::web::{address, connect, snapshots};
@@ -133,7 +133,10 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let request = json!({ "preview": 2, "digest": digest });
     assert_eq!(page.post("/upload", &request).0, 200);
     // The same request again is refused at once, and later.
-    let again = (409, "preview 2 was uploaded already".to_owned());
+    let again = (
+        409,
+        "preview 2 was used already: make a new preview".to_owned(),
+    );
     assert_eq!(page.post("/upload", &request), again);
     station.line("flown: 2 of 2 relays fly version 1 of the mission");
     assert_eq!(page.post("/upload", &request), again);
@@ -259,5 +262,53 @@ fn a_page_for_other_computers_needs_a_password() {
             .unwrap();
         assert_eq!(&answer[9..12], status, "{header}");
     }
+    station.stopped();
+}
+
+#[test]
+fn the_status_socket_takes_the_same_tasks() {
+    let chain = Chain::with_ground(1, QUIET);
+    let files = &chain.files;
+    let mut relay = chain.relay(1, &files.signed("key", "relay"));
+    relay.line("converged: ");
+    let (socket, tty) = (files.text("status"), chain.tx.as_ref().unwrap().tty(0));
+    let own = format!("--status-socket {socket} {}", files.signed("key", "ground"));
+    let mut station = Relay::ground(&format!("--stand --end tx --of 1 --tty {tty} {own}"));
+    let commanded = |line: &str| {
+        let said = answer(&socket, &format!("{line}\n"), false);
+        let said: Value = serde_json::from_str(&said).unwrap();
+        (
+            said["done"] == true,
+            said["text"].as_str().unwrap().to_owned(),
+        )
+    };
+    let usage = "must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, at a station with --stand, or empty to read its state";
+    for line in ["land", "preview altitude", "upload 1", "upload x 0x1"] {
+        assert_eq!(commanded(line), (false, format!("{line}: {usage}")));
+    }
+    let refused = commanded("preview land=1");
+    assert!(
+        refused.1.contains("unexpected argument '--new-land'"),
+        "{refused:?}"
+    );
+    assert_eq!(
+        commanded("preview interferer=80,700,-300"),
+        (true, "{\"preview\":1}".to_owned())
+    );
+    let said = until(&socket, |said| {
+        said["station"]["upload"]["stage"] == "ready"
+    });
+    let digest = said["station"]["upload"]["digest"].as_str().unwrap();
+    assert!(commanded(&format!("upload 1 {digest}")).0);
+    station.line("flown: 1 of 1 relays fly version 1 of the mission");
+    let refused = commanded(&format!("upload 1 {digest}"));
+    assert_eq!(
+        refused,
+        (
+            false,
+            "preview 1 was used already: make a new preview".to_owned()
+        )
+    );
+    relay.settles_at(simulated(&with_source(80.0, 700.0, -300.0), 1)[0]);
     station.stopped();
 }
