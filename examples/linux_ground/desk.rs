@@ -15,7 +15,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Geodetic, Ground, Instant, Mission, Placement, Profile, Report, Sites, UploadError,
+    Geodetic, Ground, Instant, Mission, Placement, Profile, Report, Sites, Upload, UploadError,
 };
 use uav_relay_linux::command::one_line;
 use uav_relay_linux::log::Log;
@@ -227,7 +227,7 @@ pub(crate) fn state(plan: &Plan, reports: &[Report], uploading: Option<&Uploadin
         return json!({ "sited": is_sited });
     };
     let upload = uploading.upload();
-    let version = upload.map(|it| it.version());
+    let version = upload.map(Upload::version);
     let flying = reports.iter().filter(|it| Some(it.version) == version);
     let arrived = flying
         .clone()
@@ -259,7 +259,6 @@ fn preview(plan: &Plan, preview: &Preview) -> Value {
         before,
         after,
         moves,
-        refusal,
     } = preview;
     let changes = changes(before, after);
     let changes = changes.map(|(name, old, new)| json!({ "value": name, "old": old, "new": new }));
@@ -272,21 +271,15 @@ fn preview(plan: &Plan, preview: &Preview) -> Value {
         [Some(old), Some(new)] if before.line != after.line => old.place(new.point(to)?),
         _ => Some(to),
     };
-    let moved = |it: &Move| {
-        let mut all = fields(it);
-        if let Some(at) = on_map(it.after) {
-            all["at"] = json!([at.x_m, at.y_m]);
-        }
-        all
-    };
+    let targets = places(|it| it.after).unwrap_or_default().into_iter();
+    let targets = targets.filter_map(on_map).map(|at| [at.x_m, at.y_m]);
     let worst = |basis, places: Option<Vec<_>>| places.map(|it| worst_db(plan, basis, &it));
     json!({
         "changes": changes.collect::<Vec<_>>(),
-        "moves": moves.map(|moves| moves.iter().map(moved).collect::<Vec<_>>()),
+        "moves": moves.map(|moves| moves.iter().map(fields).collect::<Vec<_>>()),
+        "targets": targets.collect::<Vec<_>>(),
         "worst_before": worst(before, places(|it| it.before)),
         "worst_after": worst(after, places(|it| it.after)),
-        "refusal": refusal,
-        "distance_m": after.config.distance_m,
     })
 }
 
@@ -306,16 +299,14 @@ fn worst_db(plan: &Plan, basis: &Basis, places: &[Placement]) -> [Option<f64>; 2
         .map(|(relay, at)| (*at, profile(relay)))
         .collect();
     let there = hop_sirs(&mission, &flown);
-    let back = match mission.reverse() > 0.0 {
-        true => hop_sirs_back(&mission, &flown),
-        false => Vec::new(),
-    };
-    [there, back].map(|sirs| sirs.into_iter().reduce(f64::min).map(db))
+    let back = (mission.reverse() > 0.0).then(|| hop_sirs_back(&mission, &flown));
+    [there, back.unwrap_or_default()].map(|sirs| sirs.into_iter().reduce(f64::min).map(db))
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
+    #![allow(clippy::cast_possible_truncation, reason = "as a mission has it")]
 
     use serde_json::json;
     use uav_relay::{
@@ -436,7 +427,9 @@ mod tests {
             index: 1,
         };
         let mut relay = Relay::new(*loaded, identity, settings, 1, Instant::ZERO).unwrap();
-        before.map(|before| relay.resume(before).unwrap());
+        if let Some(before) = before {
+            relay.resume(before).unwrap();
+        }
         match relay.handle_upload(Instant::ZERO, new) {
             Ok(()) => None,
             Err(UploadError::Line(LineError::Altitude)) => Some("altitude "),
@@ -469,7 +462,7 @@ mod tests {
                 lateral_max_m: if random.is(0.5) { 40.0 } else { 0.0 },
                 ..Scenario::default()
             };
-            let relays = 1 + random.within(0.0, 5.0) as u16;
+            let relays = 1 + checked % 5;
             let (mission, _) = mission::mission(&scenario, relays, 1e-4).unwrap();
             let method = if random.is(0.3) {
                 Method::Joint

@@ -79,8 +79,6 @@ pub(crate) struct Preview {
     pub(crate) after: Basis,
     /// `None` if the moves cannot be computed.
     pub(crate) moves: Option<Vec<Move>>,
-    /// Reason why a relay that flies a drone refuses the upload, with the limit.
-    pub(crate) refusal: Option<String>,
 }
 
 #[derive(Debug)]
@@ -189,7 +187,7 @@ impl Uploading {
         number: u32,
         digest: &str,
     ) -> Result<(), String> {
-        let newest = self.number().unwrap_or(0);
+        let newest = self.number().ok_or("there is no preview")?;
         if number != newest {
             return Err(format!(
                 "preview {number} is not the newest one, which is preview {newest}"
@@ -379,7 +377,6 @@ impl Uploading {
             before,
             after,
             moves: None,
-            refusal: None,
         });
         (self.stage, self.upload, self.late_at) = (Stage::Computing(now), Some(upload), None);
         None
@@ -406,17 +403,17 @@ impl Uploading {
         let (version, options) = (upload.version(), &plan.options);
         change::log_moves(log, now, moves.as_deref());
         let fence = FenceViolation::of(&plan.loaded.mission, &upload).filter(|_| !options.no_fence);
-        let refusal = fence.map(|fence| fence.line(moves.as_deref()));
+        let outside = fence.map(|fence| fence.line(moves.as_deref()));
         if let Some(preview) = &mut self.preview {
             preview.moves = moves;
-            preview.refusal.clone_from(&refusal);
         }
-        if let Some(outside) = refusal {
-            let hint = match self.form {
-                Some(_) => "",
-                None => "; --no-fence uploads it nevertheless",
-            };
-            return failed(format!("--version {version}: {outside}{hint}"));
+        if let Some(outside) = outside {
+            return failed(match self.form {
+                Some(_) => outside,
+                None => {
+                    format!("--version {version}: {outside}; --no-fence uploads it nevertheless")
+                }
+            });
         }
         (self.stage, self.upload) = (Stage::Confirming, Some(upload));
         if self.form.is_some() {

@@ -29,7 +29,7 @@ async function preview() {
   try {
     desk.mine = (await post("/preview", values())).preview;
   } catch (error) {
-    desk.note = `Refused: ${error.message}`;
+    desk.note = `Refused: ${error.message}.`;
   }
   describe();
 }
@@ -39,7 +39,7 @@ async function upload() {
   try {
     await post("/upload", { preview, digest });
   } catch (error) {
-    desk.note = `Refused: ${error.message}`;
+    desk.note = `Refused: ${error.message}.`;
   }
   describe();
 }
@@ -52,7 +52,8 @@ function edited() {
   describe();
 }
 
-const isReady = () => desk.mine !== null && desk.mine === desk.state.number && desk.state.stage === "ready";
+/** Returns true if the form's own preview can be uploaded, and the page does not show an old state. */
+const isReady = () => desk.mine !== null && desk.mine === desk.state.number && desk.state.stage === "ready" && !document.body.classList.contains("stale");
 
 /** Takes the token and the state of the tasks from a snapshot. */
 function takeDesk({ token, desk: state }) {
@@ -99,11 +100,10 @@ function describe() {
   byId("hold").disabled = !isReady();
   if (!isReady()) release();
   const shown = state.preview;
-  const key = shown ? JSON.stringify([state.number, shown]) : "";
+  const key = shown ? JSON.stringify([state.number, state.stage, shown]) : "";
   if (key === desk.shown) return;
   desk.shown = key;
   const lines = shown ? shown.changes.map(({ value, old, new: now }) => `${value}: ${old} → ${now}`) : [];
-  if (shown?.refusal) lines.push(`Refused by relays that fly a drone: ${shown.refusal}`);
   if (shown?.moves) {
     lines.push(`worst hop: ${worstText(shown.worst_before)} → ${worstText(shown.worst_after)}`);
     for (const { relay, metres: way, from, to } of shown.moves) lines.push(`relay ${relay} moves ${metres(way)} m: x ${metres(from.x_m)}, y ${metres(from.y_m)}, h ${metres(from.h_m)} → x ${metres(to.x_m)}, y ${metres(to.y_m)}, h ${metres(to.h_m)}`);
@@ -111,7 +111,8 @@ function describe() {
     lines.push("the moves of the relays cannot be computed in advance");
   }
   byId("changes").replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
-  map.targets = shown?.moves?.map(({ at }) => at) ?? [];
+  // An uploaded mission may have another line, and the map other coordinates.
+  map.targets = state.stage === "ready" ? shown.targets : [];
   map.request();
 }
 

@@ -134,7 +134,7 @@ function connection() {
   say("state", `${state}${closed && state.startsWith("no data") ? ", not connected to the server" : ""}`);
   say("seconds", broken ? ` for ${Math.floor(silent / 1000)} s` : "");
   byId("connection").className = broken ? "broken" : "";
-  document.body.classList.toggle("stale", broken);
+  if (document.body.classList.toggle("stale", broken)) describe();
   const silence = broken ? silent / 1000 : 0;
   if (silence !== map.silence) {
     map.silence = silence;

@@ -27,8 +27,13 @@ struct Shown {
 
 impl Shown {
     /// Shows ten snapshots of `next` a second.
-    fn begin(mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
-        let screen = Arc::new(Screen::start("127.0.0.1:0".parse().unwrap()).unwrap());
+    fn begin(next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Screen::start("127.0.0.1:0".parse().unwrap()).unwrap();
+        Self::on(screen, next)
+    }
+
+    fn on(screen: Screen, mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Arc::new(screen);
         let has_ended = Arc::new(AtomicBool::new(false));
         let (shown, stop) = (Arc::clone(&screen), Arc::clone(&has_ended));
         let thread = thread::spawn(move || {
@@ -279,17 +284,20 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
         "sited": false, "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
         "preview": {
             "changes": [{ "value": "altitude", "old": "20 m", "new": "30 m" }], "worst_before": [1.0, null], "worst_after": [2.25, -3.5],
-            "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34), "at": [412.34, 0.0] }],
+            "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34) }],
+            "targets": [[412.34, 0.0]],
         },
     });
-    screen.show(Snapshot {
-        desk: Some(desk),
+    let shown = Shown::on(screen, move || Snapshot {
+        desk: Some(desk.clone()),
         ..full(3, 0.0)
     });
-    let mut browser = Browser::start(&screen.url(), 1280, 900);
+    let mut browser = shown.opened(1280, 900);
     browser.until(&shows(4));
     browser.until("!byId('desk').hidden");
     browser.run("byId('desk').open = true");
+    let over = "document.documentElement.scrollWidth - window.innerWidth";
+    assert!(number(&mut browser, over) <= 0.0);
     let text = browser.text("byId('changes').textContent");
     for part in [
         "altitude: 20 m → 30 m",
@@ -333,6 +341,9 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     task.reply(Err("preview 1 was used already".to_owned()));
     browser
         .until("byId('desk-state').textContent.startsWith('Refused: preview 1 was used already')");
+    // A page without new data uploads nothing.
+    browser.run("document.body.classList.add('stale'); describe()");
+    assert_eq!(browser.value("isReady()"), false);
     // A drag of Rx moves it, and not the map; without sites along the line only.
     let at = browser.value("(() => { const box = byId('canvas').getBoundingClientRect(); const [x, y] = map.pixels(received.last.rx.x_m, 0); return [box.x + x, box.y + y]; })()");
     let [x, y] = [0, 1].map(|it| at[it].as_f64().unwrap());
@@ -452,7 +463,7 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
                 );
                 assert!(over <= 0.0, "{name} {scheme} {what}: {over} px too wide");
                 let small = browser.value(
-                    "[...document.querySelectorAll('button')].map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
+                    "[...document.querySelectorAll('button')].filter((it) => it.checkVisibility()).map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
                 );
                 assert_eq!(
                     small.to_string(),
