@@ -342,8 +342,8 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     browser
         .until("byId('desk-state').textContent.startsWith('Refused: preview 1 was used already')");
     // A page without new data uploads nothing.
-    browser.run("document.body.classList.add('stale'); describe()");
-    assert_eq!(browser.value("isReady()"), false);
+    let stale = "(document.body.classList.add('stale'), isReady())";
+    assert_eq!(browser.value(stale), false);
     // A drag of Rx moves it, and not the map; without sites along the line only.
     let at = browser.value("(() => { const box = byId('canvas').getBoundingClientRect(); const [x, y] = map.pixels(received.last.rx.x_m, 0); return [box.x + x, box.y + y]; })()");
     let [x, y] = [0, 1].map(|it| at[it].as_f64().unwrap());
