@@ -1,6 +1,7 @@
 //! Linux companion and ground station as processes on pseudo-terminals. Their chain is compared with the simulated one.
 #![cfg(target_os = "linux")]
 
+mod acting;
 mod astray;
 mod bench;
 mod binary;

@@ -10,7 +10,7 @@ use clap::Parser as _;
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
     Alarm, Condition, Fence, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Screen,
-    Snapshot, Urgency,
+    Snapshot, Task, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -27,8 +27,13 @@ struct Shown {
 
 impl Shown {
     /// Shows ten snapshots of `next` a second.
-    fn begin(mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
-        let screen = Arc::new(Screen::start("127.0.0.1:0".parse().unwrap()).unwrap());
+    fn begin(next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Screen::start("127.0.0.1:0".parse().unwrap()).unwrap();
+        Self::on(screen, next)
+    }
+
+    fn on(screen: Screen, mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Arc::new(screen);
         let has_ended = Arc::new(AtomicBool::new(false));
         let (shown, stop) = (Arc::clone(&screen), Arc::clone(&has_ended));
         let thread = thread::spawn(move || {
@@ -270,6 +275,95 @@ fn only_alarms_that_last_sound_and_are_in_the_title() {
     assert_eq!(listed, 2);
 }
 
+#[test]
+fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
+    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None).unwrap();
+    let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
+    let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
+    let desk = serde_json::json!({
+        "sited": false, "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
+        "preview": {
+            "changes": [{ "value": "altitude", "old": "20 m", "new": "30 m" }], "worst_before": [1.0, null], "worst_after": [2.25, -3.5],
+            "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34) }],
+            "targets": [[412.34, 0.0]],
+        },
+    });
+    let shown = Shown::on(screen, move || Snapshot {
+        desk: Some(desk.clone()),
+        ..full(3, 0.0)
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(4));
+    browser.until("!byId('desk').hidden");
+    browser.run("byId('desk').open = true");
+    let over = "document.documentElement.scrollWidth - window.innerWidth";
+    assert!(number(&mut browser, over) <= 0.0);
+    let text = browser.text("byId('changes').textContent");
+    for part in [
+        "altitude: 20 m → 30 m",
+        "worst hop: 1.0 dB → 2.3 dB toward Rx, -3.5 dB back",
+        "relay 1 moves 12.3 m: x 400.0",
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
+    // The preview on the page is that of another browser.
+    assert_eq!(browser.value("byId('hold').disabled"), true);
+    browser.run("byId('form').elements.altitude.value = ' 30 '; byId('form').requestSubmit()");
+    let task = next();
+    assert_eq!(
+        (task.task, &task.body[..]),
+        (Task::Preview, "{\"altitude\":\"30\"}")
+    );
+    task.reply(Ok("{\"preview\":1}".to_owned()));
+    browser.until("!byId('hold').disabled");
+    let press = "byId('hold').dispatchEvent(new PointerEvent('pointerdown'))";
+    browser.run(press);
+    thread::sleep(Duration::from_millis(700));
+    browser.run("byId('hold').dispatchEvent(new PointerEvent('pointerup'))");
+    browser.run("byId('hold').focus()");
+    browser.key("Enter", 13);
+    browser.run("byId('hold').click()");
+    thread::sleep(Duration::from_millis(1_500));
+    assert!(
+        posts.try_recv().is_err(),
+        "held for 0.7 s, pressed and clicked"
+    );
+    let begun = Instant::now();
+    browser.run(press);
+    let task = next();
+    assert!(
+        begun.elapsed() > Duration::from_millis(950),
+        "{:?}",
+        begun.elapsed()
+    );
+    let body = "{\"preview\":1,\"digest\":\"0x1234\"}";
+    assert_eq!((task.task, &task.body[..]), (Task::Upload, body));
+    task.reply(Err("preview 1 was used already".to_owned()));
+    browser
+        .until("byId('desk-state').textContent.startsWith('Refused: preview 1 was used already')");
+    // A page without new data uploads nothing.
+    let stale = "(document.body.classList.add('stale'), isReady())";
+    assert_eq!(browser.value(stale), false);
+    // A drag of Rx moves it, and not the map; without sites along the line only.
+    let at = browser.value("(() => { const box = byId('canvas').getBoundingClientRect(); const [x, y] = map.pixels(received.last.rx.x_m, 0); return [box.x + x, box.y + y]; })()");
+    let [x, y] = [0, 1].map(|it| at[it].as_f64().unwrap());
+    browser.drag([x, y], [x - 60.0, y + 30.0], 5);
+    let task = next();
+    let body: serde_json::Value = serde_json::from_str(&task.body).unwrap();
+    let (to, beside) = body["receiver"].as_str().unwrap().split_once(',').unwrap();
+    let to: f64 = to.parse().unwrap();
+    assert!(
+        (500.0..1_990.0).contains(&to) && beside == "0" && body["altitude"] == "30",
+        "{body}"
+    );
+    assert_eq!(browser.value("map.fitted"), true);
+    task.reply(Err("no".to_owned()));
+    save("desk", &browser.screenshot());
+    // The browser reports each refused request.
+    let errors = browser.errors();
+    assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
+}
+
 /// Returns a snapshot of `relays` relays that move, with everything that the map can show.
 fn full(relays: u16, time_s: f64) -> Snapshot {
     let distance_m = 2_000.0;
@@ -369,7 +463,7 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
                 );
                 assert!(over <= 0.0, "{name} {scheme} {what}: {over} px too wide");
                 let small = browser.value(
-                    "[...document.querySelectorAll('button')].map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
+                    "[...document.querySelectorAll('button')].filter((it) => it.checkVisibility()).map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
                 );
                 assert_eq!(
                     small.to_string(),
