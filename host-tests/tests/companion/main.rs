@@ -10,6 +10,7 @@ mod change;
 mod cleared;
 mod datagrams;
 mod file;
+mod faults;
 mod files;
 mod flying;
 mod idle;
