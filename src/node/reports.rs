@@ -6,7 +6,7 @@
 //! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports |
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
-//! | first frame of a neighbour's new session, or of the relay four numbers away | hand the Watch of the other side on to it |
+//! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -154,8 +154,8 @@ impl Reporting {
     pub(crate) fn handle_session(&mut self, now: Instant, member: &Member, side: Side, from: u16) {
         let distance = from.abs_diff(member.node);
         let watched = self.at(side.other());
-        if watched.until > Instant::ZERO && (distance == 1 || distance == CANDIDATES) {
-            watched.hand_on |= mask(distance);
+        if watched.until > Instant::ZERO && distance == 1 {
+            watched.hand_on |= mask(1);
             watched.hand_on_at = now;
         }
     }
@@ -284,7 +284,8 @@ impl Watched {
     /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s, or a relay that has
     /// sent nothing for 4 s.
     fn expire(&mut self, now: Instant, member: &Member) {
-        let is_unheard = now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
+        let is_unheard =
+            now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
         if now >= self.until {
             *self = Self::default();
         } else if now >= self.to_until || is_unheard {
@@ -332,7 +333,10 @@ impl Reporting {
             return;
         }
         let distance = |node: u16| node.abs_diff(member.node);
-        if distance(from) == CANDIDATES && core::mem::replace(&mut watched.far_number, number) == number && !begins {
+        if distance(from) == CANDIDATES
+            && core::mem::replace(&mut watched.far_number, number) == number
+            && !begins
+        {
             return; // That relay repeats it, because it does not receive this relay's reports.
         }
         if watched.to.is_none_or(|to| distance(from) >= distance(to)) {

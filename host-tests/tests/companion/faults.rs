@@ -36,14 +36,48 @@ const TWO: &str = "critical two nodes have the number #";
 /// station waits 5 s for a report, and 15 s for a drone that does not move. Relays notice a missing quorum 15 s after the
 /// losses and an attempt to agree.
 const SCRIPT: [&[Fault]; 15] = [
-    &[("pilot", 3, 1.0, RELEASED), ("gps", 6, 1.0, BLIND), ("mute", 8, 3.0, UNLINKED), ("unplug", 1, 3.0, UNLINKED)],
-    &[("kill", 4, 5.0, LOST), ("reboot", 7, 1.0, RELEASED), ("rtl", 2, 1.0, RELEASED)],
-    &[("cut", 2, 5.0, LOST), ("gps", 5, 1.0, BLIND), ("pilot", 8, 1.0, RELEASED)],
-    &[("refuse", 5, 17.0, STUCK), ("pilot", 1, 1.0, RELEASED), ("mute", 4, 3.0, UNLINKED)],
-    &[("pilot", 2, 1.0, RELEASED), ("pilot", 4, 1.0, RELEASED), ("pilot", 6, 1.0, RELEASED)],
-    &[("pilot", 5, 1.0, RELEASED), ("pilot", 7, 1.0, RELEASED), ("hold", 1, 1.0, RELEASED)],
-    &[("gps", 1, 1.0, BLIND), ("gps", 8, 1.0, BLIND), ("stranger", 3, 3.0, UNLINKED)],
-    &[("cut off", 0, 5.0, "critical nothing received from the chain")],
+    &[
+        ("pilot", 3, 1.0, RELEASED),
+        ("gps", 6, 1.0, BLIND),
+        ("mute", 8, 3.0, UNLINKED),
+        ("unplug", 1, 3.0, UNLINKED),
+    ],
+    &[
+        ("kill", 4, 5.0, LOST),
+        ("reboot", 7, 1.0, RELEASED),
+        ("rtl", 2, 1.0, RELEASED),
+    ],
+    &[
+        ("cut", 2, 5.0, LOST),
+        ("gps", 5, 1.0, BLIND),
+        ("pilot", 8, 1.0, RELEASED),
+    ],
+    &[
+        ("refuse", 5, 17.0, STUCK),
+        ("pilot", 1, 1.0, RELEASED),
+        ("mute", 4, 3.0, UNLINKED),
+    ],
+    &[
+        ("pilot", 2, 1.0, RELEASED),
+        ("pilot", 4, 1.0, RELEASED),
+        ("pilot", 6, 1.0, RELEASED),
+    ],
+    &[
+        ("pilot", 5, 1.0, RELEASED),
+        ("pilot", 7, 1.0, RELEASED),
+        ("hold", 1, 1.0, RELEASED),
+    ],
+    &[
+        ("gps", 1, 1.0, BLIND),
+        ("gps", 8, 1.0, BLIND),
+        ("stranger", 3, 3.0, UNLINKED),
+    ],
+    &[(
+        "cut off",
+        0,
+        5.0,
+        "critical nothing received from the chain",
+    )],
     &[("duplicate", 6, 5.0, TWO)],
     &[("kill", 1, 5.0, LOST), ("kill", 8, 5.0, LOST)],
     &[("stop", 5, 5.0, LOST)],
@@ -63,7 +97,12 @@ pub(crate) struct Stage {
 
 impl Stage {
     pub(crate) const fn new(chain: Chain, flown: Vec<Flown>, page: Page) -> Self {
-        Self { chain, flown, page, second: None }
+        Self {
+            chain,
+            flown,
+            page,
+            second: None,
+        }
     }
 
     /// Runs the faults of the script, as many as COUNT says.
@@ -82,7 +121,8 @@ impl Stage {
     }
 
     fn group(&mut self, group: &[Fault], failures: &mut Vec<String>) {
-        self.page.until(LIMIT, "no alarms", |it| alarms(it).is_empty());
+        self.page
+            .until(LIMIT, "no alarms", |it| alarms(it).is_empty());
         let number = |it: &Value| it["number"].as_u64().unwrap();
         let all = |it: &Value| it["alarms"].as_array().unwrap().clone();
         let known = all(&self.page.last).iter().map(number).max().unwrap_or(0);
@@ -91,7 +131,10 @@ impl Stage {
         }
         let text = |(_, relay, _, alarm): &Fault| alarm.replace('#', &relay.to_string());
         let (begun, mut times) = (Instant::now(), vec![None; group.len()]);
-        let most_s = group.iter().map(|it| it.2 + 3.0 * SOON_S).fold(0.0, f64::max);
+        let most_s = group
+            .iter()
+            .map(|it| it.2 + 3.0 * SOON_S)
+            .fold(0.0, f64::max);
         while times.contains(&None) && begun.elapsed().as_secs_f64() < most_s {
             let (_, snapshot) = self.page.next();
             let (took, lasting) = (begun.elapsed().as_secs_f64(), alarms(&snapshot));
@@ -121,15 +164,30 @@ impl Stage {
             self.page.next();
         }
         println!("  all alarms ended after {:.1?}", ended.elapsed());
-        let new: Vec<Value> = all(&self.page.last).into_iter().filter(|it| number(it) > known).collect();
+        let new: Vec<Value> = all(&self.page.last)
+            .into_iter()
+            .filter(|it| number(it) > known)
+            .collect();
         for it in &new {
-            println!("  {}: {} to {} {}", it["text"], it["time_s"], it["cleared_s"], it["urgency"]);
+            println!(
+                "  {}: {} to {} {}",
+                it["text"], it["time_s"], it["cleared_s"], it["urgency"]
+            );
             if it["cleared_s"].is_null() {
                 failures.push(format!("{group:?}: does not end: {it}"));
             }
         }
         for fault in group {
-            let of = |it: &&Value| is_of(&format!("{} {}", it["urgency"].as_str().unwrap(), it["text"].as_str().unwrap()), &text(fault));
+            let of = |it: &&Value| {
+                is_of(
+                    &format!(
+                        "{} {}",
+                        it["urgency"].as_str().unwrap(),
+                        it["text"].as_str().unwrap()
+                    ),
+                    &text(fault),
+                )
+            };
             let times = new.iter().filter(of).count();
             if times != 1 {
                 failures.push(format!("{fault:?}: {times} alarms"));
@@ -176,7 +234,9 @@ impl Stage {
                 let tty = self.chain.media[0].tty(SECOND);
                 let signed = self.chain.files.signed("key", "second");
                 let (of, distance) = (self.chain.of, crate::peer::distance_to_m(crate::peer::RX));
-                self.second = Some(Relay::start(&format!("--index {relay} --of {of} --shared {tty} --distance {distance} {signed}")));
+                self.second = Some(Relay::start(&format!(
+                    "--index {relay} --of {of} --shared {tty} --distance {distance} {signed}"
+                )));
             }
             "no quorum" => (4..=8).for_each(|relay| self.kill(relay)),
             _ => panic!("{what}"),
@@ -241,7 +301,11 @@ impl Stage {
                 }
             }
             turn += 1;
-            assert!(begun.elapsed() < LIMIT, "relay {relay}: {:#}", self.page.last);
+            assert!(
+                begun.elapsed() < LIMIT,
+                "relay {relay}: {:#}",
+                self.page.last
+            );
         }
     }
 }

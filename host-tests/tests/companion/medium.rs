@@ -122,7 +122,9 @@ impl Medium {
         let stop = Arc::new(AtomicBool::new(false));
         let cut = Arc::new(AtomicU16::new(0));
         let (lost, mut passes) = (Arc::clone(&cut), gate);
-        let gate: Gate = Box::new(move |from, sent| passes(from, sent) && lost.load(Ordering::Relaxed) >> from & 1 == 0);
+        let gate: Gate = Box::new(move |from, sent| {
+            passes(from, sent) && lost.load(Ordering::Relaxed) >> from & 1 == 0
+        });
         let shared = (Arc::clone(&ptys), Arc::clone(&counts), Arc::clone(&stop));
         let pump = std::thread::spawn(move || carry(&shared.0, noise, gate, &shared.1, &shared.2));
         Self {

@@ -87,7 +87,12 @@ impl Page {
     }
 
     /// Waits for a snapshot for which `is_so` is true. Returns the time until then.
-    pub(crate) fn until(&mut self, limit: Duration, what: &str, is_so: impl Fn(&Value) -> bool) -> Duration {
+    pub(crate) fn until(
+        &mut self,
+        limit: Duration,
+        what: &str,
+        is_so: impl Fn(&Value) -> bool,
+    ) -> Duration {
         // Snapshots from before the call are not counted.
         self.arriving.try_iter().for_each(drop);
         let begun = Instant::now();
@@ -194,7 +199,10 @@ fn the_page_shows_eight_flying_relays_and_their_faults() {
     };
     let agreed = simulated(&scenario, 8).into_iter().zip(1..);
     let agreed = agreed.map(|(at, index)| (index, f64::from(f32::from_bits(at[0]))));
-    println!("agreed: {:.0?}", agreed.clone().map(|it| it.1).collect::<Vec<_>>());
+    println!(
+        "agreed: {:.0?}",
+        agreed.clone().map(|it| it.1).collect::<Vec<_>>()
+    );
     // Each drone flies 60 m to its position.
     let mut flown: Vec<Flown> = agreed
         .map(|(index, x_m)| fly(&chain, index, x_m - 60.0))
@@ -244,7 +252,10 @@ fn the_page_shows_eight_flying_relays_and_their_faults() {
     let age_s = [0.5, 0.95, 1.0].map(|share| quantile(&mut ages, share));
     let error_m = [0.5, 0.95, 1.0].map(|share| quantile(&mut errors, share));
     println!("median, 95 % and maximum: ages {age_s:.2?} s, errors {error_m:.2?} m");
-    assert!(shown.len() as f64 > 4.0 * flight_s && age_s[1] <= 2.0, "{age_s:?}");
+    assert!(
+        shown.len() as f64 > 4.0 * flight_s && age_s[1] <= 2.0,
+        "{age_s:?}"
+    );
     assert!(
         error_m[1] <= 1.0 && error_m[2] <= MOST_ERROR_M,
         "{error_m:?}"

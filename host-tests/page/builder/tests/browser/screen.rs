@@ -10,8 +10,8 @@ use clap::Parser as _;
 use serde_json::Value;
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Alarm, Condition, Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot, Screen,
-    Snapshot, Urgency,
+    Alarm, Condition, Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot,
+    Screen, Snapshot, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -523,7 +523,10 @@ fn the_page_has_no_serious_fault_of_accessibility() {
         let nameless: Vec<_> = nodes.iter().filter(is_control).filter(nameless).collect();
         assert!(nameless.is_empty(), "{what}: {nameless:#?}");
         // The focus visits everything in the order of the document, and is visible.
-        let all = number(&mut browser, "[...document.querySelectorAll('button:enabled, [tabindex]')].length");
+        let all = number(
+            &mut browser,
+            "[...document.querySelectorAll('button:enabled, [tabindex]')].length",
+        );
         browser.run("document.body.focus(); window.visited = []");
         for _ in 0..all as usize {
             browser.key("Tab", 9);
@@ -537,7 +540,11 @@ fn the_page_has_no_serious_fault_of_accessibility() {
                 "axe.run({ resultTypes: ['violations'] }).then((it) => it.violations.map((one) => `${one.impact} ${one.id}: ${one.nodes.map((node) => node.target).join()}`))",
             );
             println!("axe-core, {what}: {faults}");
-            assert!(!["serious", "critical"].iter().any(|it| faults.to_string().contains(it)));
+            assert!(
+                !["serious", "critical"]
+                    .iter()
+                    .any(|it| faults.to_string().contains(it))
+            );
         }
         assert_eq!(browser.errors(), Vec::<String>::new());
     }
