@@ -10,7 +10,7 @@
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
-//! neighbour, too: reports then skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. A relay that has sent no frame for 4 s is no destination. The time between two reports of a relay is proportional to the first one's
+//! neighbour, too: reports then skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. A relay that has sent no frame for 2.5 s is no destination. The time between two reports of a relay is proportional to the first one's
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
@@ -32,7 +32,7 @@ const WATCHED: Duration = Duration::from_millis(60_000);
 const DESTINED: Duration = Duration::from_millis(25_000);
 
 /// Time without any frame of a relay after which it is the destination of reports no longer.
-const UNHEARD: Duration = Duration::from_millis(4_000);
+const UNHEARD: Duration = Duration::from_millis(2_500);
 
 /// Time without a report from a relay after which a Watch to it is repeated.
 const UNCONFIRMED: Duration = Duration::from_millis(4_000);
@@ -139,8 +139,13 @@ impl Reporting {
         self.power_w = power_w;
     }
 
+    /// Takes the control state; a change is reported as soon as the share of the channel allows.
     pub(crate) fn handle_control(&mut self, control: u16) {
-        self.control = control;
+        if core::mem::replace(&mut self.control, control) != control {
+            for watched in &mut self.watched {
+                (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
+            }
+        }
     }
 
     /// Records a frame of node `from`, to whichever node.
@@ -282,7 +287,7 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 
 impl Watched {
     /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s, or a relay that has
-    /// sent nothing for 4 s.
+    /// sent nothing for 2.5 s.
     fn expire(&mut self, now: Instant, member: &Member) {
         let is_unheard =
             now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
