@@ -35,7 +35,7 @@ const DESTINED: Duration = Duration::from_millis(25_000);
 const UNHEARD: Duration = Duration::from_millis(2_500);
 
 /// Time without a report from a relay after which a Watch to it is repeated.
-const UNCONFIRMED: Duration = Duration::from_millis(4_000);
+const UNCONFIRMED: Duration = Duration::from_millis(3000);
 
 /// Maximum number of doublings of the time between two such repetitions.
 const MOST_DOUBLINGS: u8 = 3;

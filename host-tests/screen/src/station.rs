@@ -105,7 +105,14 @@ impl Known {
     }
 
     /// Returns the age of its report from which the relay counts as silent. Where reports often take long, it is longer.
+    ///
+    /// Before a relay's first agreement its reports may wait 6 s for it.
     fn silent_after(&self) -> Duration {
+        let Report { phase, agreed, .. } = self.report;
+        let is_idle = matches!(phase, Phase::Holding | Phase::Infeasible | Phase::NoQuorum);
+        if agreed.is_none() && !is_idle {
+            return SILENT_AFTER.times(2);
+        }
         let usual = Duration::from_micros(self.longest_age.as_micros() * 3 / 2);
         usual.clamp(SILENT_AFTER, SILENT_AFTER.times(2))
     }

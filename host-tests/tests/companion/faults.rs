@@ -206,8 +206,8 @@ impl Stage {
             "refuse" => {
                 // The pilot flies it off its place, along the line and back.
                 order("mode pilot");
-                order("sticks 12 0");
-                std::thread::sleep(Duration::from_secs(2));
+                order("sticks 8 0");
+                std::thread::sleep(Duration::from_millis(1_500));
                 order("sticks 0 0");
                 order("refuse");
                 self.engage(relay);
@@ -296,7 +296,9 @@ impl Stage {
             let until = Instant::now() + Duration::from_millis([1_300, 3_000][turn % 2]);
             while Instant::now() < until {
                 let (_, snapshot) = self.page.next();
-                if turn % 2 == 1 && relays(&snapshot)[relay - 1]["control"] == "engaged" {
+                let shown = &relays(&snapshot)[relay - 1];
+                let is_new = shown["age_s"].as_f64().is_some_and(|it| it < 2.0);
+                if turn % 2 == 1 && is_new && shown["control"] == "engaged" {
                     return;
                 }
             }

@@ -203,9 +203,9 @@ fn the_page_shows_eight_flying_relays_and_their_faults() {
         "agreed: {:.0?}",
         agreed.clone().map(|it| it.1).collect::<Vec<_>>()
     );
-    // Each drone flies 60 m to its position.
+    // Each drone flies 20 m to its position, and its home keeps the order of the chain.
     let mut flown: Vec<Flown> = agreed
-        .map(|(index, x_m)| fly(&chain, index, x_m - 60.0))
+        .map(|(index, x_m)| fly(&chain, index, x_m - 20.0))
         .collect();
     page.until(LIMIT, "all relays", has_all);
     for it in &mut flown {

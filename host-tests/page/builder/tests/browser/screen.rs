@@ -391,13 +391,19 @@ fn a_hundred_relays_are_drawn_ten_times_a_second() {
     let shown = shown_full(100);
     let mut browser = Browser::start("about:blank", 1920, 1080);
     thread::sleep(Duration::from_secs(1));
-    browser.open(&shown.screen.url());
-    browser.until("performance.getEntriesByName('first-contentful-paint').length > 0");
-    let paint = number(
-        &mut browser,
-        "performance.getEntriesByName('first-contentful-paint')[0].startTime",
-    );
-    println!("first paint after {paint:.0} ms");
+    let mut paints: Vec<f64> = (0..7)
+        .map(|_| {
+            browser.open("about:blank");
+            browser.open(&shown.screen.url());
+            let paint = "performance.getEntriesByName('first-contentful-paint')[0]";
+            browser.until(&format!("location.protocol === 'http:' && {paint}"));
+            number(&mut browser, &format!("{paint}.startTime"))
+        })
+        .collect();
+    println!("first paints of {} loads: {paints:.0?} ms", paints.len());
+    paints.sort_by(f64::total_cmp);
+    // The first one of a browser starts its processes; a busy machine delays others.
+    assert!(paints[0] < 100.0, "{paints:?}");
     browser.until(&shows(100));
     // Ways of full length.
     browser.run(
