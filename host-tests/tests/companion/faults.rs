@@ -34,7 +34,7 @@ const TWO: &str = "critical two nodes have the number #";
 ///
 /// An autopilot reports its mode every second. A companion waits 3 s for a silent autopilot, and 1 s for a position. A
 /// station waits 5 s for a report, and 15 s for a drone that does not move. Relays notice a missing quorum 15 s after the
-/// losses and an attempt to agree. After the loss of a relay, reports wait up to 2 s for an agreement.
+/// losses and an attempt to agree. After a loss or a restart, reports wait up to 2 s for an agreement.
 const SCRIPT: [&[Fault]; 15] = [
     &[
         ("pilot", 3, 1.0, RELEASED),
@@ -44,13 +44,13 @@ const SCRIPT: [&[Fault]; 15] = [
     ],
     &[
         ("kill", 4, 5.0, LOST),
-        ("reboot", 7, 1.0, RELEASED),
-        ("rtl", 2, 1.0, RELEASED),
+        ("reboot", 7, 3.0, RELEASED),
+        ("rtl", 2, 3.0, RELEASED),
     ],
     &[
         ("cut", 2, 5.0, LOST),
         ("gps", 5, 3.0, BLIND),
-        ("pilot", 8, 1.0, RELEASED),
+        ("pilot", 8, 3.0, RELEASED),
     ],
     &[
         ("refuse", 5, 17.0, STUCK),
