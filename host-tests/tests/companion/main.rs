@@ -10,6 +10,7 @@ mod chain;
 mod change;
 mod cleared;
 mod datagrams;
+mod faults;
 mod file;
 mod files;
 mod flying;

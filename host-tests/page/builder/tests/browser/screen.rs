@@ -7,10 +7,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser as _;
+use serde_json::Value;
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Alarm, Condition, Fence, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Screen,
-    Snapshot, Task, Urgency,
+    Alarm, Condition, Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot,
+    Screen, Snapshot, Task, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -484,13 +485,19 @@ fn a_hundred_relays_are_drawn_ten_times_a_second() {
     let shown = shown_full(100);
     let mut browser = Browser::start("about:blank", 1920, 1080);
     thread::sleep(Duration::from_secs(1));
-    browser.open(&shown.screen.url());
-    browser.until("performance.getEntriesByName('first-contentful-paint').length > 0");
-    let paint = number(
-        &mut browser,
-        "performance.getEntriesByName('first-contentful-paint')[0].startTime",
-    );
-    println!("first paint after {paint:.0} ms");
+    let mut paints: Vec<f64> = (0..7)
+        .map(|_| {
+            browser.open("about:blank");
+            browser.open(&shown.screen.url());
+            let paint = "performance.getEntriesByName('first-contentful-paint')[0]";
+            browser.until(&format!("location.protocol === 'http:' && {paint}"));
+            number(&mut browser, &format!("{paint}.startTime"))
+        })
+        .collect();
+    println!("first paints of {} loads: {paints:.0?} ms", paints.len());
+    paints.sort_by(f64::total_cmp);
+    // The first one of a browser starts its processes. An idle machine takes less than 100 ms; this one may be busy.
+    assert!(paints[0] < 500.0, "{paints:?}");
     browser.until(&shows(100));
     // Ways of full length.
     browser.run(
@@ -555,4 +562,90 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
     let pressed = browser.text("byId('sound').getAttribute('aria-pressed')");
     assert_eq!(pressed, "true");
     assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// JavaScript: the texts with a contrast below 4.5 to 1 (WCAG 2.1 AA), without those of disabled buttons and of the canvas.
+const FAINT: &str = r"(() => {
+  const linear = (part) => (part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4);
+  const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
+  const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  const behind = (it) => { const of = parts(getComputedStyle(it).backgroundColor); return of[3] === 0 ? behind(it.parentElement) : of; };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), faint = [];
+  while (walker.nextNode()) {
+    const [text, it] = [walker.currentNode.textContent.trim(), walker.currentNode.parentElement];
+    if (!text || !it.getClientRects().length || it.closest('.unseen, :disabled')) continue;
+    const [one, other] = [light(parts(getComputedStyle(it).color)), light(behind(it))];
+    const ratio = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+    if (ratio < 4.5) faint.push(`${text}: ${ratio.toFixed(1)}`);
+  }
+  return faint;
+})()";
+
+/// Checks contrast, names and keyboard focus of everything on the page, with alarms of each urgency.
+///
+/// With `AXE=axe.min.js`, a copy of axe-core 4, it also runs all rules of axe-core.
+#[test]
+fn the_page_has_no_serious_fault_of_accessibility() {
+    let alarm = |number, urgency, cleared_s| Alarm {
+        number,
+        time_s: 1.0,
+        urgency,
+        text: format!("relay {number} lost: reported by relays 2 and 4"),
+        cleared_s,
+    };
+    let shown = Shown::begin(move || Snapshot {
+        alarms: vec![
+            alarm(1, Urgency::Critical, None),
+            alarm(2, Urgency::Warning, None),
+            alarm(3, Urgency::Notice, Some(2.0)),
+        ],
+        log: vec![LogLine {
+            time_s: 1.0,
+            text: "relay 2: does not receive relay 3".to_owned(),
+        }],
+        ..full(9, 3.0)
+    });
+    let axe = std::env::var("AXE").map(|file| std::fs::read_to_string(file).unwrap());
+    for (width, is_dark) in [(1280, false), (1280, true), (390, false), (390, true)] {
+        let mut browser = shown.opened(width, 900);
+        if is_dark {
+            browser.prefer_dark();
+        }
+        browser.until(&shows(9));
+        let what = format!("{width} px, dark: {is_dark}");
+        assert_eq!(browser.value(FAINT).to_string(), "[]", "{what}");
+        let nodes = browser.accessible();
+        let is_control = |it: &&Value| {
+            let role = it["role"]["value"].as_str().unwrap_or_default();
+            ["button", "link", "textbox", "application", "region"].contains(&role)
+        };
+        let nameless = |it: &&Value| it["name"]["value"].as_str().is_none_or(str::is_empty);
+        let nameless: Vec<_> = nodes.iter().filter(is_control).filter(nameless).collect();
+        assert!(nameless.is_empty(), "{what}: {nameless:#?}");
+        // The focus visits everything in the order of the document, and is visible.
+        let all = number(
+            &mut browser,
+            "[...document.querySelectorAll('button:enabled, [tabindex]')].length",
+        );
+        browser.run("document.body.focus(); window.visited = []");
+        for _ in 0..all as usize {
+            browser.key("Tab", 9);
+            browser.run("const it = document.activeElement; if (it.matches(':focus-visible') && getComputedStyle(it).outlineWidth === '3px') visited.push(it)");
+        }
+        let in_order = browser.value("new Set(visited).size === visited.length && visited.every((it, at) => at === 0 || visited[at - 1].compareDocumentPosition(it) & 4) && visited.length");
+        assert_eq!(in_order.as_f64(), Some(all), "{what}");
+        if let Ok(axe) = &axe {
+            browser.run(axe);
+            let faults = browser.value(
+                "axe.run({ resultTypes: ['violations'] }).then((it) => it.violations.map((one) => `${one.impact} ${one.id}: ${one.nodes.map((node) => node.target).join()}`))",
+            );
+            println!("axe-core, {what}: {faults}");
+            assert!(
+                !["serious", "critical"]
+                    .iter()
+                    .any(|it| faults.to_string().contains(it))
+            );
+        }
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
 }
