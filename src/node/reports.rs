@@ -155,7 +155,7 @@ impl Reporting {
         }
     }
 
-    /// Schedules the Watch of the other side for node `from` at `side`, which could not verify an earlier one.
+    /// Schedules a Watch for node `from` at `side`, which could not verify an earlier one.
     pub(crate) fn handle_session(&mut self, now: Instant, member: &Member, side: Side, from: u16) {
         let distance = from.abs_diff(member.node);
         let watched = self.at(side.other());
@@ -286,8 +286,9 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s, or a relay that has
-    /// sent nothing for 2.5 s.
+    /// Ends the watch 60 s after the last request, and forgets destinations.
+    ///
+    /// A destination is forgotten if it has sent no request for 25 s, or as a relay nothing at all for 2.5 s.
     fn expire(&mut self, now: Instant, member: &Member) {
         let is_unheard =
             now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));

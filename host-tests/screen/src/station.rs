@@ -358,7 +358,7 @@ impl StationView {
     }
 }
 
-/// Returns the distance of a drone from the setpoint that it has to fly to, m; `None` if it is not engaged or has to wait.
+/// Returns the distance of a drone from its setpoint, m. `None` if it is not engaged or has to wait.
 fn distance_to_fly_m(report: &Report) -> Option<f32> {
     let flies = report.control == Some(State::Engaged) && report.hold_reasons == [None; 2];
     let (at, to) = (report.position?, report.setpoint?);

@@ -20,7 +20,8 @@ const SOON_S: f64 = 2.0;
 /// Tty of the channel for a second node with a relay's number.
 pub(crate) const SECOND: usize = 9;
 
-/// Fault of a relay (0: of the chain), the time that the chain itself needs to notice it, s, and the alarm. `#` is the relay's number.
+/// Fault: command, relay (0: the chain), time that the chain itself needs to notice it, s, and alarm. `#` in the alarm
+/// is the relay's number.
 type Fault = (&'static str, usize, f64, &'static str);
 
 const RELEASED: &str = "warning relay # released";

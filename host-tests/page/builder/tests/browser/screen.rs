@@ -350,7 +350,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     let [x, y] = [0, 1].map(|it| at[it].as_f64().unwrap());
     browser.drag([x, y], [x - 60.0, y + 30.0], 5);
     let task = next();
-    let body: serde_json::Value = serde_json::from_str(&task.body).unwrap();
+    let body: Value = serde_json::from_str(&task.body).unwrap();
     let (to, beside) = body["receiver"].as_str().unwrap().split_once(',').unwrap();
     let to: f64 = to.parse().unwrap();
     assert!(
@@ -564,7 +564,9 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// JavaScript: the texts with a contrast below 4.5 to 1 (WCAG 2.1 AA), without those of disabled buttons and of the canvas.
+/// JavaScript that returns the texts with a contrast below 4.5 to 1 (WCAG 2.1 AA).
+///
+/// Texts of disabled buttons and of the canvas are left out.
 const FAINT: &str = r"(() => {
   const linear = (part) => (part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4);
   const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
