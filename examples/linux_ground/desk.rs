@@ -88,7 +88,7 @@ impl Desk {
         }
     }
 
-    /// Does a command of the status socket: `preview NAME=VALUE ...` or `upload NUMBER DIGEST`.
+    /// Handles a command of the status socket: `preview NAME=VALUE ...` or `upload NUMBER DIGEST`.
     pub(crate) fn command(
         &mut self,
         now: Instant,

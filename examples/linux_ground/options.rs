@@ -102,8 +102,8 @@ pub(crate) struct Options {
     /// that mission first
     #[arg(long, help_heading = "Standing")]
     pub(crate) stand: bool,
-    /// Show the chain in a browser: a map of the relays by their reports, alarms and a log, and a form for uploads. Use 127.0.0.1:8080
-    /// for this computer alone; port 0 takes any free port. Another address needs --web-password
+    /// Show the chain in a browser, with alarms, a log and a form for uploads. Use 127.0.0.1:8080 for this computer alone; port 0 takes
+    /// any free port. Another address needs --web-password
     #[arg(long, value_name = "ADDRESS:PORT", requires = "stand", value_parser = address, help_heading = "Standing")]
     pub(crate) web: Option<SocketAddr>,
     /// File with the password of the page, 8 to 200 characters. The browser asks for it; any user name will do

@@ -315,8 +315,9 @@ impl Uploading {
         })
     }
 
-    /// Builds the upload from the mission that the relays fly, shows the changes, and starts to compute the moves. Starts
-    /// the upload if the page's operator has confirmed it.
+    /// Builds the upload from the mission that the relays fly, and starts to compute the moves.
+    ///
+    /// Starts the upload instead if the page's operator has confirmed it.
     fn decide(
         &mut self,
         now: Instant,

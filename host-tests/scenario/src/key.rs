@@ -1,4 +1,6 @@
-//! Reads a secret from a file: a key (of the network or the autopilot), 64 hexadecimal digits as from `openssl rand -hex 32`, or a password.
+//! Reads a secret from a file: a key (of the network or the autopilot) or a password.
+//!
+//! A key has 64 hexadecimal digits, as from `openssl rand -hex 32`.
 
 use std::path::Path;
 

@@ -1,11 +1,12 @@
 //! Requests of browsers: parsing, checks, and the files of the page.
 //!
 //! A request is refused unless it is for the address that it arrived at, with the password if there is one, and is a GET without a body or
-//! a POST with the page's token. The check of `Host` prevents DNS rebinding: a foreign name that resolves to this computer. Requests of other sites' pages are refused if the browser marks them:
-//! by `Origin`, or by `Sec-Fetch-Site`, which browsers send to loopback addresses but not to other addresses by plain HTTP. Only a
-//! link to `/` may be on another site. A foreign page's request without either header is answered, and the headers of the
-//! response tell the browser to keep the answer from that page. A POST must have an `Origin`, a JSON body, and the token, which only
-//! pages of this server can read; a foreign page's POST would first need a permission (CORS) that no answer gives.
+//! a POST with the page's token. The check of `Host` prevents DNS rebinding: a foreign name that resolves to this computer.
+//! Requests of other sites' pages are refused if the browser marks them: by `Origin`, or by `Sec-Fetch-Site`, which browsers send to
+//! loopback addresses but not to other addresses by plain HTTP. Only a link to `/` may be on another site. A foreign page's GET without
+//! either header is answered, and the headers of the response tell the browser to keep the answer from that page. A POST must have an
+//! `Origin`, a JSON body, and the token, which only pages of this server can read; a foreign page's POST would first need a permission
+//! (CORS) that no answer gives.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -80,7 +81,7 @@ pub enum Task {
 /// Secrets that requests have to carry.
 #[derive(Default)]
 pub(crate) struct Access {
-    /// Password of all requests, by HTTP basic authentication with any user name; `None` for a page without password.
+    /// Password of all requests, by HTTP basic authentication with any user name; `None` for none.
     pub(crate) password: Option<String>,
     /// Token of every POST; `None` if no POST is accepted.
     pub(crate) token: Option<String>,
@@ -109,7 +110,7 @@ pub(crate) enum Answer {
 pub(crate) const TOO_LARGE: Answer = Answer::Refused(431, "Request Header Fields Too Large");
 /// Refusal of a request that did not arrive in time.
 pub(crate) const TOO_SLOW: Answer = Answer::Refused(408, "Request Timeout");
-/// Refusal of a connection beyond the limit of connections, and of a POST while the program does not answer.
+/// Refusal of a connection beyond the limit, and of a POST that the program does not answer.
 pub(crate) const FULL: Answer = Answer::Refused(503, "Service Unavailable");
 /// Refusal of a request without a password.
 const NO_PASSWORD: Answer = Answer::Refused(401, "Unauthorized");

@@ -60,7 +60,9 @@ const TRIES_TIME: Duration = Duration::from_secs(60);
 /// Largest number of wrong passwords in [`TRIES_TIME`] from one address.
 const MAX_TRIES: usize = 5;
 
-/// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses, for addresses of other computers.
+/// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses.
+///
+/// Beyond it all other computers are refused.
 const MAX_ALL_TRIES: usize = 100;
 
 /// Stack size of a connection's thread, bytes.
@@ -322,7 +324,7 @@ impl Shared {
         }
     }
 
-    /// Replaces the answer to a request from `peer` by a refusal after too many wrong passwords, and counts a wrong one.
+    /// Counts a wrong password from `peer`, and returns the answer: a refusal after too many of them.
     ///
     /// While an address is refused, the right password is refused, too. Many addresses can make all other computers wait, but not
     /// this one, from which a tunnel comes.

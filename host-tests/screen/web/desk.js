@@ -12,7 +12,8 @@ const metres = (value) => value.toFixed(1);
 /** Sends a task. Returns the answer; a refusal is an error with the reason. */
 async function post(path, body) {
   const headers = { "Content-Type": "application/json", "X-Relay-Token": desk.token };
-  const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(body) });
+  // The address of the page may contain the password, which `fetch` refuses; the origin does not.
+  const response = await fetch(location.origin + path, { method: "POST", headers, body: JSON.stringify(body) });
   const text = (await response.text()).trim();
   if (!response.ok) throw new Error(text || response.statusText);
   return JSON.parse(text);

@@ -278,7 +278,9 @@ fn only_alarms_that_last_sound_and_are_in_the_title() {
 
 #[test]
 fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
-    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None).unwrap();
+    let (own, password) = ("127.0.0.1:0".parse().unwrap(), "secret-7".to_owned());
+    let (screen, posts) = Screen::start_acting(own, Some(password)).unwrap();
+    let url = screen.url().replace("//", "//operator:secret-7@");
     let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
     let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
     let desk = serde_json::json!({
@@ -289,11 +291,11 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
             "targets": [[412.34, 0.0]],
         },
     });
-    let shown = Shown::on(screen, move || Snapshot {
+    let _shown = Shown::on(screen, move || Snapshot {
         desk: Some(desk.clone()),
         ..full(3, 0.0)
     });
-    let mut browser = shown.opened(1280, 900);
+    let mut browser = Browser::start(&url, 1280, 900);
     browser.until(&shows(4));
     browser.until("!byId('desk').hidden");
     browser.run("byId('desk').open = true");
