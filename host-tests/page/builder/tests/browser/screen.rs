@@ -627,17 +627,16 @@ fn the_page_has_no_serious_fault_of_accessibility() {
         let nameless: Vec<_> = nodes.iter().filter(is_control).filter(nameless).collect();
         assert!(nameless.is_empty(), "{what}: {nameless:#?}");
         // The focus visits everything in the order of the document, and is visible.
-        let all = number(
-            &mut browser,
-            "[...document.querySelectorAll('button:enabled, [tabindex]')].length",
-        );
+        let all =
+            browser.value("[...document.querySelectorAll('button:enabled, [tabindex]')].length");
+        let all = all.as_u64().unwrap();
         browser.run("document.body.focus(); window.visited = []");
-        for _ in 0..all as usize {
+        for _ in 0..all {
             browser.key("Tab", 9);
             browser.run("const it = document.activeElement; if (it.matches(':focus-visible') && getComputedStyle(it).outlineWidth === '3px') visited.push(it)");
         }
         let in_order = browser.value("new Set(visited).size === visited.length && visited.every((it, at) => at === 0 || visited[at - 1].compareDocumentPosition(it) & 4) && visited.length");
-        assert_eq!(in_order.as_f64(), Some(all), "{what}");
+        assert_eq!(in_order.as_u64(), Some(all), "{what}");
         if let Ok(axe) = &axe {
             browser.run(axe);
             let faults = browser.value(
