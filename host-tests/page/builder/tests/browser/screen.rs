@@ -627,8 +627,9 @@ fn the_page_has_no_serious_fault_of_accessibility() {
         let nameless: Vec<_> = nodes.iter().filter(is_control).filter(nameless).collect();
         assert!(nameless.is_empty(), "{what}: {nameless:#?}");
         // The focus visits everything in the order of the document, and is visible.
-        let all =
-            browser.value("[...document.querySelectorAll('button:enabled, [tabindex]')].length");
+        let all = browser.value(
+            "[...document.querySelectorAll('button:enabled, input:enabled, select:enabled, summary, a[href], [tabindex]')].filter((it) => it.getClientRects().length).length",
+        );
         let all = all.as_u64().unwrap();
         browser.run("document.body.focus(); window.visited = []");
         for _ in 0..all {
