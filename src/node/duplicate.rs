@@ -48,34 +48,7 @@
 use crate::settings::{Settings, Wiring};
 use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
-
-/// Sender of a frame that bears this relay's own node number.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Sender {
-    /// The relay itself: the frame is an echo of its own.
-    Itself,
-    /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
-    Unknown,
-    /// Another node that claims this relay's node number, with its claim.
-    Rival(Rival),
-}
-
-/// Claim of another node to this relay's node number.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Rival {
-    pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's; false if it is the same.
-    pub(crate) newer_epoch: bool,
-    /// True if the other node is passive: it has no setpoint and does not take part in the chain.
-    pub(crate) passive: bool,
-    /// True if the claim was certainly sent after this relay's start. It then names this relay's claim number, or is
-    /// signed.
-    pub(crate) is_current: bool,
-}
-
-/// Bit that a relay with a position sets in its claim number, to win against a later node. Of two nodes with the same
-/// node number, the one with the larger claim number wins.
-pub(crate) const RAISED: u32 = 1 << 31;
+use crate::wire::session::{RAISED, Rival, Sender};
 
 /// Wait before the first unprompted claim to this relay's node number. The next intervals double from claim to claim.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);

@@ -2,14 +2,13 @@
 
 use super::Port;
 use crate::node::Node;
-use crate::node::duplicate::Sender;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::endpoint::{Endpoint, Sent};
 use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
-use crate::wire::session::{Checked, Session};
+use crate::wire::session::{Checked, Rival, Sender, Session};
 
 /// Number of heartbeat requests to a silent neighbour after which a handshake requests a reply.
 ///
@@ -93,7 +92,7 @@ fn receive_addressed(
 
 fn receive_signed(
     node: &mut Node,
-    rival: Option<crate::node::duplicate::Rival>,
+    rival: Option<Rival>,
     checked: Checked,
     now: Instant,
     side: Side,

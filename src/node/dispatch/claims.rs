@@ -2,11 +2,12 @@
 
 use super::Node;
 use crate::event::{Event, NodeEvent};
-use crate::node::duplicate::{Duplicated, Sender};
+use crate::node::duplicate::Duplicated;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::{Claim, Message};
+use crate::wire::session::Sender;
 
 impl Node {
     pub(crate) fn on_duplicate_index(&mut self, now: Instant, sender: Sender) {

@@ -1,7 +1,7 @@
 //! Handshakes of two sessions, and a table with fewer entries than nodes.
 
 use super::{Checked, HANDSHAKE_LENGTH, PEERS, Session};
-use crate::node::duplicate::{RAISED, Rival, Sender};
+use super::{RAISED, Rival, Sender};
 use crate::time::{Duration, Instant};
 use crate::wire::auth::{Auth, Key};
 use crate::wire::frame::{self, FrameBuf, Header, MAX_FRAME};
