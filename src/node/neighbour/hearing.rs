@@ -3,8 +3,7 @@
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Number of nearest nodes on one side that may become the neighbour and are sent hellos.
-pub(crate) const CANDIDATES: u16 = 4;
+pub(crate) use crate::wire::CANDIDATES;
 
 /// Minimum interval between two reports about the same node.
 const MINUTE: Duration = Duration::from_millis(60_000);

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::parts::{MessageError, PassId, Word, read, tag, write};
 use crate::mission::MAX_RELAYS;
-use crate::node::neighbour::hearing::CANDIDATES;
 use crate::place::Placement;
 use crate::time::{Duration, Instant};
+use crate::wire::CANDIDATES;
 
 /// Maximum number of entries in one report. A relay without any feature then has room for the message.
 const MOST_ENTRIES: usize = 4;
