@@ -183,6 +183,23 @@ impl TerrainReport {
         })
     }
 
+    /// Returns a line that names the relays higher than `most_m` above the ground below them; `None` if there are none.
+    pub fn too_high(&self, most_m: f64) -> Option<String> {
+        let high = self
+            .heights
+            .iter()
+            .filter(|relay| relay.above_ground_m > most_m + 0.01);
+        let high =
+            high.map(|relay| format!("relay {} is {:.1} m", relay.index, relay.above_ground_m));
+        let high: Vec<String> = high.collect();
+        (!high.is_empty()).then(|| {
+            format!(
+                "{} above the ground; allowed: at most {most_m} m (terrain.above_ground_max_m)",
+                high.join(", ")
+            )
+        })
+    }
+
     /// Returns the name of a hop, from 0, with its two ends.
     fn name(&self, hop: usize) -> String {
         let node = |at: usize| match at {

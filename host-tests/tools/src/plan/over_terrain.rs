@@ -4,7 +4,8 @@
 //! at a grid point is the largest, over the points of relay k - 1, of the smaller of that relay's value and the SIR of the hop. On
 //! its grid the result is exact. It is refined by the same method on finer grids around the relays. The relays are on the line, y = 0.
 //!
-//! Candidates of the previous relay are visited in the order of a bound without diffraction, so that few losses are computed.
+//! Candidates of the previous relay are visited in the order of a bound without diffraction, so that few losses are computed. Hops below
+//! the SIR of a chain on a coarser grid are left out.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -17,7 +18,7 @@ use uav_relay_terrain::diffraction::{LIGHT_M_S, Point, loss_db};
 use uav_relay_terrain::profile::{Ground, Node};
 
 use super::terrain::Elevation;
-use super::{NoPlan, Plan, ProfiledMission, Why};
+use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, Why};
 
 /// Largest number of relays for which positions over terrain are searched.
 pub const MOST_RELAYS: u16 = 50;
@@ -152,7 +153,7 @@ impl<'a> Search<'a> {
         Ok(f64::from(self.ground.point(x_m, 0.0)?.amsl_mm) / 1e3)
     }
 
-    /// Returns the candidates for relay `relay` (from 0) at `x_m`, at altitudes from `from_m` to `to_m` that are allowed there.
+    /// Returns the candidates for relay `relay` (from 0) at `x_m`. `levels` chooses altitudes from the allowed ones.
     fn column(
         &self,
         relay: usize,
@@ -312,8 +313,30 @@ impl<'a> Search<'a> {
         points
     }
 
-    /// Returns the best chain whose relays are among their candidates, and the SIR of its worst hop, linear. `None` if there is none.
-    pub fn best(&mut self, candidates: &[Vec<Candidate>]) -> Option<(Vec<Candidate>, f64)> {
+    /// Returns the SIR of the worst hop of a chain with terrain, linear.
+    pub fn worst_sir(&mut self, chain: &[Candidate]) -> f64 {
+        let places: Vec<(f64, f64)> = chain.iter().map(|at| (at.x_m, at.h_m)).collect();
+        let back = self.scene.hop_sirs_back(&places);
+        let mut worst = f64::INFINITY;
+        for (hop, sir) in self.scene.hop_sirs(&places).into_iter().enumerate() {
+            let from = hop.checked_sub(1).and_then(|at| chain.get(at));
+            let gain = self.gain(from.copied(), chain.get(hop).copied());
+            worst = worst.min(sir * gain);
+            if let Some(back) = back.get(hop).filter(|_| self.scene.reverse > 0.0) {
+                worst = worst.min(back * gain / self.scene.reverse);
+            }
+        }
+        worst
+    }
+
+    /// Returns the best chain whose relays are among their candidates, and the SIR of its worst hop, linear.
+    ///
+    /// `None` if there is none with at least the SIR `floor`. A high floor saves time: hops below it are left out.
+    pub fn best(
+        &mut self,
+        candidates: &[Vec<Candidate>],
+        floor: f64,
+    ) -> Option<(Vec<Candidate>, f64)> {
         // For each candidate of a relay: the worst hop up to it, and the candidate of the relay before it.
         let mut layers: Vec<Vec<(f64, usize)>> = Vec::new();
         for (node, own) in candidates.iter().enumerate() {
@@ -334,7 +357,7 @@ impl<'a> Search<'a> {
                         self.free_sir(node, None, Some(*to)) * self.gain(None, Some(*to)),
                         0,
                     ),
-                    Some(before) => self.reached(node, before, Some(*to)),
+                    Some(before) => self.reached(node, before, Some(*to), floor),
                 });
             }
             layers.push(layer);
@@ -345,8 +368,8 @@ impl<'a> Search<'a> {
             .copied()
             .zip(layers.last()?.iter().copied())
             .collect();
-        let (sir, mut at) = self.reached(candidates.len(), &last, None);
-        if !(sir > 0.0) {
+        let (sir, mut at) = self.reached(candidates.len(), &last, None, floor);
+        if !(sir > 0.0 && sir >= floor) {
             return None;
         }
         let mut chain = Vec::new();
@@ -364,6 +387,7 @@ impl<'a> Search<'a> {
         node: usize,
         before: &[(Candidate, (f64, usize))],
         to: Option<Candidate>,
+        floor: f64,
     ) -> (f64, usize) {
         let separation = self.scene.min_separation_m;
         let mut bounds: Vec<(f64, usize, Candidate, f64)> = Vec::new();
@@ -371,9 +395,11 @@ impl<'a> Search<'a> {
             let is_apart = to.is_none_or(|to| {
                 to.x_m > from.x_m && (to.x_m - from.x_m).hypot(to.h_m - from.h_m) >= separation
             });
-            if is_apart && *value > 0.0 {
+            if is_apart && *value > 0.0 && *value >= floor {
                 let free = self.free_sir(node, Some(*from), to);
-                bounds.push((value.min(free), at, *from, free));
+                if free >= floor {
+                    bounds.push((value.min(free), at, *from, free));
+                }
             }
         }
         bounds.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -413,15 +439,40 @@ pub fn best(
     let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
     let mut search = Search::new(scenario, &scene, elevation).map_err(NoPlan::Wrong)?;
     let columns = u32::from(relays * 8).max(80);
-    let grid = search.grid(columns, LEVELS).map_err(NoPlan::Wrong)?;
-    let Some((mut chain, mut sir)) = search.best(&grid) else {
+    // The positions that ignore the terrain, as high as they have to be, are candidates: the search does no worse.
+    let mut seeds = vec![Vec::new(); usize::from(relays)];
+    let ask = PlanRequest {
+        number: Number::Of(relays),
+        free_altitude: true,
+        x_m: None,
+        tolerance,
+    };
+    if let Ok(blind) = super::plan(scenario, &ask) {
+        for ((relay, seeds), (place, _)) in seeds.iter_mut().enumerate().zip(&blind.places) {
+            let own_m = f64::from(place.altitude_m);
+            let level = |[low, high]: [f64; 2]| vec![own_m.clamp(low, high)];
+            *seeds = search
+                .column(relay, place.x_m.into(), level)
+                .map_err(NoPlan::Wrong)?;
+        }
+    }
+    // A coarse grid first: its best chain is a candidate of the grid, and the grid's floor.
+    let mut found: Option<(Vec<Candidate>, f64)> = None;
+    let mut highest: f64 = 0.0;
+    for (columns, levels) in [(columns / 4, LEVELS / 4), (columns, LEVELS)] {
+        let mut grid = search.grid(columns, levels).map_err(NoPlan::Wrong)?;
+        for (relay, (own, seeds)) in grid.iter_mut().zip(&seeds).enumerate() {
+            own.extend(seeds);
+            own.extend(found.as_ref().and_then(|(chain, _)| chain.get(relay)));
+            highest = own.iter().fold(highest, |most, at| most.max(at.h_m));
+        }
+        let floor = found.as_ref().map_or(0.0, |(_, sir)| *sir);
+        found = search.best(&grid, floor).or(found);
+    }
+    let Some((mut chain, mut sir)) = found else {
         let why = "no positions over the terrain are high enough and far enough apart: check terrain.above_ground_m, terrain.above_ground_max_m and the band of altitudes";
         return Err(NoPlan::Unmet(Why::Plain(why.to_owned()), None));
     };
-    let highest = grid
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |most, at| most.max(at.h_m));
     let step_m = scene.distance_m / f64::from(columns + 1);
     let climb_m = highest / f64::from(LEVELS - 1);
     for halving in 1..=REFINEMENTS {
@@ -429,7 +480,7 @@ pub fn best(
         let around = search
             .around(&chain, step_m * finer, climb_m * finer)
             .map_err(NoPlan::Wrong)?;
-        if let Some((better, at_least)) = search.best(&around).filter(|(_, found)| *found >= sir) {
+        if let Some((better, at_least)) = search.best(&around, sir) {
             (chain, sir) = (better, at_least);
         }
     }

@@ -499,8 +499,8 @@ impl PlanReport {
     #[must_use]
     pub fn above(self, terrain: Option<TerrainReport>, error: Option<String>) -> Self {
         Self {
-            terrain,
             error,
+            terrain,
             ..self
         }
     }

@@ -81,7 +81,12 @@ impl Elevation {
 
     /// Returns a line that says why the chain of `report` cannot be flown; `None` if it can.
     pub fn problem(&self, report: &TerrainReport) -> Option<String> {
-        let lines = [report.blocked(), report.too_low(self.spec.above_ground_m)];
+        let most_m = self.spec.above_ground_max_m;
+        let lines = [
+            report.blocked(),
+            report.too_low(self.spec.above_ground_m),
+            most_m.and_then(|most_m| report.too_high(most_m)),
+        ];
         let lines: Vec<String> = lines.into_iter().flatten().collect();
         (!lines.is_empty()).then(|| lines.join("; "))
     }
@@ -120,7 +125,7 @@ pub fn chart(report: &TerrainReport, scenario: &Scenario) -> Chart {
         let (name, hue) = match hop.state {
             State::Clear => ("hop", 0),
             State::Grazing => ("grazing hop", 4),
-            State::Blocked => ("blocked hop", 1),
+            State::Blocked => ("blocked hop", 2),
         };
         hops.push(Line::new(
             name,
@@ -140,12 +145,12 @@ pub fn chart(report: &TerrainReport, scenario: &Scenario) -> Chart {
             ));
         }
     }
-    hops.push(Line::new("ground", plain(2, Stroke::Full), ground));
+    hops.push(Line::new("ground", plain(3, Stroke::Full), ground));
     let signs = Look::number(0).joined(Stroke::None);
     hops.push(Line::new("Tx, relays, Rx", signs, nodes));
     Chart::of(
-        Axis::linear("x (m)"),
-        Axis::linear("height above the sea (m), raised by the curvature of the earth"),
+        Axis::linear("x (m)").between(0.0, scenario.distance_m),
+        Axis::linear("height above the sea (m)"),
         hops,
     )
 }
