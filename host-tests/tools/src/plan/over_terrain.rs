@@ -2,7 +2,8 @@
 //!
 //! The best chain on a grid over x and the altitude is found by dynamic programming: the best worst hop of a chain that ends with relay k
 //! at a grid point is the largest, over the points of relay k - 1, of the smaller of that relay's value and the SIR of the hop. On
-//! its grid the result is exact. It is refined by the same method on finer grids around the relays. The relays are on the line, y = 0.
+//! its grid the result is exact. Chains without a blocked hop come first, because others are refused. The result is refined by the same
+//! method on finer grids around the relays. The relays are on the line, y = 0.
 //!
 //! Candidates of the previous relay are visited in the order of a bound without diffraction, so that few losses are computed. Hops below
 //! the SIR of a chain on a coarser grid are left out.
@@ -15,7 +16,7 @@ use uav_relay::Placement;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_terrain::diffraction::{LIGHT_M_S, Point, loss_db};
-use uav_relay_terrain::profile::{Ground, Node};
+use uav_relay_terrain::profile::{Ground, Node, bulge_m};
 
 use super::terrain::Elevation;
 use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, Why};
@@ -31,6 +32,9 @@ const POINTS: f64 = 800.0;
 
 /// Number of finer grids, each with cells half as large.
 const REFINEMENTS: i32 = 5;
+
+/// Factor on the gain of a blocked hop: a chain without blocked hops is better than one with any.
+const BLOCKED: f64 = 1e-30;
 
 /// Grid points on each side of a relay in a finer grid.
 const AROUND: i32 = 2;
@@ -263,7 +267,7 @@ impl<'a> Search<'a> {
         there
     }
 
-    /// Returns the gain of the hop by diffraction, 0 to 1.
+    /// Returns the gain of the hop by diffraction, 0 to 1, times [`BLOCKED`] if the terrain blocks the hop.
     fn gain(&mut self, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let [tx, rx] = self.ground.ends;
         let end = |node: Node| Candidate {
@@ -278,7 +282,13 @@ impl<'a> Search<'a> {
         }
         let points = self.profile(from.x_m, to.x_m);
         let loss = loss_db(&points, [from.amsl_m, to.amsl_m], self.wavelength_m);
-        let gain = 10_f64.powf(-loss / 10.0);
+        let length = to.x_m - from.x_m;
+        let climb = (to.amsl_m - from.amsl_m) / length.max(f64::MIN_POSITIVE);
+        let is_blocked = points
+            .iter()
+            .any(|[along, height]| height + bulge_m(*along, length) > from.amsl_m + climb * along);
+        let preference = if is_blocked { BLOCKED } else { 1.0 };
+        let gain = preference * 10_f64.powf(-loss / 10.0);
         self.losses.insert(key, gain);
         gain
     }
@@ -313,7 +323,7 @@ impl<'a> Search<'a> {
         points
     }
 
-    /// Returns the SIR of the worst hop of a chain with terrain, linear.
+    /// Returns the SIR of the worst hop of a chain with terrain, linear; times [`BLOCKED`] if that hop is blocked.
     pub fn worst_sir(&mut self, chain: &[Candidate]) -> f64 {
         let places: Vec<(f64, f64)> = chain.iter().map(|at| (at.x_m, at.h_m)).collect();
         let back = self.scene.hop_sirs_back(&places);
