@@ -69,7 +69,9 @@ pub struct TerrainSpec {
     pub files: Vec<PathBuf>,
     /// Height of the antennas of Tx and Rx above the ground, m, 0 to 200; 2 by default.
     pub mast_m: f64,
-    /// Least height of a relay above the highest ground within its position error, m, 0 (its default) to 1e4.
+    /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
+    ///
+    /// The highest ground within the relay's position error counts.
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground below it, m; `None` for no limit.
     pub above_ground_max_m: Option<f64>,

@@ -1,4 +1,6 @@
-//! Diffraction loss of a terrain profile by Recommendation ITU-R P.526-15, section 4.5 (the "delta-Bullington" method).
+//! Diffraction loss of a terrain profile by Recommendation ITU-R P.526-15, section 4.5.
+//!
+//! It is the "delta-Bullington" method.
 //!
 //! The Bullington construction replaces the terrain by one knife edge, where the horizons of the two antennas meet. The method adds
 //! the loss by which a smooth spherical earth exceeds the construction's loss above a smooth earth: L = La + max(Lsph - Ls, 0).
@@ -43,9 +45,10 @@ impl Default for Surface {
     }
 }
 
-/// Returns the diffraction loss, dB, between antennas at the heights `ends_m` above the sea at the ends of `profile`.
+/// Returns the diffraction loss, dB, of the path over `profile`.
 ///
-/// The profile has at least two points, with increasing distances from 0 on. The loss is at least 0, and the same in both directions.
+/// The antennas are at the heights `ends_m` above the sea, at the ends of the profile. The profile has at least two points,
+/// with increasing distances from 0 on. The loss is at least 0, and the same in both directions.
 pub fn loss_db(profile: &[Point], ends_m: [f64; 2], wavelength_m: f64) -> f64 {
     loss_over_db(profile, ends_m, wavelength_m, Surface::default())
 }
@@ -117,7 +120,9 @@ fn bullington_db(
     loss + (1.0 - (-loss / 6.0).exp()) * (10.0 + 0.02 * length / 1000.0)
 }
 
-/// Returns the heights of the antennas above a smooth surface that is fitted to the profile, m, at least 0.
+/// Returns the heights of the antennas above a smooth surface, m, at least 0.
+///
+/// The surface is fitted to the profile.
 fn smooth_heights_m(profile: &[Point], [from, to]: [f64; 2]) -> [f64; 2] {
     let (Some([_, first]), Some([length, last])) = (profile.first(), profile.last()) else {
         return [0.0; 2];
@@ -152,7 +157,9 @@ fn smooth_heights_m(profile: &[Point], [from, to]: [f64; 2]) -> [f64; 2] {
     [from - surface[0].min(*first), to - surface[1].min(*last)].map(|height| height.max(0.0))
 }
 
-/// Returns the diffraction loss of a smooth spherical earth, dB, for antennas at these heights above it, m.
+/// Returns the diffraction loss of a smooth spherical earth, dB.
+///
+/// The antennas are at these heights above it, m.
 fn spherical_db(length: f64, heights: [f64; 2], wavelength: f64, surface: Surface) -> f64 {
     let [h1, h2] = heights;
     let roots = h1.sqrt() + h2.sqrt();

@@ -6,7 +6,8 @@
 //! | GeoTIFF | one band; latitude and longitude (EPSG 4326 or 4258) or UTM (EPSG 326zz, 327zz or 258zz), north up; heights in metres |
 //!
 //! All files are parts of one grid: they have the same coordinate system and cells, and their cells are aligned. A height between four
-//! heights of the grid is interpolated bilinearly. The four may be in different files. If files overlap, the first one that has a height counts.
+//! heights of the grid is interpolated bilinearly. The four may be in different files. If files overlap, the first one that
+//! has a height counts.
 //!
 //! The vertical datum is not converted: heights are taken as heights above the mean sea level.
 
@@ -240,7 +241,9 @@ impl Tile {
         read.map_err(|problem| format!("{name}: {problem}"))
     }
 
-    /// Returns column and row of the tile's north-west height in a grid, or the property in which the grids differ.
+    /// Returns column and row of the tile's north-west height in a grid.
+    ///
+    /// The error is the property in which the grids differ.
     fn place_in(
         &self,
         system: System,

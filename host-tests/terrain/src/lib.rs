@@ -1,4 +1,4 @@
-//! Terrain below a chain of relays: elevation grids, profiles of hops, diffraction loss, and a search for positions.
+//! Terrain below a chain of relays: elevation grids, profiles of hops, and diffraction loss.
 //!
 //! | module | content |
 //! | --- | --- |
@@ -12,7 +12,8 @@
 //! # Dependencies
 //! `tiff` decodes GeoTIFF files: it is maintained by the image-rs organisation and has few dependencies. The tags that GeoTIFF adds
 //! are read here, because `geotiff` has no coordinate systems and no nodata values, and `geotiff-reader` needs ndarray and
-//! several more crates. `utm` converts to UTM coordinates. SRTM files are two bytes for each height. They are read here, because `srtm_reader`
+//! several more crates. `utm` converts to UTM coordinates. SRTM files are two bytes for each height. They are read here,
+//! because `srtm_reader`
 //! returns only the nearest height, panics outside a tile, and prints to standard error.
 
 pub mod diffraction;

@@ -1,6 +1,7 @@
 //! Profiles: the ground below each hop of a chain, and the clearance of the line of sight.
 //!
-//! A hop runs straight, seen from above. Its profile has a height at every quarter of a cell of the elevation model. Along the hop the earth rises
+//! A hop runs straight, seen from above. Its profile has a height at every quarter of a cell of the elevation model. Along
+//! the hop the earth rises
 //! by d1 d2 / 2a between its ends, with the distances d1 and d2 from the ends and the effective radius a.
 //!
 //! | state of a hop | condition |
@@ -22,7 +23,7 @@ pub const FREE: f64 = 0.6;
 /// Largest number of points of a profile, apart from its first one.
 const MOST_POINTS: f64 = 20_000.0;
 
-/// Largest accepted difference, m, between the height of a site in the scenario and in the elevation model.
+/// Largest accepted difference of a site's heights in scenario and elevation model, m.
 pub const SITE_ERROR_M: f64 = 50.0;
 
 /// Terrain along the line from Tx to Rx.
@@ -52,7 +53,7 @@ pub struct Node {
 pub struct Profile {
     /// Antennas of the hop, the one nearer to Tx first.
     pub nodes: [Node; 2],
-    /// Distances from the first antenna, increasing from 0, and heights of the ground above the mean sea level, m.
+    /// Distances from the first antenna, increasing from 0, and heights of the ground, m.
     pub points: Vec<Point>,
 }
 
@@ -82,7 +83,9 @@ pub struct Clearance {
 }
 
 impl<'a> Ground<'a> {
-    /// Creates the terrain along `axis`, the line between the sites Tx and Rx, with antennas `mast_m` above the ground.
+    /// Creates the terrain along `axis`, the line between the sites Tx and Rx.
+    ///
+    /// The antennas of Tx and Rx are `mast_m` above the ground.
     ///
     /// # Errors
     /// A line that names the site and the heights: the terrain does not cover a site, or contradicts its height.
@@ -157,7 +160,9 @@ impl<'a> Ground<'a> {
             .ok_or_else(|| format!("x = {x_m:.1} m, y = {y_m:.1} m is too far from the line"))
     }
 
-    /// Returns the height of the ground at `x_m` along the line and `y_m` beside it, m above the mean sea level.
+    /// Returns the height of the ground, m above the mean sea level.
+    ///
+    /// The place is `x_m` along the line and `y_m` beside it.
     ///
     /// # Errors
     /// A line that names the place: it is not covered by the elevation files, or a hole.

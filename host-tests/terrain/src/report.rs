@@ -1,4 +1,4 @@
-//! Report of the terrain below a chain: state and loss of each hop, and heights of the relays above the ground.
+//! Report of the terrain below a chain: its hops, and the heights of its relays.
 
 use std::fmt::Write as _;
 
@@ -169,7 +169,9 @@ impl TerrainReport {
         (!lines.is_empty()).then(|| lines.join("; "))
     }
 
-    /// Returns a line that names the relays lower than `least_m` above the highest ground below them; `None` if there are none.
+    /// Returns a line that names the relays lower than `least_m` above the highest ground.
+    ///
+    /// `None` if there are none.
     pub fn too_low(&self, least_m: f64) -> Option<String> {
         let low = self
             .heights
@@ -183,7 +185,9 @@ impl TerrainReport {
         })
     }
 
-    /// Returns a line that names the relays higher than `most_m` above the ground below them; `None` if there are none.
+    /// Returns a line that names the relays higher than `most_m` above the ground.
+    ///
+    /// `None` if there are none.
     pub fn too_high(&self, most_m: f64) -> Option<String> {
         let high = self
             .heights

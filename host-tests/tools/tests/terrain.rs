@@ -27,7 +27,7 @@ use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 const EXAMPLE: &str = "../../examples/hills.toml";
 
-/// Random hills along a line of 5 km, and a scenario above them with `altitude_m`, and `more` in its file.
+/// Random hills along a line of 5 km, and a scenario above them with `more` in its file.
 fn scene(folder: &Path, rng: &mut impl rand::Rng, more: &str) -> Scenario {
     let mut wave = || {
         let [east, north] = [(); 2].map(|()| rng.random_range(-1.0_f64..1.0) / 250.0);
@@ -145,7 +145,7 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
     }
 }
 
-/// Compares positions over terrain with the joint method, which ignores it, and with all relays at 120 m.
+/// Compares positions over terrain with the joint method, and with all relays at 120 m.
 #[test]
 fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The ITU's validation examples, random profiles against the second implementation, and properties of the loss.
+//! Diffraction loss: the ITU's validation examples, and a second implementation.
 //!
 //! The four terrain profiles (`data/itu_profiles.csv`, a line for each, one height every 50 m) and the losses are those of the document
 //! "Validation examples for the delta Bullington diffraction prediction method" of ITU-R Study Group 3.
@@ -20,7 +20,7 @@ const LINKS: [[f64; 3]; 5] = [
     [70.0, 5.0, 150.0],
 ];
 
-/// Published losses, dB: above the terrain (La), above the smooth earth (Ls), of the smooth earth (Lsph), and the result.
+/// Published losses La, Ls and Lsph, and the result, dB.
 const PUBLISHED: [[f64; 4]; 20] = [
     [32.84284766, 13.74840484, 15.3485837, 34.44302652],
     [37.229036, 18.5970601, 23.6973069, 42.32928281],

@@ -1,5 +1,7 @@
-//! Second implementation of the delta-Bullington method, which shares no code with the first: kilometres, gigahertz and the numeric
-//! constants of Recommendations ITU-R P.452 and P.1812, whose section on diffraction is the same method.
+//! Second implementation of the delta-Bullington method, which shares no code with the first.
+//!
+//! It has kilometres, gigahertz and the numeric constants of Recommendations ITU-R P.452 and P.1812, whose section on
+//! diffraction is the same method.
 
 /// Profile and link as the Recommendation has them.
 pub(crate) struct Path {
@@ -84,7 +86,9 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, f_ghz: f64, vertical: bool
     -fx - g(h1) - g(h2)
 }
 
-/// The place of the smallest clearance, where the antennas have the same elevation (as for a reflection), by bisection.
+/// Loss of the smooth earth, dB.
+///
+/// The place of the smallest clearance, where the antennas have the same elevation (as for a reflection), is found by bisection.
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
     let horizon = (2.0 * AE_KM / 1000.0).sqrt() * (h1.sqrt() + h2.sqrt());
     if d_km >= horizon {

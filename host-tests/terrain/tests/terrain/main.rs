@@ -1,4 +1,4 @@
-//! Elevation files, profiles and diffraction losses, against analytic terrain, an independent implementation and the ITU's examples.
+//! Tests of elevation files, profiles and diffraction losses.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -444,8 +444,8 @@ struct Options {
     /// diffraction loss (ITU-R P.526), and the heights of the relays above the ground. Needs a scenario with a site
     #[arg(long, value_name = "FILE")]
     dem: Vec<PathBuf>,
-    /// Accept a plan with a hop that the terrain blocks, or with a relay below terrain.above_ground_m or above
-    /// terrain.above_ground_max_m
+    /// Accept a plan with a blocked hop, or with a relay too low or too high above the ground. The limits
+    /// are terrain.above_ground_m and terrain.above_ground_max_m
     #[arg(long)]
     allow_blocked: bool,
     /// Draw ground, hops and their first Fresnel zones (SVG). Needs elevation files

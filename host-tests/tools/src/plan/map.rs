@@ -154,8 +154,9 @@ impl Map {
         })
     }
 
-    /// Adds the state of each hop above the terrain, and the ground below it: once with the heights of the elevation files,
-    /// once clamped to the ground of the globe.
+    /// Adds the state of each hop above the terrain, and the ground below it.
+    ///
+    /// The ground is there twice: with the heights of the elevation files, and clamped to the ground of the globe.
     #[must_use]
     pub fn above(mut self, line: &Line, terrain: &TerrainReport) -> Self {
         let hops = self.features.iter_mut().filter(|one| one.kind == "hop");

@@ -1,4 +1,6 @@
-//! Positions with the terrain in the objective: the SIR of a hop is that of free space, times the gain of diffraction.
+//! Positions with the terrain in the objective.
+//!
+//! The SIR of a hop is that of free space, times the gain of diffraction.
 //!
 //! The best chain on a grid over x and the altitude is found by dynamic programming: the best worst hop of a chain that ends with relay k
 //! at a grid point is the largest, over the points of relay k - 1, of the smaller of that relay's value and the SIR of the hop. On
@@ -42,7 +44,7 @@ const AROUND: i32 = 2;
 /// Comparison of the positions over terrain with those that ignore it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OverTerrain {
-    /// SIR of the worst hop with terrain, dB, at positions that ignore the terrain; absent if there are none.
+    /// SIR of the worst hop with terrain, dB, at positions that ignore it; absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
     /// Gain of the plan over these positions, dB.
@@ -131,7 +133,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the lowest and highest altitude of a relay at `x_m`, above the datum; `None` if there is none.
+    /// Returns the lowest and highest altitude of a relay at `x_m`; `None` if there is none.
     fn band_m(&self, x_m: f64) -> Result<Option<[f64; 2]>, String> {
         let datum = self.datum_m(x_m)?;
         let node = Node {
@@ -182,7 +184,7 @@ impl<'a> Search<'a> {
             .collect())
     }
 
-    /// Returns the candidates of every relay on a grid of `columns` positions and `levels` altitudes at each.
+    /// Returns the candidates of every relay on a grid of `columns` by `levels` altitudes.
     ///
     /// # Errors
     /// A line that names the place: it is not covered by the elevation files, or a hole.
@@ -229,7 +231,9 @@ impl<'a> Search<'a> {
         each.collect()
     }
 
-    /// Returns the SIR of the hop to node `node` in free space, linear: the smaller of both directions if the mission has both.
+    /// Returns the SIR of the hop to node `node` in free space, linear.
+    ///
+    /// It is the smaller one of both directions if the mission has both.
     fn free_sir(&self, node: usize, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let place = |at: Candidate| (at.x_m, at.h_m);
         let relays = &self.scene.relays;
@@ -323,7 +327,9 @@ impl<'a> Search<'a> {
         points
     }
 
-    /// Returns the SIR of the worst hop of a chain with terrain, linear; times [`BLOCKED`] if that hop is blocked.
+    /// Returns the SIR of the worst hop of a chain with terrain, linear.
+    ///
+    /// It is nearly 0 if a hop is blocked.
     pub fn worst_sir(&mut self, chain: &[Candidate]) -> f64 {
         let places: Vec<(f64, f64)> = chain.iter().map(|at| (at.x_m, at.h_m)).collect();
         let back = self.scene.hop_sirs_back(&places);
@@ -339,7 +345,7 @@ impl<'a> Search<'a> {
         worst
     }
 
-    /// Returns the best chain whose relays are among their candidates, and the SIR of its worst hop, linear.
+    /// Returns the best chain of the candidates, and the SIR of its worst hop, linear.
     ///
     /// `None` if there is none with at least the SIR `floor`. A high floor saves time: hops below it are left out.
     pub fn best(
@@ -391,7 +397,7 @@ impl<'a> Search<'a> {
         Some((chain, sir))
     }
 
-    /// Returns the best worst hop of a chain that ends with the hop to `to`, and the number of the hop's other end.
+    /// Returns the best worst hop of a chain that ends at `to`, and the hop's other end.
     fn reached(
         &mut self,
         node: usize,
