@@ -77,23 +77,16 @@ fn run(options: &Options) -> Result<(), Failure> {
             if let Some(file) = &options.svg {
                 command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
             }
-            let terrain = terrain(options, &scenario, elevation.as_ref(), &plan)?;
-            let problem = elevation.as_ref().zip(terrain.as_ref());
-            let problem = problem.and_then(|(elevation, report)| elevation.problem(report));
-            let problem = problem.filter(|_| !options.allow_blocked);
-            let error = problem.map(|line| format!("{line}; --allow-blocked accepts it"));
+            let (terrain, error) = terrain(options, &scenario, elevation.as_ref(), &plan)?;
             write_map(options, &scenario, &plan, terrain.as_ref())?;
             let next = match error {
                 Some(_) => String::new(),
                 None => write_out(options, &scenario, (&plan, number), radio.as_ref())?,
             };
             let rates = rates.map(listed);
-            let over_terrain = match (&elevation, &terrain) {
-                (Some(elevation), Some(terrain)) if options.altitude == Altitude::Terrain => {
-                    Some(compared(&scenario, &ask, elevation, terrain))
-                }
-                _ => None,
-            };
+            let known = elevation.as_ref().zip(terrain.as_ref());
+            let known = known.filter(|_| options.altitude == Altitude::Terrain);
+            let over_terrain = known.map(|known| compared(&scenario, &ask, known));
             let report = PlanReport::new(&plan, number, options.unit())
                 .with_way_back(&scenario, &plan)
                 .with_rates(rates)
@@ -232,8 +225,7 @@ fn above_terrain(
 fn compared(
     scenario: &Scenario,
     ask: &PlanRequest,
-    elevation: &Elevation,
-    terrain: &TerrainReport,
+    (elevation, terrain): (&Elevation, &TerrainReport),
 ) -> OverTerrain {
     let blind = plan::plan(scenario, ask).map_err(|none| match none {
         NoPlan::Wrong(line) => line,
@@ -261,7 +253,7 @@ fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>
             .map_or(POSITION_ERROR_M, f64::from),
         None => POSITION_ERROR_M,
     };
-    let elevation = Elevation::load(scenario, &options.dem, error_m).map_err(|line| {
+    let elevation = Elevation::load(scenario, &options.terrain.dem, error_m).map_err(|line| {
         let file = if line.starts_with("site") {
             format!("{}: ", options.file())
         } else {
@@ -272,7 +264,7 @@ fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>
     if let Some(elevation) = &elevation {
         let named = |line| Failure::input(format!("{}: {line}", options.file()));
         elevation.ground(scenario).map_err(named)?;
-    } else if let Some(file) = &options.profile {
+    } else if let Some(file) = &options.terrain.profile {
         return Err(Failure::input(format!(
             "--profile {}: needs elevation files: --dem FILE, or terrain.files",
             file.display()
@@ -294,28 +286,29 @@ fn companion(options: &Options) -> Result<Companion, Failure> {
     Ok(sections.companion)
 }
 
-/// Returns the terrain below `plan`, and draws it for `--profile`. `None` without elevation files.
+/// Returns the terrain below `plan`, and the reason why the plan is refused there. Draws the terrain for `--profile`.
 fn terrain(
     options: &Options,
     scenario: &Scenario,
     elevation: Option<&Elevation>,
     plan: &Plan,
-) -> Result<Option<TerrainReport>, Failure> {
+) -> Result<(Option<TerrainReport>, Option<String>), Failure> {
     let Some(elevation) = elevation else {
-        return Ok(None);
+        return Ok((None, None));
     };
     let report = elevation
         .report(scenario, plan)
         .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
-    if let Some(file) = &options.profile {
-        let failed = |error: &dyn std::fmt::Display| {
-            Failure::input(format!("--profile {}: {error}", file.display()))
-        };
-        let drawing = draw(&chart(&report, scenario), "profile of the chain")
-            .map_err(|error| failed(&format!("{error:?}")))?;
-        std::fs::write(file, drawing).map_err(|error| failed(&error))?;
+    if let Some(file) = &options.terrain.profile {
+        let drawing = draw(&chart(&report, scenario), "profile of the chain");
+        let drawing = drawing.map_err(|error| Failure::input(format!("--profile: {error:?}")))?;
+        save(file, "--profile", &drawing)?;
     }
-    Ok(Some(report))
+    let problem = elevation
+        .problem(&report)
+        .filter(|_| !options.terrain.allow_blocked);
+    let error = problem.map(|line| format!("{line}; --allow-blocked accepts it"));
+    Ok((Some(report), error))
 }
 
 fn by_rate(
@@ -440,6 +433,19 @@ struct Options {
     /// Write the same for a globe (KML), with altitudes above the sea
     #[arg(long, value_name = "FILE")]
     kml: Option<PathBuf>,
+    #[command(flatten)]
+    terrain: TerrainOptions,
+    /// Write the scenario with its plan, for cargo provision --scenario FILE --all
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Overwrite the file of --out
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// Terrain below the chain.
+#[derive(Args, Debug)]
+struct TerrainOptions {
     /// Elevation file, GeoTIFF or SRTM (.hgt), in place of terrain.files; repeatable. Adds the state of each hop above the terrain, its
     /// diffraction loss (ITU-R P.526), and the heights of the relays above the ground. Needs a scenario with a site
     #[arg(long, value_name = "FILE")]
@@ -451,12 +457,6 @@ struct Options {
     /// Draw ground, hops and their first Fresnel zones (SVG). Needs elevation files
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
-    /// Write the scenario with its plan, for cargo provision --scenario FILE --all
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Overwrite the file of --out
-    #[arg(long, requires = "out")]
-    force: bool,
 }
 
 /// Request: exactly one of these.
