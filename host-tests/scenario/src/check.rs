@@ -150,6 +150,13 @@ impl Check<'_> {
             (Rule::Choice(texts), Value::String(text)) if !texts.contains(&text.as_str()) => {
                 fail(Problem::UnknownChoice)
             }
+            (Rule::Texts, Value::Array(list)) if list.is_empty() => fail(Problem::EmptyList),
+            (Rule::Texts, Value::Array(list)) => {
+                for (index, item) in list.iter().enumerate() {
+                    self.value(&format!("{path}[{index}]"), item, &Rule::Text)?;
+                }
+                Ok(())
+            }
             (Whole(_), Value::Integer(_))
             | (Rule::Flag, Value::Boolean(_))
             | (Rule::Text | Rule::Choice(_), Value::String(_)) => Ok(()),

@@ -1,6 +1,7 @@
 //! Typed form of the file, and checks that involve several keys.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::Deserialize;
 use toml::Table;
@@ -14,7 +15,7 @@ use super::link::{Access, Link, RateModel, RateStep};
 use super::number::{factor, watts};
 use super::spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, Planned,
-    PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
+    PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source, TerrainSpec,
 };
 
 /// Contents of a scenario file as serde reads them, before the keys are checked against each other.
@@ -36,7 +37,17 @@ pub(super) struct RawFile {
     field: Option<RawField>,
     site: Option<RawSites>,
     listen: Option<RawListen>,
+    terrain: Option<RawTerrain>,
     plan: Option<RawPlan>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTerrain {
+    files: Vec<String>,
+    mast_m: Option<f64>,
+    above_ground_m: Option<f64>,
+    above_ground_max_m: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -185,6 +196,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         return band("geometry.altitude_max_m", altitude_max_m, "least");
     }
     let (line, distance_m) = line(file, raw.site, geometry.distance_m)?;
+    let has_site = line.is_some();
     let powers = powers(file, &raw.power)?;
     let room = RelayArea {
         line: line.as_ref(),
@@ -231,7 +243,44 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
             .map(|link| data_link(file, link, raw.noise.bandwidth_hz))
             .transpose()?,
         relays: relays(file, raw.relay, powers.uav_gain_dbi)?,
+        terrain: raw
+            .terrain
+            .as_ref()
+            .map(|raw| terrain(file, raw, has_site))
+            .transpose()?,
         plan: raw.plan.map(|plan| planned(file, plan)).transpose()?,
+    })
+}
+
+/// Converts the `[terrain]` table of a file. Its elevation files are relative to the folder of the file.
+fn terrain(file: &str, raw: &RawTerrain, has_site: bool) -> Result<TerrainSpec, ScenarioError> {
+    if !has_site {
+        let allowed = "a [site] with the geographic positions of Tx and Rx, or no [terrain]";
+        return Err(mistake(
+            file,
+            "terrain",
+            None,
+            Problem::NoSite,
+            allowed.to_owned(),
+        ));
+    }
+    let folder = Path::new(file).parent().unwrap_or(Path::new(""));
+    let default = TerrainSpec::of(raw.files.iter().map(|name| folder.join(name)).collect());
+    let least = raw.above_ground_m.unwrap_or(default.above_ground_m);
+    if let Some(most) = raw.above_ground_max_m.filter(|most| *most < least) {
+        return Err(mistake(
+            file,
+            "terrain.above_ground_max_m",
+            Some(number(most)),
+            Problem::OutOfRange,
+            format!("at least above_ground_m, {} m", number(least)),
+        ));
+    }
+    Ok(TerrainSpec {
+        mast_m: raw.mast_m.unwrap_or(default.mast_m),
+        above_ground_m: least,
+        above_ground_max_m: raw.above_ground_max_m,
+        ..default
     })
 }
 

@@ -27,6 +27,8 @@ pub(super) enum Rule {
     Flag,
     Choice(&'static [&'static str]),
     Text,
+    /// List of at least one text, none of them empty.
+    Texts,
     /// Text that names a serial port or the UDP address of an autopilot.
     TtyOrUdp,
     Table(Keys),
@@ -128,6 +130,7 @@ pub(super) const FILE: Keys = &[
     optional("noise", Rule::Table(NOISE)),
     optional("link", Rule::Table(LINK)),
     optional("site", Rule::Table(SITES)),
+    optional("terrain", Rule::Table(TERRAIN)),
     optional("listen", Rule::Table(LISTEN)),
     optional("plan", Rule::Table(PLAN)),
 ];
@@ -173,6 +176,13 @@ const SITE: Keys = &[
     required("lat_deg", Number(LATITUDE)),
     required("lon_deg", Number(LONGITUDE)),
     required("amsl_m", Number(AMSL)),
+];
+
+const TERRAIN: Keys = &[
+    required("files", Rule::Texts),
+    optional("mast_m", Number(range(0.0, 200.0, "m"))),
+    optional("above_ground_m", Number(range(0.0, 1e4, "m"))),
+    optional("above_ground_max_m", Number(range(0.1, 1e4, "m"))),
 ];
 
 const POWERS: Keys = &[
@@ -324,6 +334,7 @@ impl fmt::Display for Rule {
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::Flag => f.write_str("true or false"),
             Text => f.write_str("a string that is not empty"),
+            Rule::Texts => f.write_str("a list of 1 or more strings that are not empty"),
             Rule::TtyOrUdp => write!(f, "a string: a tty, or {FORM}"),
             Choice(texts) => write!(f, "\"{}\"", texts.join("\" or \"")),
             Rule::Table(keys) => write!(f, "a table with the keys {}", names(*keys)),

@@ -34,7 +34,7 @@ pub use error::{Problem, ScenarioError};
 pub use keys::all as keys;
 pub use spec::{
     AirGround, BetaPoint, ChannelSpec, Field, Interference, Line, ListenSpec, Noise, Planned,
-    PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source,
+    PlannedMethod, PlannedPlace, RelayOverride, Scenario, Source, TerrainSpec,
 };
 
 /// Text of the scenario file that tools use by default, as TOML.

@@ -195,17 +195,10 @@ impl Scene {
         if places.len() != self.relays.len() {
             return Vec::new();
         }
-        let Place { x, y, h } = first.into();
-        let signal = received_w(relay.power_w, self.eta, x, y, h);
-        let mut sirs = vec![signal / (self.interference_on_ground_w(0.0) + self.noise_w)];
+        let mut sirs = vec![self.sir_at_tx(first, relay)];
         let senders = places.iter().zip(&self.relays).skip(1);
         let senders = senders.map(|(&at, relay)| self.sender(at, relay));
-        let rx = Sender {
-            at: Place::from((self.distance_m, 0.0)),
-            power_w: self.rx_w,
-            factor: self.eta,
-        };
-        let hops = places.iter().zip(senders.chain([rx]));
+        let hops = places.iter().zip(senders.chain([self.rx()]));
         sirs.extend(hops.map(|(&at, sender)| self.sir_at(sender, at)));
         sirs
     }
@@ -241,6 +234,15 @@ impl Scene {
         }
     }
 
+    /// Returns Rx as a sender toward Tx, for [`Scene::sir_at`].
+    pub fn rx(&self) -> Sender {
+        Sender {
+            at: Place::from((self.distance_m, 0.0)),
+            power_w: self.rx_w,
+            factor: self.eta,
+        }
+    }
+
     /// Returns `relay` at the position `at` as a sender to another relay, for [`Scene::sir_at`].
     pub fn sender(&self, at: impl Into<Place>, relay: &Relay) -> Sender {
         Sender {
@@ -261,6 +263,13 @@ impl Scene {
             to.h - by.h,
         );
         signal / (self.interference_w(to) + self.noise_w)
+    }
+
+    /// Returns the linear SIR at Tx if the first relay of the chain is `relay`, at the position `at`.
+    pub fn sir_at_tx(&self, at: impl Into<Place>, relay: &Relay) -> f64 {
+        let Place { x, y, h } = at.into();
+        let signal = received_w(relay.power_w, self.eta, x, y, h);
+        signal / (self.interference_on_ground_w(0.0) + self.noise_w)
     }
 
     /// Returns the linear SIR at Rx if the last relay of the chain is `relay`, at the position `at`.

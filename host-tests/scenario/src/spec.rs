@@ -1,6 +1,7 @@
 //! Typed content of a scenario.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde::Deserialize;
 use uav_relay::flight::axis::Axis;
@@ -55,8 +56,37 @@ pub struct Scenario {
     pub reverse: f64,
     /// Relays with their own altitude or power, by index (1 to 1000, 1 is next to Tx).
     pub relays: BTreeMap<u16, RelayOverride>,
+    /// Terrain below the chain; `None` if the file has none.
+    pub terrain: Option<TerrainSpec>,
     /// Plan of relay positions; `None` if the file has none.
     pub plan: Option<Planned>,
+}
+
+/// Terrain below a chain, for the planner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TerrainSpec {
+    /// Elevation files (GeoTIFF or SRTM), at least one.
+    pub files: Vec<PathBuf>,
+    /// Height of the antennas of Tx and Rx above the ground, m, 0 to 200; 2 by default.
+    pub mast_m: f64,
+    /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
+    ///
+    /// The highest ground within the relay's position error counts.
+    pub above_ground_m: f64,
+    /// Greatest height of a relay above the ground below it, m; `None` for no limit.
+    pub above_ground_max_m: Option<f64>,
+}
+
+impl TerrainSpec {
+    /// Creates the terrain in these elevation files, with the defaults of all other keys.
+    pub fn of(files: Vec<PathBuf>) -> Self {
+        Self {
+            files,
+            mast_m: 2.0,
+            above_ground_m: 0.0,
+            above_ground_max_m: None,
+        }
+    }
 }
 
 /// Line from Tx to Rx in geographic coordinates, and the geographic positions of its ends.
@@ -285,6 +315,7 @@ impl Default for Scenario {
             link: None,
             reverse: 0.0,
             relays: BTreeMap::new(),
+            terrain: None,
             plan: None,
         }
     }

@@ -73,6 +73,7 @@ pub(crate) fn scenario(
         listen: None,
         link: None,
         reverse: 0.0,
+        terrain: None,
         plan: None,
         distance_m: d,
         altitude_m,

@@ -74,6 +74,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
         listen: None,
         link: None,
         reverse: 0.0,
+        terrain: None,
         plan: None,
         distance_m: link.distance_m,
         altitude_m: corridor.least_m,

@@ -81,6 +81,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         listen: None,
         link: None,
         reverse: 0.0,
+        terrain: None,
         plan: None,
         distance_m: d,
         altitude_m,

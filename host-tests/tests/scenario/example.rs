@@ -39,7 +39,7 @@ fn shown(text: &str) -> BTreeSet<String> {
                     Some(format!("{name}.{}", pair.split_once(" = ")?.0.trim()))
                 }),
             );
-        } else if value.starts_with('[') {
+        } else if value.starts_with('[') && !value.starts_with("[\"") {
             list = name;
         } else {
             keys.insert(name);

@@ -48,6 +48,7 @@ fn every_key_sets_its_value() {
         listen: None,
         link: None,
         reverse: 0.0,
+        terrain: None,
         plan: None,
         distance_m: 1500.0,
         altitude_m: 25.0,

@@ -10,12 +10,16 @@ use uav_relay_scenario::{DEFAULT, Interference, PlannedMethod, Scenario, mission
 use uav_relay_sim::command::{Failure, number, whole};
 use uav_relay_sim::svg::{Picture, lateral_view};
 use uav_relay_sim::{command, svg};
+use uav_relay_terrain::report::TerrainReport;
+use uav_relay_tools::figures::draw::draw;
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::carried::Carried;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
 use uav_relay_tools::plan::map::{Map, geojson, kml};
+use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
 use uav_relay_tools::plan::rate::{Rate, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
+use uav_relay_tools::plan::terrain::{Elevation, chart};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
 
@@ -39,14 +43,18 @@ fn run(options: &Options) -> Result<(), Failure> {
     check_target(options, &scenario)?;
     check_out(options, &scenario)?;
     check_map(options, &scenario)?;
+    let elevation = elevation(options, &scenario)?;
     let ask = PlanRequest {
         number,
-        free_altitude: options.altitude == Altitude::Free,
+        free_altitude: options.altitude != Altitude::Given,
         x_m: options.x_m,
         tolerance: options.tolerance,
     };
     let radio = radio(options, &scenario)?;
     let planned = match (options.wanted.target_rate_bps, &radio) {
+        _ if options.altitude == Altitude::Terrain => {
+            above_terrain(&scenario, &ask, elevation.as_ref(), radio.as_ref())
+        }
         (Some(target_bps), Some(radio)) => by_rate(&scenario, &ask, radio, target_bps),
         (_, radio) => plain(&scenario, &ask, radio.as_ref()),
     };
@@ -69,15 +77,27 @@ fn run(options: &Options) -> Result<(), Failure> {
             if let Some(file) = &options.svg {
                 command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
             }
-            write_map(options, &scenario, &plan)?;
-            let next = write_out(options, &scenario, (&plan, number), radio.as_ref())?;
+            let (terrain, error) = terrain(options, &scenario, elevation.as_ref(), &plan)?;
+            write_map(options, &scenario, &plan, terrain.as_ref())?;
+            let next = match error {
+                Some(_) => String::new(),
+                None => write_out(options, &scenario, (&plan, number), radio.as_ref())?,
+            };
             let rates = rates.map(listed);
+            let known = elevation.as_ref().zip(terrain.as_ref());
+            let known = known.filter(|_| options.altitude == Altitude::Terrain);
+            let over_terrain = known.map(|known| compared(&scenario, &ask, known));
+            let report = PlanReport::new(&plan, number, options.unit())
+                .with_way_back(&scenario, &plan)
+                .with_rates(rates)
+                .in_noise(&scenario.noise)
+                .above(terrain, error);
             show(
                 options,
-                &PlanReport::new(&plan, number, options.unit())
-                    .with_way_back(&scenario, &plan)
-                    .with_rates(rates)
-                    .in_noise(&scenario.noise),
+                &PlanReport {
+                    over_terrain,
+                    ..report
+                },
             )?;
             if !options.json {
                 command::print(&next);
@@ -169,6 +189,128 @@ fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Resul
     })
 }
 
+/// Plans a given number of relays with the terrain in the objective.
+fn above_terrain(
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    elevation: Option<&Elevation>,
+    radio: Option<&Radio>,
+) -> Result<Planned, NoPlan> {
+    let wrong = |line: &str| NoPlan::Wrong(format!("--altitude terrain: {line}"));
+    let elevation =
+        elevation.ok_or_else(|| wrong("needs elevation files: --dem FILE, or terrain.files"))?;
+    let Number::Of(relays) = ask.number else {
+        return Err(wrong(
+            "needs --uavs N: it has no search for the number of relays",
+        ));
+    };
+    if radio.is_some() {
+        return Err(wrong(
+            "has no data rates: leave out [link], --rates, --bandwidth-hz and --target-rate-bps",
+        ));
+    }
+    Ok(Planned {
+        plan: Some(over_terrain::best(
+            scenario,
+            elevation,
+            relays,
+            ask.tolerance,
+        )?),
+        number: ask.number,
+        rates: None,
+    })
+}
+
+/// Compares a plan over `terrain` with the plan that ignores it.
+fn compared(
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    (elevation, terrain): (&Elevation, &TerrainReport),
+) -> OverTerrain {
+    let blind = plan::plan(scenario, ask).map_err(|none| match none {
+        NoPlan::Wrong(line) => line,
+        NoPlan::Unmet(why, _) => why.say(Unit::Decibels),
+    });
+    match blind.and_then(|blind| elevation.report(scenario, &blind)) {
+        Ok(blind) => OverTerrain {
+            blind_sir_db: Some(blind.terrain_sir_db),
+            terrain_gain_db: Some(terrain.terrain_sir_db - blind.terrain_sir_db),
+            blind_problem: elevation.problem(&blind),
+        },
+        Err(line) => OverTerrain {
+            blind_sir_db: None,
+            terrain_gain_db: None,
+            blind_problem: Some(line),
+        },
+    }
+}
+
+/// Reads the elevation files, and checks the options that need them.
+fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>, Failure> {
+    let error_m = match &options.scenario {
+        Some(_) => companion(options)?
+            .position_error_m
+            .map_or(POSITION_ERROR_M, f64::from),
+        None => POSITION_ERROR_M,
+    };
+    let elevation = Elevation::load(scenario, &options.terrain.dem, error_m).map_err(|line| {
+        let file = if line.starts_with("site") {
+            format!("{}: ", options.file())
+        } else {
+            String::new()
+        };
+        Failure::input(format!("{file}{line}"))
+    })?;
+    if let Some(elevation) = &elevation {
+        let named = |line| Failure::input(format!("{}: {line}", options.file()));
+        elevation.ground(scenario).map_err(named)?;
+    } else if let Some(file) = &options.terrain.profile {
+        return Err(Failure::input(format!(
+            "--profile {}: needs elevation files: --dem FILE, or terrain.files",
+            file.display()
+        )));
+    }
+    Ok(elevation)
+}
+
+/// Position error of a relay, m, unless `companion.position_error_m` says another one. It is the companion's default.
+const POSITION_ERROR_M: f64 = 1.0;
+
+/// Returns the settings of the drones' companion computers in the scenario file.
+fn companion(options: &Options) -> Result<Companion, Failure> {
+    let Some(path) = &options.scenario else {
+        return Ok(Companion::default());
+    };
+    let (_, sections) =
+        Deployment::load(path).map_err(|error| Failure::input(error.to_string()))?;
+    Ok(sections.companion)
+}
+
+/// Returns the terrain below `plan`, and the reason why the plan is refused there. Draws the terrain for `--profile`.
+fn terrain(
+    options: &Options,
+    scenario: &Scenario,
+    elevation: Option<&Elevation>,
+    plan: &Plan,
+) -> Result<(Option<TerrainReport>, Option<String>), Failure> {
+    let Some(elevation) = elevation else {
+        return Ok((None, None));
+    };
+    let report = elevation
+        .report(scenario, plan)
+        .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
+    if let Some(file) = &options.terrain.profile {
+        let drawing = draw(&chart(&report, scenario), "profile of the chain");
+        let drawing = drawing.map_err(|error| Failure::input(format!("--profile: {error:?}")))?;
+        save(file, "--profile", &drawing)?;
+    }
+    let problem = elevation
+        .problem(&report)
+        .filter(|_| !options.terrain.allow_blocked);
+    let error = problem.map(|line| format!("{line}; --allow-blocked accepts it"));
+    Ok((Some(report), error))
+}
+
 fn by_rate(
     scenario: &Scenario,
     ask: &PlanRequest,
@@ -258,9 +400,10 @@ struct Options {
     scenario: Option<PathBuf>,
     #[command(flatten)]
     wanted: Wanted,
-    /// Altitudes of the relays: fixed, or free in the scenario's band. A fixed relay stays above the line at its altitude of the
+    /// Altitudes of the relays: fixed, free in the scenario's band, or chosen for the terrain. A fixed relay stays above the line at its altitude of the
     /// scenario. A free one may choose an altitude (geometry.altitude_min_m to altitude_max_m) and a place beside the line
-    /// (geometry.lateral_min_m to lateral_max_m)
+    /// (geometry.lateral_min_m to lateral_max_m). With terrain the diffraction losses count, and the band is above the ground
+    /// (terrain.above_ground_m to above_ground_max_m)
     #[arg(long, value_name = "A", value_enum, default_value_t = Altitude::Given)]
     altitude: Altitude,
     /// Required place of the only relay, metres from Tx; its altitude is chosen from the band. Needs --uavs 1
@@ -290,12 +433,30 @@ struct Options {
     /// Write the same for a globe (KML), with altitudes above the sea
     #[arg(long, value_name = "FILE")]
     kml: Option<PathBuf>,
+    #[command(flatten)]
+    terrain: TerrainOptions,
     /// Write the scenario with its plan, for cargo provision --scenario FILE --all
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Overwrite the file of --out
     #[arg(long, requires = "out")]
     force: bool,
+}
+
+/// Terrain below the chain.
+#[derive(Args, Debug)]
+struct TerrainOptions {
+    /// Elevation file, GeoTIFF or SRTM (.hgt), in place of terrain.files; repeatable. Adds the state of each hop above the terrain, its
+    /// diffraction loss (ITU-R P.526), and the heights of the relays above the ground. Needs a scenario with a site
+    #[arg(long, value_name = "FILE")]
+    dem: Vec<PathBuf>,
+    /// Accept a plan with a blocked hop, or with a relay too low or too high above the ground. The limits
+    /// are terrain.above_ground_m and terrain.above_ground_max_m
+    #[arg(long)]
+    allow_blocked: bool,
+    /// Draw ground, hops and their first Fresnel zones (SVG). Needs elevation files
+    #[arg(long, value_name = "FILE")]
+    profile: Option<PathBuf>,
 }
 
 /// Request: exactly one of these.
@@ -328,6 +489,8 @@ enum Altitude {
     Given,
     /// Free within the scenario's band, and beside the line within its limits
     Free,
+    /// Best places on the line with the diffraction losses of the terrain
+    Terrain,
 }
 
 impl Options {
@@ -392,6 +555,11 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
             "--x-m {x_m:?}: cannot be used with --out, because relays compute their positions along the line themselves: leave --x-m out"
         ));
     }
+    if options.altitude == Altitude::Terrain {
+        return refuse(
+            "--altitude terrain: cannot be used with --out, because relays compute their positions without the terrain".to_owned(),
+        );
+    }
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if is_field && options.altitude == Altitude::Free {
         return refuse(
@@ -427,7 +595,7 @@ fn write_out(
     };
     let method = match options.altitude {
         Altitude::Given => PlannedMethod::Align,
-        Altitude::Free => PlannedMethod::Joint,
+        Altitude::Free | Altitude::Terrain => PlannedMethod::Joint,
     };
     let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
     let flown = flown(scenario, relays, method, options.tolerance).map_err(|none| match none {
@@ -537,12 +705,21 @@ fn check_map(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     )))
 }
 
-fn write_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
+fn write_map(
+    options: &Options,
+    scenario: &Scenario,
+    plan: &Plan,
+    terrain: Option<&TerrainReport>,
+) -> Result<(), Failure> {
     if options.geojson.is_none() && options.kml.is_none() {
         return Ok(());
     }
     let map = Map::new(scenario, plan)
         .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
+    let map = match (&scenario.line, terrain) {
+        (Some(line), Some(terrain)) => map.above(line, terrain),
+        _ => map,
+    };
     for number in &map.left_out {
         command::print_line(&format!(
             "note: interferer {number} is more than 5 km from the line, and is left out of the map"

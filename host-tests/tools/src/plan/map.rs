@@ -7,6 +7,8 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
 use uav_relay::{Geodetic, Placement};
 use uav_relay_scenario::{Line, Scenario};
+use uav_relay_terrain::profile::State;
+use uav_relay_terrain::report::TerrainReport;
 
 use super::Plan;
 
@@ -15,10 +17,12 @@ use super::Plan;
 pub struct Feature {
     /// Label of the object on the map, for example `relay 3`.
     pub name: String,
-    /// Kind of the object: `tx`, `rx`, `relay`, `interferer` or `hop`.
+    /// Kind of the object: `tx`, `rx`, `relay`, `interferer`, `hop` or `ground`.
     pub kind: &'static str,
-    /// Coordinates of the object: one point, or the two ends of a hop.
+    /// Coordinates of the object: one point, the two ends of a hop, or the points of a line.
     pub at: Vec<Geodetic>,
+    /// True for a line on the ground without heights of its own, for a globe that has a terrain.
+    pub is_clamped: bool,
     /// Numbers of the object, such as its position and SIR. Each has a name that ends in the unit.
     pub numbers: Vec<(&'static str, Number)>,
 }
@@ -81,6 +85,7 @@ impl Map {
             name: name.to_owned(),
             kind,
             at: vec![at],
+            is_clamped: false,
             numbers: Vec::new(),
         };
         let mut features = vec![site("Tx", "tx", tx), site("Rx", "rx", rx)];
@@ -93,6 +98,7 @@ impl Map {
                 name: format!("relay {index}"),
                 kind: "relay",
                 at: vec![at],
+                is_clamped: false,
                 numbers: vec![
                     ("index", Number::Whole(index)),
                     ("x_m", Number::Rounded(place.x_m.into())),
@@ -119,6 +125,7 @@ impl Map {
                 name: format!("interferer {number}"),
                 kind: "interferer",
                 at: vec![at],
+                is_clamped: false,
                 numbers: vec![
                     ("x_m", Number::Rounded(x_m)),
                     ("y_m", Number::Rounded(y_m)),
@@ -132,6 +139,7 @@ impl Map {
                 name: format!("hop {number}: {:.2} dB", 10.0 * sir.log10()),
                 kind: "hop",
                 at: vec![*from, *to],
+                is_clamped: false,
                 numbers: vec![
                     ("hop", Number::Whole(number)),
                     ("sir_ratio", Number::Ratio(*sir)),
@@ -145,7 +153,64 @@ impl Map {
             left_out,
         })
     }
+
+    /// Adds the state of each hop above the terrain, and the ground below it.
+    ///
+    /// The ground is there twice: with the heights of the elevation files, and clamped to the ground of the globe.
+    #[must_use]
+    pub fn above(mut self, line: &Line, terrain: &TerrainReport) -> Self {
+        let hops = self.features.iter_mut().filter(|one| one.kind == "hop");
+        for (feature, hop) in hops.zip(&terrain.hops) {
+            if hop.state != State::Clear {
+                feature.name = format!("{}, {:?}", feature.name, hop.state).to_lowercase();
+            }
+            let numbers = [
+                ("clearance_m", hop.clearance_m),
+                ("diffraction_db", hop.diffraction_db),
+                ("terrain_sir_db", hop.sir_db),
+            ];
+            let numbers = numbers.map(|(name, value)| (name, Number::Rounded(value)));
+            feature.numbers.extend(numbers);
+        }
+        for (number, profile) in (1..).zip(&terrain.profiles) {
+            let [from, to] = profile.nodes;
+            let length = profile.length_m().max(f64::MIN_POSITIVE);
+            let every = profile.points.len().div_ceil(MAP_POINTS).max(1);
+            let last = profile.points.len().saturating_sub(1);
+            let points = profile.points.iter().enumerate();
+            let points = points.filter(|(at, _)| at % every == 0 || *at == last);
+            let points = points.filter_map(|(_, [along, height])| {
+                let at = |from: f64, to: f64| from + along / length * (to - from);
+                #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
+                let place = Placement {
+                    x_m: at(from.x_m, to.x_m) as f32,
+                    y_m: at(from.y_m, to.y_m) as f32,
+                    altitude_m: 0.0,
+                };
+                #[expect(clippy::cast_possible_truncation, reason = "heights on earth")]
+                let amsl_mm = (height * 1e3).round() as i32;
+                Some(Geodetic {
+                    amsl_mm,
+                    ..point(line, place)?
+                })
+            });
+            let at: Vec<Geodetic> = points.collect();
+            let ground = |name: &str, is_clamped| Feature {
+                name: format!("{name} of hop {number}"),
+                kind: "ground",
+                at: at.clone(),
+                is_clamped,
+                numbers: vec![("hop", Number::Whole(number))],
+            };
+            self.features
+                .extend([ground("ground", false), ground("track", true)]);
+        }
+        self
+    }
 }
+
+/// Largest number of points of a hop's ground on the map, approximately.
+const MAP_POINTS: usize = 400;
 
 fn point(line: &Line, place: Placement) -> Option<Geodetic> {
     line.axis.point(place)
@@ -171,7 +236,8 @@ fn position(at: Geodetic) -> [f64; 3] {
 
 /// Returns the map as the text of a GeoJSON file.
 pub fn geojson(map: &Map) -> String {
-    let features = map.features.iter().map(|one| feature(one, map.geoid_m));
+    let shown = map.features.iter().filter(|one| !one.is_clamped);
+    let features = shown.map(|one| feature(one, map.geoid_m));
     let mut text = FeatureCollection::new(features).to_string();
     text.push('\n');
     text
@@ -183,21 +249,35 @@ fn feature(feature: &Feature, geoid_m: Option<f64>) -> geojson::Feature {
         None => vec![lon, lat],
     };
     let at: Vec<[f64; 3]> = feature.at.iter().map(|at| position(*at)).collect();
-    let value = match at.as_slice() {
-        [from, to] => match cut(*from, *to) {
-            Some([before, after]) => GeometryValue::new_multi_line_string([
-                [*from, before].map(shown),
-                [after, *to].map(shown),
-            ]),
-            None => GeometryValue::new_line_string([*from, *to].map(shown)),
-        },
-        at => GeometryValue::new_point(shown(at.first().copied().unwrap_or_default())),
+    let value = if let [at] = at.as_slice() {
+        GeometryValue::new_point(shown(*at))
+    } else {
+        let mut parts = vec![Vec::new()];
+        for (from, to) in at.iter().zip(at.iter().skip(1)) {
+            let Some(part) = parts.last_mut() else { break };
+            if part.is_empty() {
+                part.push(shown(*from));
+            }
+            if let Some([before, after]) = cut(*from, *to) {
+                part.push(shown(before));
+                parts.push(vec![shown(after), shown(*to)]);
+            } else {
+                part.push(shown(*to));
+            }
+        }
+        match parts.as_slice() {
+            [line] => GeometryValue::new_line_string(line.clone()),
+            _ => GeometryValue::new_multi_line_string(parts),
+        }
     };
     let mut properties = JsonObject::new();
     properties.insert("name".to_owned(), feature.name.clone().into());
     properties.insert("kind".to_owned(), feature.kind.into());
     if let [at] = at.as_slice() {
         properties.insert("amsl_m".to_owned(), at[2].into());
+    } else if at.len() > 2 {
+        let heights: Vec<f64> = at.iter().map(|at| at[2]).collect();
+        properties.insert("amsl_m".to_owned(), heights.into());
     }
     for (name, number) in &feature.numbers {
         let value = match number {
@@ -232,12 +312,13 @@ fn cut(from: [f64; 3], to: [f64; 3]) -> Option<[[f64; 3]; 2]> {
 const NAMESPACE: &str = "http://www.opengis.net/kml/2.2";
 
 /// Colours of the objects on a KML map, by kind, as hexadecimal alpha, blue, green and red.
-const STYLES: [(&str, &str); 5] = [
+const STYLES: [(&str, &str); 6] = [
     ("tx", "ff00a000"),
     ("rx", "ffa06000"),
     ("relay", "ffffffff"),
     ("interferer", "ff0000e0"),
     ("hop", "ff00d0ff"),
+    ("ground", "ff2a5a8a"),
 ];
 
 type Xml = Writer<Vec<u8>>;
@@ -307,11 +388,20 @@ fn placemark(xml: &mut Xml, feature: &Feature) -> io::Result<()> {
         leaf(xml, "styleUrl", &format!("#{}", feature.kind))?;
         let shape = if at.len() > 1 { "LineString" } else { "Point" };
         xml.create_element(shape).write_inner_content(|xml| {
+            if feature.is_clamped {
+                // A clamped line follows the ground between its points only if it is tessellated.
+                leaf(xml, "tessellate", "1")?;
+            }
             if shape == "Point" {
                 // Draws a line down to the ground.
                 leaf(xml, "extrude", "1")?;
             }
-            leaf(xml, "altitudeMode", "absolute")?;
+            let mode = if feature.is_clamped {
+                "clampToGround"
+            } else {
+                "absolute"
+            };
+            leaf(xml, "altitudeMode", mode)?;
             leaf(xml, "coordinates", &at.join(" "))
         })?;
         Ok(())

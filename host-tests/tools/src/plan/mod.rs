@@ -8,6 +8,7 @@
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
 //! | a field, both directions | `source`: Algorithm 4 |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
+//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective |
 //! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
 //! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
@@ -20,11 +21,13 @@ pub mod flown;
 pub mod map;
 mod multi_interferer;
 pub mod one_both_ways;
+pub mod over_terrain;
 pub mod path;
 pub mod rate;
 pub mod report;
 mod source;
 mod steps;
+pub mod terrain;
 
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;

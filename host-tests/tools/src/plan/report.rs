@@ -7,7 +7,9 @@ use serde::Serialize;
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::{Noise, Scenario};
 use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, db, hops_table, relays};
+use uav_relay_terrain::report::TerrainReport;
 
+use super::over_terrain::OverTerrain;
 use super::rate::{BestRate, Rate, RateOf};
 use super::{Number, Plan, Unit, Why};
 
@@ -275,6 +277,10 @@ impl WayBack {
 /// Text at the end of each plan: what the model leaves out.
 const NOT_MODELLED: &str = "not modelled: terrain and obstacles";
 
+/// The same for a plan with terrain.
+const NOT_IN_TERRAIN: &str =
+    "not modelled: buildings and trees, and terrain in front of the interferers";
+
 /// Text added to a plan for one direction: the direction from Rx to Tx is not optimised.
 const ONE_WAY: &str = "; not optimised: the way back from Rx to Tx";
 
@@ -356,6 +362,12 @@ pub struct PlanReport {
     /// Hypothetical interferer in place of several; absent unless there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hypothetical: Option<HypotheticalReport>,
+    /// Terrain below the chain; absent without elevation files.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<TerrainReport>,
+    /// Gain of positions that are chosen for the terrain; absent for other positions.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub over_terrain: Option<OverTerrain>,
     /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
@@ -414,6 +426,8 @@ impl PlanReport {
             rx_sir_db: rx_sir.map(db),
             noise: None,
             hypothetical,
+            terrain: None,
+            over_terrain: None,
             room: !plan.mission.config().lateral.is_single(),
             unit,
         }
@@ -481,6 +495,16 @@ impl PlanReport {
         }
     }
 
+    /// Adds the terrain below the chain, if it is known. `error` says why the plan cannot be flown above it.
+    #[must_use]
+    pub fn above(self, terrain: Option<TerrainReport>, error: Option<String>) -> Self {
+        Self {
+            error,
+            terrain,
+            ..self
+        }
+    }
+
     /// Returns the report as a table for the terminal.
     pub fn table(&self) -> String {
         let rx_sir_back = self
@@ -519,7 +543,17 @@ impl PlanReport {
         }
         let is_for_both = self.way_back.is_some_and(|back| back.reverse.is_some());
         let one_way = if is_for_both { "" } else { ONE_WAY };
-        _ = writeln!(text, "{}; {NOT_MODELLED}{one_way}", self.certainty());
+        if let Some(terrain) = &self.terrain {
+            text.push_str(&terrain.table());
+        }
+        if let Some(over) = &self.over_terrain {
+            _ = writeln!(text, "{over}");
+        }
+        let not_modelled = self
+            .terrain
+            .as_ref()
+            .map_or(NOT_MODELLED, |_| NOT_IN_TERRAIN);
+        _ = writeln!(text, "{}; {not_modelled}{one_way}", self.certainty());
         if let Some(noise) = &self.noise {
             _ = writeln!(text, "{noise}");
         }

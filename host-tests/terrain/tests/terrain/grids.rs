@@ -1,0 +1,255 @@
+//! Heights from elevation files, and the errors of files that cannot be used.
+
+use rand::RngExt as _;
+use uav_relay_terrain::grid::Terrain;
+
+use crate::files::{Raster, hgt};
+use crate::{rng, seeds};
+
+/// Height of a tilted plane, which bilinear interpolation reproduces.
+fn plane(east: f64, north: f64) -> f64 {
+    500.0 + 300.0 * (east - 8.0) - 200.0 * (north - 47.0)
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+#[test]
+fn heights_are_interpolated_within_and_between_files() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    let cell = 1.0 / 3600.0;
+    // Two tiles without overlap: a seam of one cell. The second has corner tie points.
+    Raster::geographic(8.0, 47.1, cell, [360, 361]).write(&file("west.tif"), plane);
+    let east = Raster {
+        is_point: false,
+        ..Raster::geographic(8.1, 47.1, cell, [360, 361])
+    };
+    east.write(&file("east.tif"), plane);
+    hgt(&file("N47E008.hgt"), [8.0, 47.0], |lon, lat| {
+        plane(lon, lat).round()
+    });
+    let tiles = Terrain::load(&[file("west.tif"), file("east.tif")]).unwrap();
+    let srtm = Terrain::load(&[file("N47E008.hgt")]).unwrap();
+    assert!((srtm.cell_m(47.0) - 63.3).abs() < 0.5 && (tiles.cell_m(47.0) - 21.1).abs() < 0.2);
+    for seed in seeds(500) {
+        let rng = &mut rng(seed);
+        let (lon, lat) = (rng.random_range(8.0..8.199), rng.random_range(47.0..47.1));
+        let height = tiles.height_m(lat, lon).unwrap();
+        assert!(
+            (height - plane(lon, lat)).abs() < 0.01,
+            "{lat} {lon}: {height}"
+        );
+        let height = srtm.height_m(lat, lon).unwrap();
+        assert!(
+            (height - plane(lon, lat)).abs() < 0.51,
+            "{lat} {lon}: {height}"
+        );
+    }
+    // Corners of the grid, and the seam itself.
+    for (lat, lon) in [
+        (47.0, 8.0),
+        (47.1, 8.0),
+        (47.05, 8.1),
+        (47.05, 8.1 - 0.5 * cell),
+    ] {
+        assert!((tiles.height_m(lat, lon).unwrap() - plane(lon, lat)).abs() < 0.01);
+    }
+    assert!((srtm.height_m(48.0, 9.0).unwrap() - plane(9.0, 48.0)).abs() < 0.01);
+}
+
+/// UTM coordinates by Krüger's series to the third order: independent of the crate's conversion.
+fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
+    let n: f64 = 1.0 / (2.0 * 298.257_223_563 - 1.0);
+    let alpha = [
+        n / 2.0 - 2.0 / 3.0 * n.powi(2) + 5.0 / 16.0 * n.powi(3),
+        13.0 / 48.0 * n.powi(2) - 3.0 / 5.0 * n.powi(3),
+        61.0 / 240.0 * n.powi(3),
+    ];
+    let radius = 6_378_137.0 / (1.0 + n) * (1.0 + n.powi(2) / 4.0 + n.powi(4) / 64.0);
+    let (phi, lambda) = (lat.to_radians(), (lon - (6.0 * zone - 183.0)).to_radians());
+    let e = 2.0 * n.sqrt() / (1.0 + n);
+    let t = (phi.sin().atanh() - e * (e * phi.sin()).atanh()).sinh();
+    let (xi, eta) = (
+        t.atan2(lambda.cos()),
+        (lambda.sin() / (1.0 + t * t).sqrt()).atanh(),
+    );
+    let sum = |of: &dyn Fn(f64) -> f64| {
+        (1..)
+            .zip(alpha)
+            .map(|(j, a)| a * of(2.0 * f64::from(j)))
+            .sum::<f64>()
+    };
+    let east = eta + sum(&|j| (j * xi).cos() * (j * eta).sinh());
+    let north = xi + sum(&|j| (j * xi).sin() * (j * eta).cosh());
+    [500_000.0 + 0.9996 * radius * east, 0.9996 * radius * north]
+}
+
+#[test]
+fn utm_grids_have_the_heights_of_an_independent_projection() {
+    let folder = folder();
+    for (zone, south, lat, lon) in [
+        (32_u16, false, 47.4, 8.5),
+        (32, false, 47.4, 11.9),
+        (19, true, -33.4, -70.6),
+        (33, false, 69.6, 18.9),
+    ] {
+        let [east, north] = utm(lat, lon, zone.into());
+        let north = if south { north + 1e7 } else { north };
+        let height = |e: f64, n: f64| 100.0 + 0.1 * (e - east) - 0.2 * (n - north);
+        let epsg = if south { 32700 } else { 32600 } + zone;
+        let raster = Raster {
+            corner: [
+                (east / 10.0).round() * 10.0 - 3000.0,
+                (north / 10.0).round() * 10.0 + 3000.0,
+            ],
+            cell: [10.0; 2],
+            size: [600, 600],
+            epsg,
+            nodata: None,
+            is_point: false,
+        };
+        let file = folder.path().join("utm.tif");
+        raster.write(&file, height);
+        let terrain = Terrain::load(&[file]).unwrap();
+        for seed in seeds(100) {
+            let rng = &mut rng(seed);
+            let (lat, lon) = (
+                lat + rng.random_range(-0.01..0.01),
+                lon + rng.random_range(-0.01..0.01),
+            );
+            let [e, n] = utm(lat, lon, zone.into());
+            let expected = height(e, if south { n + 1e7 } else { n });
+            let found = terrain.height_m(lat, lon).unwrap();
+            // A millimetre is a place within a centimetre.
+            assert!(
+                (found - expected).abs() < 2e-3,
+                "{epsg} {lat} {lon}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn unusable_files_and_places_are_named() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    let cell = 1.0 / 3600.0;
+    let geographic = || Raster::geographic(8.0, 47.1, cell, [360, 361]);
+    geographic().write(&file("a.tif"), plane);
+    Raster {
+        size: [180, 180],
+        ..Raster::geographic(8.1, 47.1, 2.0 * cell, [180, 180])
+    }
+    .write(&file("coarse.tif"), plane);
+    Raster::geographic(8.1 + 0.3 * cell, 47.1, cell, [90, 90]).write(&file("shifted.tif"), plane);
+    Raster {
+        epsg: 32632,
+        corner: [4.6e5, 5.25e6],
+        cell: [30.0; 2],
+        ..geographic()
+    }
+    .write(&file("utm.tif"), |_, _| 1.0);
+    Raster {
+        epsg: 2056,
+        corner: [2.6e6, 1.2e6],
+        cell: [30.0; 2],
+        ..geographic()
+    }
+    .write(&file("swiss.tif"), |_, _| 1.0);
+    std::fs::write(file("N47E008.hgt"), [0; 1000]).unwrap();
+    std::fs::write(file("zurich.hgt"), [0; 1000]).unwrap();
+    std::fs::write(file("text.tif"), "no picture").unwrap();
+    let load = |names: &[&str]| {
+        let files: Vec<_> = names.iter().map(|name| file(name)).collect();
+        Terrain::load(&files)
+            .err()
+            .unwrap_or_else(|| panic!("{names:?}"))
+    };
+    for (names, parts) in [
+        (
+            &["missing.tif"] as &[&str],
+            &["missing.tif: No such file"] as &[&str],
+        ),
+        (&["text.tif"], &["text.tif: "]),
+        (
+            &["N47E008.hgt"],
+            &["N47E008.hgt: has 1000 bytes; allowed: 2 bytes for each of 1201 x 1201"],
+        ),
+        (&["zurich.hgt"], &["zurich.hgt: its name must begin with"]),
+        (
+            &["swiss.tif"],
+            &["swiss.tif: has the EPSG code 2056; allowed: 4326"],
+        ),
+        (
+            &["a.tif", "utm.tif"],
+            &[
+                "utm.tif: its coordinate system, UTM zone 32N, differs from that of ",
+                "a.tif (latitude and longitude, cells of 0.000277",
+            ],
+        ),
+        (
+            &["a.tif", "coarse.tif"],
+            &["coarse.tif: its cell size, 0.000555"],
+        ),
+        (
+            &["a.tif", "shifted.tif"],
+            &["shifted.tif: its origin, 8.100083", "is not at a node"],
+        ),
+    ] {
+        let line = load(names);
+        for part in parts {
+            assert!(line.contains(part), "{names:?}: {line}: {part}");
+        }
+    }
+}
+
+#[test]
+fn holes_and_uncovered_places_are_named() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    let cell = 1.0 / 3600.0;
+    let geographic = || Raster::geographic(8.0, 47.1, cell, [360, 361]);
+    geographic().write(&file("a.tif"), plane);
+    Raster {
+        nodata: Some(-9999.0),
+        ..geographic()
+    }
+    .write(&file("hole.tif"), |lon, lat| {
+        if lon > 8.05 { -9999.0 } else { plane(lon, lat) }
+    });
+    Raster {
+        epsg: 32632,
+        corner: [4.6e5, 5.25e6],
+        cell: [30.0; 2],
+        ..geographic()
+    }
+    .write(&file("utm.tif"), |_, _| 1.0);
+    let holed = Terrain::load(&[file("hole.tif")]).unwrap();
+    let line = holed.height_m(47.05, 8.0600001).unwrap_err();
+    assert!(line.contains("hole.tif: has no height at latitude 47.050000, longitude 8.060000: its value there is -9999"), "{line}");
+    assert!(holed.height_m(47.05, 8.04).is_ok());
+    // A second file fills the hole.
+    let filled = Terrain::load(&[file("hole.tif"), file("a.tif")]).unwrap();
+    assert!((filled.height_m(47.05, 8.06).unwrap() - plane(8.06, 47.05)).abs() < 0.01);
+    let line = filled.height_m(47.2, 8.05).unwrap_err();
+    assert!(
+        line.contains("latitude 47.200000, longitude 8.050000 is not covered")
+            && line
+                .contains("a.tif has latitudes 47.0000 to 47.1000 and longitudes 8.0000 to 8.0997"),
+        "{line}"
+    );
+    assert!(!line.contains("swapped"), "{line}");
+    let line = filled.height_m(8.05, 47.05).unwrap_err();
+    assert!(
+        line.ends_with("; latitude and longitude look swapped"),
+        "{line}"
+    );
+    let utm = Terrain::load(&[file("utm.tif")]).unwrap();
+    let line = utm.height_m(48.4, 8.5).unwrap_err();
+    assert!(
+        line.contains("(easting 462") && line.contains("in UTM zone 32N)"),
+        "{line}"
+    );
+}

@@ -1,0 +1,525 @@
+//! Positions with the terrain in the objective.
+//!
+//! The SIR of a hop is that of free space, times the gain of diffraction.
+//!
+//! The best chain on a grid over x and the altitude is found by dynamic programming: the best worst hop of a chain that ends with relay k
+//! at a grid point is the largest, over the points of relay k - 1, of the smaller of that relay's value and the SIR of the hop. On
+//! its grid the result is exact. Chains without a blocked hop come first, because others are refused. The result is refined by the same
+//! method on finer grids around the relays. The relays are on the line, y = 0.
+//!
+//! Candidates of the previous relay are visited in the order of a bound without diffraction, so that few losses are computed. Hops below
+//! the SIR of a chain on a coarser grid are left out.
+
+use std::collections::HashMap;
+use std::fmt;
+
+use serde::Serialize;
+use uav_relay::Placement;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_terrain::diffraction::{LIGHT_M_S, Point, loss_db};
+use uav_relay_terrain::profile::{Ground, Node, bulge_m};
+
+use super::terrain::Elevation;
+use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, Why};
+
+/// Largest number of relays for which positions over terrain are searched.
+pub const MOST_RELAYS: u16 = 50;
+
+/// Number of altitudes of the first grid at each x.
+const LEVELS: u32 = 12;
+
+/// Largest number of points of a hop's profile during the search, relative to the whole line.
+const POINTS: f64 = 800.0;
+
+/// Number of finer grids, each with cells half as large.
+const REFINEMENTS: i32 = 5;
+
+/// Factor on the gain of a blocked hop: a chain without blocked hops is better than one with any.
+const BLOCKED: f64 = 1e-30;
+
+/// Grid points on each side of a relay in a finer grid.
+const AROUND: i32 = 2;
+
+/// Comparison of the positions over terrain with those that ignore it.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct OverTerrain {
+    /// SIR of the worst hop with terrain, dB, at positions that ignore it; absent if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind_sir_db: Option<f64>,
+    /// Gain of the plan over these positions, dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub terrain_gain_db: Option<f64>,
+    /// Reason why those positions cannot be flown, or why there are none; absent if they can.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind_problem: Option<String>,
+}
+
+impl fmt::Display for OverTerrain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.blind_sir_db, self.terrain_gain_db) {
+            (Some(sir_db), Some(gain_db)) => write!(
+                f,
+                "positions that ignore the terrain: worst hop {sir_db:.3} dB with terrain; this plan gains {gain_db:.3} dB"
+            )?,
+            _ => f.write_str("positions that ignore the terrain: none")?,
+        }
+        match &self.blind_problem {
+            Some(problem) => write!(f, "; they cannot be flown: {problem}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Position that a relay may have: x, altitude above the datum, and height above the sea, m.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Candidate {
+    /// Distance from Tx, m.
+    pub x_m: f64,
+    /// Altitude above the straight line between the sites, m.
+    pub h_m: f64,
+    amsl_m: f64,
+}
+
+/// Search for positions of the relays of a scene above a terrain.
+#[expect(missing_debug_implementations, reason = "the terrain has none")]
+pub struct Search<'a> {
+    scene: &'a Scene,
+    ground: Ground<'a>,
+    wavelength_m: f64,
+    /// Heights of the ground along the line, at equal steps.
+    line: Vec<f64>,
+    step_m: f64,
+    /// Least and greatest height above the ground, and the position error, m.
+    clearance_m: [f64; 2],
+    position_error_m: f64,
+    /// True if the altitudes are limited by the scenario's band, too.
+    is_banded: bool,
+    losses: HashMap<[[u64; 2]; 2], f64>,
+}
+
+impl<'a> Search<'a> {
+    /// Creates a search above the line of the scenario.
+    ///
+    /// # Errors
+    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    pub fn new(
+        scenario: &Scenario,
+        scene: &'a Scene,
+        elevation: &'a Elevation,
+    ) -> Result<Self, String> {
+        let ground = elevation.ground(scenario)?;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "16 to 800"
+        )]
+        let steps = (scene.distance_m / ground.step_m())
+            .ceil()
+            .clamp(16.0, POINTS) as u32;
+        let step_m = scene.distance_m / f64::from(steps);
+        let line = (0..=steps).map(|step| ground.height_m(f64::from(step) * step_m, 0.0));
+        let most = elevation.spec.above_ground_max_m;
+        Ok(Self {
+            scene,
+            wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
+            line: line.collect::<Result<_, _>>()?,
+            step_m,
+            clearance_m: [elevation.spec.above_ground_m, most.unwrap_or(f64::INFINITY)],
+            position_error_m: elevation.position_error_m(),
+            is_banded: most.is_none(),
+            losses: HashMap::new(),
+            ground,
+        })
+    }
+
+    /// Returns the lowest and highest altitude of a relay at `x_m`; `None` if there is none.
+    fn band_m(&self, x_m: f64) -> Result<Option<[f64; 2]>, String> {
+        let datum = self.datum_m(x_m)?;
+        let node = Node {
+            x_m,
+            y_m: 0.0,
+            amsl_m: datum,
+        };
+        let [least, most] = self.clearance_m;
+        let mut low = self.ground.highest_m(node, self.position_error_m)? + least - datum;
+        let mut high = self.ground.height_m(x_m, 0.0)? + most - datum;
+        if self.is_banded {
+            (low, high) = (
+                low.max(self.scene.band.least_m),
+                high.min(self.scene.band.most_m),
+            );
+        }
+        // Missions have altitudes above 0.
+        low = low.max(0.1);
+        Ok((low <= high).then_some([low, high]))
+    }
+
+    fn datum_m(&self, x_m: f64) -> Result<f64, String> {
+        Ok(f64::from(self.ground.point(x_m, 0.0)?.amsl_mm) / 1e3)
+    }
+
+    /// Returns the candidates for relay `relay` (from 0) at `x_m`. `levels` chooses altitudes from the allowed ones.
+    fn column(
+        &self,
+        relay: usize,
+        x_m: f64,
+        levels: impl Fn([f64; 2]) -> Vec<f64>,
+    ) -> Result<Vec<Candidate>, String> {
+        let Some(band) = self.band_m(x_m)? else {
+            return Ok(Vec::new());
+        };
+        let held = self.scene.relays.get(relay).filter(|relay| relay.holds);
+        let levels = held.map_or_else(|| levels(band), |relay| vec![relay.altitude_m]);
+        let datum = self.datum_m(x_m)?;
+        let levels = levels
+            .into_iter()
+            .filter(|h_m| (band[0]..=band[1]).contains(h_m));
+        Ok(levels
+            .map(|h_m| Candidate {
+                x_m,
+                h_m,
+                amsl_m: datum + h_m,
+            })
+            .collect())
+    }
+
+    /// Returns the candidates of every relay on a grid of `columns` by `levels` altitudes.
+    ///
+    /// # Errors
+    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    pub fn grid(&self, columns: u32, levels: u32) -> Result<Vec<Vec<Candidate>>, String> {
+        let free = |[low, high]: [f64; 2]| {
+            let level =
+                |level: u32| low + (high - low) * f64::from(level) / f64::from((levels - 1).max(1));
+            (0..levels).map(level).collect()
+        };
+        let relays = 0..self.scene.relays.len();
+        let each = relays.map(|relay| {
+            let x = (1..=columns)
+                .map(|column| self.scene.distance_m * f64::from(column) / f64::from(columns + 1));
+            let columns = x.map(|x_m| self.column(relay, x_m, free));
+            Ok(columns.collect::<Result<Vec<_>, String>>()?.concat())
+        });
+        each.collect()
+    }
+
+    /// Returns the candidates around `chain`, at steps of `step_m` along x and `climb_m` in altitude.
+    fn around(
+        &self,
+        chain: &[Candidate],
+        step_m: f64,
+        climb_m: f64,
+    ) -> Result<Vec<Vec<Candidate>>, String> {
+        let steps = || (-AROUND..=AROUND).map(f64::from);
+        let each = chain.iter().enumerate().map(|(relay, at)| {
+            let mut candidates = vec![*at];
+            for x_m in steps().map(|step| at.x_m + step * step_m) {
+                if !(x_m > 0.0 && x_m < self.scene.distance_m) {
+                    continue;
+                }
+                // The lowest altitude is often the best one, and is between two steps.
+                let levels = |[low, high]: [f64; 2]| {
+                    steps()
+                        .map(|step| (at.h_m + step * climb_m).clamp(low, high))
+                        .collect()
+                };
+                candidates.extend(self.column(relay, x_m, levels)?);
+            }
+            Ok(candidates)
+        });
+        each.collect()
+    }
+
+    /// Returns the SIR of the hop to node `node` in free space, linear.
+    ///
+    /// It is the smaller one of both directions if the mission has both.
+    fn free_sir(&self, node: usize, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
+        let place = |at: Candidate| (at.x_m, at.h_m);
+        let relays = &self.scene.relays;
+        let sender = |at: Candidate, index: usize| {
+            relays
+                .get(index)
+                .map(|relay| self.scene.sender(place(at), relay))
+        };
+        let before = node.checked_sub(1);
+        let (there, back) = match (from, to) {
+            (None, Some(to)) => (
+                Some(self.scene.sir_at(self.scene.tx(), place(to))),
+                relays
+                    .get(node)
+                    .map(|relay| self.scene.sir_at_tx(place(to), relay)),
+            ),
+            (Some(from), Some(to)) => (
+                before
+                    .and_then(|before| sender(from, before))
+                    .map(|sender| self.scene.sir_at(sender, place(to))),
+                sender(to, node).map(|sender| self.scene.sir_at(sender, place(from))),
+            ),
+            (Some(from), None) => (
+                before
+                    .and_then(|before| relays.get(before))
+                    .map(|relay| self.scene.sir_at_rx(place(from), relay)),
+                Some(self.scene.sir_at(self.scene.rx(), place(from))),
+            ),
+            (None, None) => (None, None),
+        };
+        let there = there.unwrap_or_default();
+        if self.scene.reverse > 0.0 {
+            return there.min(back.unwrap_or_default() / self.scene.reverse);
+        }
+        there
+    }
+
+    /// Returns the gain of the hop by diffraction, 0 to 1, times [`BLOCKED`] if the terrain blocks the hop.
+    fn gain(&mut self, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
+        let [tx, rx] = self.ground.ends;
+        let end = |node: Node| Candidate {
+            x_m: node.x_m,
+            h_m: 0.0,
+            amsl_m: node.amsl_m,
+        };
+        let (from, to) = (from.unwrap_or(end(tx)), to.unwrap_or(end(rx)));
+        let key = [from, to].map(|at| [at.x_m.to_bits(), at.amsl_m.to_bits()]);
+        if let Some(gain) = self.losses.get(&key) {
+            return *gain;
+        }
+        let points = self.profile(from.x_m, to.x_m);
+        let loss = loss_db(&points, [from.amsl_m, to.amsl_m], self.wavelength_m);
+        let length = to.x_m - from.x_m;
+        let climb = (to.amsl_m - from.amsl_m) / length.max(f64::MIN_POSITIVE);
+        let is_blocked = points
+            .iter()
+            .any(|[along, height]| height + bulge_m(*along, length) > from.amsl_m + climb * along);
+        let preference = if is_blocked { BLOCKED } else { 1.0 };
+        let gain = preference * 10_f64.powf(-loss / 10.0);
+        self.losses.insert(key, gain);
+        gain
+    }
+
+    /// Returns the ground between two positions on the line.
+    fn profile(&self, from_m: f64, to_m: f64) -> Vec<Point> {
+        let height = |x_m: f64| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "0 to 800"
+            )]
+            let at = (x_m / self.step_m).floor().max(0.0) as usize;
+            let share = x_m / self.step_m - at as f64;
+            let node = |at: usize| {
+                self.line
+                    .get(at)
+                    .or(self.line.last())
+                    .copied()
+                    .unwrap_or_default()
+            };
+            node(at) * (1.0 - share) + node(at + 1) * share
+        };
+        let mut points = vec![[0.0, height(from_m)]];
+        for (at, ground) in self.line.iter().enumerate() {
+            let x_m = at as f64 * self.step_m;
+            if x_m > from_m + 1e-3 && x_m < to_m - 1e-3 {
+                points.push([x_m - from_m, *ground]);
+            }
+        }
+        points.push([to_m - from_m, height(to_m)]);
+        points
+    }
+
+    /// Returns the SIR of the worst hop of a chain with terrain, linear.
+    ///
+    /// It is nearly 0 if a hop is blocked.
+    pub fn worst_sir(&mut self, chain: &[Candidate]) -> f64 {
+        let places: Vec<(f64, f64)> = chain.iter().map(|at| (at.x_m, at.h_m)).collect();
+        let back = self.scene.hop_sirs_back(&places);
+        let mut worst = f64::INFINITY;
+        for (hop, sir) in self.scene.hop_sirs(&places).into_iter().enumerate() {
+            let from = hop.checked_sub(1).and_then(|at| chain.get(at));
+            let gain = self.gain(from.copied(), chain.get(hop).copied());
+            worst = worst.min(sir * gain);
+            if let Some(back) = back.get(hop).filter(|_| self.scene.reverse > 0.0) {
+                worst = worst.min(back * gain / self.scene.reverse);
+            }
+        }
+        worst
+    }
+
+    /// Returns the best chain of the candidates, and the SIR of its worst hop, linear.
+    ///
+    /// `None` if there is none with at least the SIR `floor`. A high floor saves time: hops below it are left out.
+    pub fn best(
+        &mut self,
+        candidates: &[Vec<Candidate>],
+        floor: f64,
+    ) -> Option<(Vec<Candidate>, f64)> {
+        // For each candidate of a relay: the worst hop up to it, and the candidate of the relay before it.
+        let mut layers: Vec<Vec<(f64, usize)>> = Vec::new();
+        for (node, own) in candidates.iter().enumerate() {
+            let before = node
+                .checked_sub(1)
+                .and_then(|at| Some((candidates.get(at)?, layers.get(at)?)));
+            let mut layer = Vec::with_capacity(own.len());
+            let before = before.map(|(places, values)| {
+                places
+                    .iter()
+                    .copied()
+                    .zip(values.iter().copied())
+                    .collect::<Vec<_>>()
+            });
+            for to in own {
+                layer.push(match &before {
+                    None => (
+                        self.free_sir(node, None, Some(*to)) * self.gain(None, Some(*to)),
+                        0,
+                    ),
+                    Some(before) => self.reached(node, before, Some(*to), floor),
+                });
+            }
+            layers.push(layer);
+        }
+        let last: Vec<_> = candidates
+            .last()?
+            .iter()
+            .copied()
+            .zip(layers.last()?.iter().copied())
+            .collect();
+        let (sir, mut at) = self.reached(candidates.len(), &last, None, floor);
+        if !(sir > 0.0 && sir >= floor) {
+            return None;
+        }
+        let mut chain = Vec::new();
+        for (own, layer) in candidates.iter().zip(&layers).rev() {
+            chain.push(*own.get(at)?);
+            at = layer.get(at)?.1;
+        }
+        chain.reverse();
+        Some((chain, sir))
+    }
+
+    /// Returns the best worst hop of a chain that ends at `to`, and the hop's other end.
+    fn reached(
+        &mut self,
+        node: usize,
+        before: &[(Candidate, (f64, usize))],
+        to: Option<Candidate>,
+        floor: f64,
+    ) -> (f64, usize) {
+        let separation = self.scene.min_separation_m;
+        let mut bounds: Vec<(f64, usize, Candidate, f64)> = Vec::new();
+        for (at, (from, (value, _))) in before.iter().enumerate() {
+            let is_apart = to.is_none_or(|to| {
+                to.x_m > from.x_m && (to.x_m - from.x_m).hypot(to.h_m - from.h_m) >= separation
+            });
+            if is_apart && *value > 0.0 && *value >= floor {
+                let free = self.free_sir(node, Some(*from), to);
+                if free >= floor {
+                    bounds.push((value.min(free), at, *from, free));
+                }
+            }
+        }
+        bounds.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut best = (0.0, 0);
+        for (bound, at, from, free) in bounds {
+            if bound <= best.0 {
+                break;
+            }
+            let value = bound.min(free * self.gain(Some(from), to));
+            if value > best.0 {
+                best = (value, at);
+            }
+        }
+        best
+    }
+}
+
+/// Returns the best positions of `relays` relays over the terrain, on the line.
+///
+/// # Errors
+/// [`NoPlan`]: an interference or a number of relays for which there is no search, terrain that is not covered, or no positions
+/// that are high enough.
+pub fn best(
+    scenario: &Scenario,
+    elevation: &Elevation,
+    relays: u16,
+    tolerance: f64,
+) -> Result<Plan, NoPlan> {
+    if relays > MOST_RELAYS {
+        return Err(NoPlan::Wrong(format!(
+            "--altitude terrain: must be with --uavs 1 to {MOST_RELAYS}, not {relays}"
+        )));
+    }
+    let scene = Scene::new(scenario, relays).ok_or_else(|| {
+        NoPlan::Wrong("--altitude terrain: needs an [[interferer]], not a [field]".to_owned())
+    })?;
+    let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
+    let mut search = Search::new(scenario, &scene, elevation).map_err(NoPlan::Wrong)?;
+    let columns = u32::from(relays * 8).max(80);
+    // The positions that ignore the terrain, as high as they have to be, are candidates: the search does no worse.
+    let mut seeds = vec![Vec::new(); usize::from(relays)];
+    let ask = PlanRequest {
+        number: Number::Of(relays),
+        free_altitude: true,
+        x_m: None,
+        tolerance,
+    };
+    if let Ok(blind) = super::plan(scenario, &ask) {
+        for ((relay, seeds), (place, _)) in seeds.iter_mut().enumerate().zip(&blind.places) {
+            let own_m = f64::from(place.altitude_m);
+            let level = |[low, high]: [f64; 2]| vec![own_m.clamp(low, high)];
+            *seeds = search
+                .column(relay, place.x_m.into(), level)
+                .map_err(NoPlan::Wrong)?;
+        }
+    }
+    // A coarse grid first: its best chain is a candidate of the grid, and the grid's floor.
+    let mut found: Option<(Vec<Candidate>, f64)> = None;
+    let mut highest: f64 = 0.0;
+    for (columns, levels) in [(columns / 4, LEVELS / 4), (columns, LEVELS)] {
+        let mut grid = search.grid(columns, levels).map_err(NoPlan::Wrong)?;
+        for (relay, (own, seeds)) in grid.iter_mut().zip(&seeds).enumerate() {
+            own.extend(seeds);
+            own.extend(found.as_ref().and_then(|(chain, _)| chain.get(relay)));
+            highest = own.iter().fold(highest, |most, at| most.max(at.h_m));
+        }
+        let floor = found.as_ref().map_or(0.0, |(_, sir)| *sir);
+        found = search.best(&grid, floor).or(found);
+    }
+    let Some((mut chain, mut sir)) = found else {
+        let why = "no positions over the terrain are high enough and far enough apart: check terrain.above_ground_m, terrain.above_ground_max_m and the band of altitudes";
+        return Err(NoPlan::Unmet(Why::Plain(why.to_owned()), None));
+    };
+    let step_m = scene.distance_m / f64::from(columns + 1);
+    let climb_m = highest / f64::from(LEVELS - 1);
+    for halving in 1..=REFINEMENTS {
+        let finer = 0.5_f64.powi(halving);
+        let around = search
+            .around(&chain, step_m * finer, climb_m * finer)
+            .map_err(NoPlan::Wrong)?;
+        if let Some((better, at_least)) = search.best(&around, sir) {
+            (chain, sir) = (better, at_least);
+        }
+    }
+    let places: Vec<Placement> = chain.iter().map(Candidate::placement).collect();
+    Ok(briefed
+        .plan(&places, "a search over the terrain", false)
+        .against(&scene))
+}
+
+impl Candidate {
+    /// Returns the position as relays have it. The altitude is rounded up, so that it stays above the ground.
+    #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
+    pub fn placement(&self) -> Placement {
+        let altitude_m = self.h_m as f32;
+        let is_lower = f64::from(altitude_m) < self.h_m;
+        Placement {
+            x_m: self.x_m as f32,
+            y_m: 0.0,
+            altitude_m: if is_lower {
+                altitude_m.next_up()
+            } else {
+                altitude_m
+            },
+        }
+    }
+}

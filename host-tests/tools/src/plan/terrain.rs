@@ -1,0 +1,156 @@
+//! Terrain below a plan: its elevation files, its report, and the picture of its profile.
+
+use std::path::PathBuf;
+
+use uav_relay_scenario::{Scenario, TerrainSpec};
+use uav_relay_terrain::diffraction::LIGHT_M_S;
+use uav_relay_terrain::grid::Terrain;
+use uav_relay_terrain::profile::{Ground, State, bulge_m};
+use uav_relay_terrain::report::{FreeSpace, TerrainReport};
+
+use super::Plan;
+use crate::figures::chart::{Axis, Chart, Line, Look, Stroke};
+
+/// Elevation model of a scenario.
+#[expect(missing_debug_implementations, reason = "millions of heights")]
+pub struct Elevation {
+    /// Terrain of the scenario; its files are those of `--dem`, if there are any.
+    pub spec: TerrainSpec,
+    terrain: Terrain,
+    /// Position error within which obstacles below a relay count, m.
+    position_error_m: f64,
+}
+
+impl Elevation {
+    /// Reads the elevation files of the scenario, or those in `dem` if there are any. `None` if there are no files.
+    ///
+    /// # Errors
+    /// A line that names the file and the problem.
+    pub fn load(
+        scenario: &Scenario,
+        dem: &[PathBuf],
+        position_error_m: f64,
+    ) -> Result<Option<Self>, String> {
+        let mut spec = scenario.terrain.clone();
+        if !dem.is_empty() {
+            let spec = spec.get_or_insert_with(|| TerrainSpec::of(Vec::new()));
+            spec.files = dem.to_vec();
+        }
+        let Some(spec) = spec else { return Ok(None) };
+        if scenario.line.is_none() {
+            return Err("site: is missing, which elevation files need; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }".to_owned());
+        }
+        let terrain = Terrain::load(&spec.files)?;
+        Ok(Some(Self {
+            spec,
+            terrain,
+            position_error_m,
+        }))
+    }
+
+    /// Returns the terrain along the line of `scenario`.
+    ///
+    /// # Errors
+    /// A line that names the site: the scenario has none, the files do not cover it, or its height contradicts them.
+    pub fn ground(&self, scenario: &Scenario) -> Result<Ground<'_>, String> {
+        let line = scenario.line.as_ref().ok_or("site: is missing")?;
+        Ground::new(&self.terrain, line.axis, line.sites, self.spec.mast_m)
+    }
+
+    /// Returns the report of the terrain below `plan`.
+    ///
+    /// # Errors
+    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    pub fn report(&self, scenario: &Scenario, plan: &Plan) -> Result<TerrainReport, String> {
+        let sirs_back = plan.sirs_back(scenario);
+        let free = FreeSpace {
+            sirs: &plan.sirs,
+            sirs_back: &sirs_back,
+            reverse: scenario.reverse,
+        };
+        let carrier_hz = scenario.channel.carrier_hz;
+        let ground = self.ground(scenario)?;
+        TerrainReport::new(
+            &ground,
+            &plan.chain(),
+            free,
+            carrier_hz,
+            self.position_error_m,
+        )
+    }
+
+    /// Returns a line that says why the chain of `report` cannot be flown; `None` if it can.
+    pub fn problem(&self, report: &TerrainReport) -> Option<String> {
+        let most_m = self.spec.above_ground_max_m;
+        let lines = [
+            report.blocked(),
+            report.too_low(self.spec.above_ground_m),
+            most_m.and_then(|most_m| report.too_high(most_m)),
+        ];
+        let lines: Vec<String> = lines.into_iter().flatten().collect();
+        (!lines.is_empty()).then(|| lines.join("; "))
+    }
+
+    pub(super) const fn position_error_m(&self) -> f64 {
+        self.position_error_m
+    }
+}
+
+/// Returns the picture of the profile: ground, hops with the first Fresnel zone, and nodes.
+///
+/// Heights are raised by the curvature of the earth with 4/3 of its radius, so that hops are straight.
+pub fn chart(report: &TerrainReport, scenario: &Scenario) -> Chart {
+    let wavelength_m = LIGHT_M_S / scenario.channel.carrier_hz;
+    let raised = |x: f64, height: f64| (x, height + bulge_m(x, scenario.distance_m));
+    let plain = |hue: usize, stroke| Look::number(hue).unsigned().joined(stroke);
+    let (mut ground, mut nodes) = (Vec::new(), Vec::new());
+    let mut hops = Vec::new();
+    for (profile, hop) in report.profiles.iter().zip(&report.hops) {
+        let [from, to] = profile.nodes;
+        let length = profile.length_m().max(f64::MIN_POSITIVE);
+        let at = |along: f64| {
+            let share = along / length;
+            let x = from.x_m + share * (to.x_m - from.x_m);
+            let (_, sight) = raised(from.x_m, from.amsl_m);
+            let (_, end) = raised(to.x_m, to.amsl_m);
+            (x, sight + share * (end - sight))
+        };
+        ground.extend(
+            profile
+                .points
+                .iter()
+                .map(|[along, height]| raised(at(*along).0, *height)),
+        );
+        nodes.extend([at(0.0), at(length)]);
+        let (name, hue) = match hop.state {
+            State::Clear => ("hop", 0),
+            State::Grazing => ("grazing hop", 4),
+            State::Blocked => ("blocked hop", 2),
+        };
+        hops.push(Line::new(
+            name,
+            plain(hue, Stroke::Full),
+            [at(0.0), at(length)],
+        ));
+        for side in [-1.0, 1.0] {
+            let edge = (0..=60_u32).map(|step| {
+                let along = length * f64::from(step) / 60.0;
+                let (x, height) = at(along);
+                (x, height + side * profile.fresnel_m(along, wavelength_m))
+            });
+            hops.push(Line::new(
+                "first Fresnel zone",
+                plain(5, Stroke::Dotted),
+                edge,
+            ));
+        }
+    }
+    hops.push(Line::new("ground", plain(3, Stroke::Full), ground));
+    let signs = Look::number(0).joined(Stroke::None);
+    hops.push(Line::new("Tx, relays, Rx", signs, nodes));
+    Chart::of(
+        Axis::linear("x (m)").between(0.0, scenario.distance_m),
+        Axis::linear("height above the sea (m)"),
+        hops,
+    )
+}

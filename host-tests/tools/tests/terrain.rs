@@ -1,0 +1,442 @@
+//! `cargo plan` over terrain: the search for positions, and the program with elevation files.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    missing_docs
+)]
+
+#[path = "../../terrain/tests/terrain/files.rs"]
+#[allow(dead_code)]
+mod files;
+
+use std::path::Path;
+use std::process::Command;
+
+use files::Raster;
+use rand::{RngExt as _, SeedableRng as _};
+use serde_json::Value;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_tools::plan::over_terrain::{self, Candidate, Search};
+use uav_relay_tools::plan::terrain::Elevation;
+use uav_relay_tools::plan::{Number, PlanRequest, plan};
+
+const EXAMPLE: &str = "../../examples/hills.toml";
+
+/// Random hills along a line of 5 km, and a scenario above them with `more` in its file.
+fn scene(folder: &Path, rng: &mut impl rand::Rng, more: &str) -> Scenario {
+    let mut wave = || {
+        let [east, north] = [(); 2].map(|()| rng.random_range(-1.0_f64..1.0) / 250.0);
+        [
+            east,
+            north,
+            rng.random_range(0.0..6.3),
+            rng.random_range(5.0..30.0),
+        ]
+    };
+    let waves: Vec<[f64; 4]> = (0..6).map(|_| wave()).collect();
+    let height = |lon: f64, lat: f64| {
+        let (x, y) = ((lon - 8.5) * 75_600.0, (lat - 47.2) * 111_200.0);
+        500.0
+            + waves
+                .iter()
+                .map(|[a, b, c, h]| h * (a * x + b * y + c).sin())
+                .sum::<f64>()
+    };
+    let raster = Raster::geographic(8.495, 47.205, 1.0 / 3600.0, [280, 37]);
+    raster.write(&folder.join("hills.tif"), height);
+    let [tx, rx] = [8.5, 8.566].map(|lon| {
+        format!(
+            "{{ lat_deg = 47.2, lon_deg = {lon}, amsl_m = {:.1} }}",
+            height(lon, 47.2)
+        )
+    });
+    let text = format!(
+        "[geometry]\naltitude_m = 120\naltitude_min_m = 20\naltitude_max_m = 120\nmin_separation_m = 4\n\
+         [site]\ntx = {tx}\nrx = {rx}\n[power]\ntx_w = 5\nuav_w = 1\n[noise]\nbandwidth_hz = 1e7\n\
+         [terrain]\nfiles = [\"hills.tif\"]\nmast_m = 5\nabove_ground_m = 30\nabove_ground_max_m = 120\n{more}\
+         [[interferer]]\npower_w = {:?}\nx_m = {:?}\ny_m = {:?}\n",
+        10_f64.powf(rng.random_range(-2.0..1.0)),
+        rng.random_range(-1000.0..6000.0),
+        rng.random_range(300.0..2000.0)
+    );
+    let file = folder.join("scene.toml");
+    std::fs::write(&file, text).unwrap();
+    Scenario::load(&file).unwrap()
+}
+
+fn rng(seed: u64) -> chacha20::ChaCha8Rng {
+    chacha20::ChaCha8Rng::seed_from_u64(seed)
+}
+
+fn elevation(scenario: &Scenario) -> Elevation {
+    Elevation::load(scenario, &[], 1.0).unwrap().unwrap()
+}
+
+/// Returns the largest worst hop of all chains with one candidate for each relay.
+fn brute_force(
+    search: &mut Search<'_>,
+    candidates: &[Vec<Candidate>],
+    chain: &mut Vec<Candidate>,
+    apart_m: f64,
+) -> f64 {
+    let Some(own) = candidates.get(chain.len()) else {
+        return search.worst_sir(chain);
+    };
+    let mut best: f64 = 0.0;
+    for at in own {
+        let is_apart = chain.last().is_none_or(|last| {
+            at.x_m > last.x_m && (at.x_m - last.x_m).hypot(at.h_m - last.h_m) >= apart_m
+        });
+        if is_apart {
+            chain.push(*at);
+            best = best.max(brute_force(search, candidates, chain, apart_m));
+            chain.pop();
+        }
+    }
+    best
+}
+
+#[test]
+fn the_search_finds_the_best_chain_of_a_small_grid() {
+    let folder = tempfile::tempdir().unwrap();
+    for (seed, relays, columns, levels) in [
+        (1, 1, 30, 5),
+        (2, 2, 12, 4),
+        (3, 3, 7, 3),
+        (4, 2, 12, 4),
+        (5, 3, 7, 3),
+    ] {
+        // Both directions, and a relay with a fixed altitude and another power.
+        let more = if seed > 3 {
+            "[link]\nreverse = 0.5\n[[relay]]\nindex = 2\naltitude_m = 90\npower_w = 0.3\n"
+        } else {
+            ""
+        };
+        let scenario = scene(folder.path(), &mut rng(seed), more);
+        let elevation = elevation(&scenario);
+        let scene = Scene::new(&scenario, relays).unwrap();
+        let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
+        let grid = search.grid(columns, levels).unwrap();
+        let (chain, sir) = search.best(&grid, 0.0).unwrap();
+        // A floor up to the result does not change it.
+        assert_eq!(
+            search.best(&grid, sir),
+            Some((chain.clone(), sir)),
+            "seed {seed}"
+        );
+        assert_eq!(search.best(&grid, sir * (1.0 + 1e-9)), None);
+        assert_eq!(chain.len(), usize::from(relays));
+        let all = brute_force(
+            &mut search,
+            &grid,
+            &mut Vec::new(),
+            scenario.min_separation_m,
+        );
+        assert!((sir / all - 1.0).abs() < 1e-12, "seed {seed}: {sir} {all}");
+        assert!(
+            (search.worst_sir(&chain) / all - 1.0).abs() < 1e-12,
+            "seed {seed}"
+        );
+    }
+}
+
+/// Compares positions over terrain with the joint method, and with all relays at 120 m.
+#[test]
+fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let number =
+        |name: &str, default| std::env::var(name).map_or(default, |text| text.parse().unwrap());
+    let (first, count) = (number("SEED", 1), number("COUNT", 6));
+    let (mut gains, mut flyable): ([Vec<f64>; 2], [u32; 3]) = Default::default();
+    for seed in first..first + count {
+        let rng = &mut rng(seed);
+        let scenario = scene(folder.path(), rng, "");
+        let elevation = elevation(&scenario);
+        let relays = rng.random_range(2..=8);
+        let ask = |free_altitude| PlanRequest {
+            number: Number::Of(relays),
+            free_altitude,
+            x_m: None,
+            tolerance: 1e-4,
+        };
+        let known = over_terrain::best(&scenario, &elevation, relays, 1e-4).unwrap();
+        let report = elevation.report(&scenario, &known).unwrap();
+        // The terrain is sampled more finely in the report.
+        let scene = Scene::new(&scenario, relays).unwrap();
+        assert!(
+            report.terrain_sir
+                <= scene.chain_sir(
+                    &known
+                        .places
+                        .iter()
+                        .map(|(place, _)| *place)
+                        .collect::<Vec<_>>()
+                ) * (1.0 + 1e-5)
+        );
+        assert!(report.too_low(30.0).is_none(), "seed {seed}: {report:?}");
+        assert!(report.too_high(120.0).is_none(), "seed {seed}: {report:?}");
+        flyable[0] += u32::from(elevation.problem(&report).is_none());
+        for (other, free_altitude) in [true, false].into_iter().enumerate() {
+            let blind = plan(&scenario, &ask(free_altitude)).unwrap();
+            let blind = elevation.report(&scenario, &blind).unwrap();
+            let gain = report.terrain_sir_db - blind.terrain_sir_db;
+            let is_flyable = elevation.problem(&blind).is_none();
+            assert!(!is_flyable || gain > -0.01, "seed {seed}: {gain}");
+            flyable[other + 1] += u32::from(is_flyable);
+            gains[other].push(gain);
+        }
+    }
+    for (name, gains) in ["the joint method", "all at 120 m"].iter().zip(&mut gains) {
+        gains.sort_by(f64::total_cmp);
+        let at = |share: f64| gains[(share * (gains.len() - 1) as f64).round() as usize];
+        println!(
+            "gain over {name}: 10 % {:.2}, median {:.2}, 90 % {:.2} dB",
+            at(0.1),
+            at(0.5),
+            at(0.9)
+        );
+        assert!(at(0.5) > -0.1, "{gains:?}");
+    }
+    println!(
+        "of {count} plans can be flown: {} over terrain, {} by the joint method, {} at 120 m",
+        flyable[0], flyable[1], flyable[2]
+    );
+}
+
+fn run(arguments: &str) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_plan"))
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (output.status.code(), out, err)
+}
+
+#[test]
+fn a_blocked_plan_is_refused_with_the_hop_the_place_and_the_metres() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (status, table, line) = run(&format!(
+        "--scenario {EXAMPLE} --uavs 6 --out {}",
+        path("plan.toml")
+    ));
+    assert_eq!(status, Some(1), "{line}");
+    assert!(
+        table.contains("terrain:  hop    state")
+            && table.contains("BLOCKED")
+            && table.contains("buildings and trees"),
+        "{table}"
+    );
+    assert!(line.contains("hop 2 (relay 1 to relay 2) is blocked: the ground at x = 1475 m, y = 0 m (latitude 47.200"), "{line}");
+    assert!(
+        line.contains(" is 34.7 m above the line of sight")
+            && line.contains("relay 1 is -13.0 m, ")
+            && line.trim_end().ends_with("--allow-blocked accepts it"),
+        "{line}"
+    );
+    assert!(!Path::new(&path("plan.toml")).exists());
+    let [svg, geojson, kml] = ["profile.svg", "plan.geojson", "plan.kml"].map(path);
+    let files = format!("--profile {svg} --geojson {geojson} --kml {kml}");
+    let (status, json, line) = run(&format!(
+        "--scenario {EXAMPLE} --uavs 6 --allow-blocked --json {files}"
+    ));
+    assert_eq!((status, line.as_str()), (Some(0), ""));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let hops = report["hops"].as_array().unwrap();
+    assert!(hops.len() == 7 && report["error"].is_null());
+    assert_eq!(
+        (&hops[1]["state"], &hops[1]["clear"]),
+        (&"blocked".into(), &false.into())
+    );
+    assert!(
+        hops[1]["diffraction_db"].as_f64().unwrap() > 60.0
+            && hops[1]["clearance_m"].as_f64().unwrap() < -34.0
+    );
+    assert!(hops[3]["clear"].as_bool().unwrap() && hops[3]["diffraction_db"].as_f64() == Some(0.0));
+    let worst = hops
+        .iter()
+        .map(|hop| hop["sir_db"].as_f64().unwrap())
+        .fold(f64::INFINITY, f64::min);
+    assert!((report["terrain_sir_db"].as_f64().unwrap() - worst).abs() < 1e-9);
+    assert_eq!(report["heights"].as_array().unwrap().len(), 6);
+    let read = |file: &str| std::fs::read_to_string(file).unwrap();
+    let svg = read(&svg);
+    roxmltree::Document::parse(&svg).unwrap();
+    for part in [
+        "blocked hop",
+        "first Fresnel zone",
+        "ground",
+        "Tx, relays, Rx",
+    ] {
+        assert!(svg.contains(part), "{part}");
+    }
+    let map: Value = serde_json::from_str(&read(&geojson)).unwrap();
+    let features = map["features"].as_array().unwrap();
+    let ground: Vec<&Value> = features
+        .iter()
+        .filter(|one| one["properties"]["kind"] == "ground")
+        .collect();
+    assert_eq!(ground.len(), 7);
+    let heights = ground[1]["properties"]["amsl_m"].as_array().unwrap();
+    assert_eq!(
+        heights.len(),
+        ground[1]["geometry"]["coordinates"]
+            .as_array()
+            .unwrap()
+            .len()
+    );
+    // The summit of the example.
+    assert!(
+        heights
+            .iter()
+            .any(|height| (height.as_f64().unwrap() - 582.0).abs() < 1.5),
+        "{heights:?}"
+    );
+    let hop = features
+        .iter()
+        .find(|one| one["properties"]["kind"] == "hop")
+        .unwrap();
+    assert!(
+        hop["properties"]["diffraction_db"].as_f64().unwrap() > 40.0,
+        "{hop}"
+    );
+    let kml = read(&kml);
+    roxmltree::Document::parse(&kml).unwrap();
+    let count = |part: &str| kml.matches(part).count();
+    assert_eq!(
+        (
+            count("clampToGround"),
+            count("ground of hop"),
+            count("track of hop")
+        ),
+        (7, 7, 7)
+    );
+}
+
+#[test]
+fn positions_over_terrain_are_reported_with_their_gain() {
+    let (status, json, line) = run(&format!(
+        "--scenario {EXAMPLE} --uavs 6 --altitude terrain --json"
+    ));
+    assert_eq!((status, line.as_str()), (Some(0), ""));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let number = |key: &str| report[key].as_f64().unwrap();
+    assert!(
+        (number("terrain_sir_db") - number("blind_sir_db") - number("terrain_gain_db")).abs()
+            < 1e-9
+    );
+    assert!(
+        number("terrain_gain_db") > -0.1 && number("terrain_sir_db") > 20.0,
+        "{report}"
+    );
+    assert_eq!(report["how"], "a search over the terrain");
+    let problem = report["blind_problem"].as_str().unwrap();
+    assert!(
+        problem
+            .contains(" m above the ground; allowed: at most 120 m (terrain.above_ground_max_m)"),
+        "{problem}"
+    );
+    assert!(
+        report["heights"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|relay| relay["above_obstacle_m"].as_f64().unwrap() >= 29.99)
+    );
+}
+
+#[test]
+fn wrong_elevation_files_and_options_are_named_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    Raster::geographic(8.495, 47.205, 1.0 / 3600.0, [100, 37])
+        .write(&folder.path().join("half.tif"), |_, _| 490.0);
+    let text = std::fs::read_to_string(EXAMPLE).unwrap();
+    let write = |name: &str, from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(folder.path().join(name), text.replace(from, to)).unwrap();
+    };
+    write(
+        "swapped.toml",
+        "lat_deg = 47.20, lon_deg = 8.510",
+        "lat_deg = 8.510, lon_deg = 47.20",
+    );
+    let both = text.replace(
+        "lat_deg = 47.20, lon_deg = 8.5",
+        "lon_deg = 47.20, lat_deg = 8.5",
+    );
+    std::fs::write(folder.path().join("both.toml"), both).unwrap();
+    write("none.toml", "[\"hills.tif\"]", "[]");
+    write(
+        "least.toml",
+        "above_ground_max_m = 120.0",
+        "above_ground_max_m = 20.0",
+    );
+    write("deep.toml", "amsl_m = 500.0", "amsl_m = 400.0");
+    let hills = "../../examples/hills.tif";
+    let scenario = format!("--scenario {EXAMPLE}");
+    let of = |name: &str| format!("--scenario {}", path(name));
+    for (arguments, part) in [
+        (
+            format!("--dem {hills}"),
+            "default scenario: site: is missing, which elevation files need",
+        ),
+        (
+            format!("{scenario} --dem {}", path("missing.tif")),
+            "missing.tif: No such file",
+        ),
+        (
+            format!("{scenario} --dem {}", path("half.tif")),
+            "hills.toml: site.rx: latitude 47.200000, longitude 8.576000 is not covered by the elevation files: ",
+        ),
+        (of("swapped.toml"), "site = "),
+        (
+            format!("{} --dem {hills}", of("both.toml")),
+            "site.tx: latitude 8.510000, longitude 47.200000 is not covered",
+        ),
+        (
+            of("none.toml"),
+            "none.toml: terrain.files = [] has no entry; allowed: a list of 1 or more strings",
+        ),
+        (
+            of("least.toml"),
+            "least.toml: terrain.above_ground_max_m = 20 is out of range; allowed: at least above_ground_m, 30 m",
+        ),
+        (
+            format!("{} --dem {hills}", of("deep.toml")),
+            "site.rx.amsl_m = 400: the elevation files have 495.0 m there; allowed: a difference of at most 50 m",
+        ),
+        (
+            format!("--profile {}", path("p.svg")),
+            "needs elevation files: --dem FILE, or terrain.files",
+        ),
+        (
+            "--altitude terrain".to_owned(),
+            "--altitude terrain: needs elevation files",
+        ),
+        (
+            format!("{scenario} --altitude terrain --out {}", path("o.toml")),
+            "--altitude terrain: cannot be used with --out",
+        ),
+        (
+            format!("{scenario} --altitude terrain --bandwidth-hz 1e7"),
+            "--altitude terrain: has no data rates",
+        ),
+    ] {
+        let (status, _, line) = run(&format!("--uavs 3 {arguments}"));
+        assert!(
+            status == Some(2) && line.contains(part) && line.trim_end().lines().count() == 1,
+            "{arguments}: {status:?} {line}"
+        );
+    }
+    let (status, _, line) = run(&format!("--target-sir 3 {scenario} --altitude terrain"));
+    assert!(
+        status == Some(2) && line.contains("--altitude terrain: needs --uavs N"),
+        "{line}"
+    );
+}
