@@ -1,7 +1,9 @@
 //! Second implementation of the delta-Bullington method, which shares no code with the first.
 //!
-//! It has kilometres, gigahertz and the numeric constants of Recommendations ITU-R P.452 and P.1812, whose section on
+//! It has kilometres, gigahertz and the formulas of Recommendations ITU-R P.452 and P.1812, whose section on
 //! diffraction is the same method.
+
+use std::f64::consts::PI;
 
 /// Profile and link as the Recommendation has them.
 pub(crate) struct Path {
@@ -59,23 +61,35 @@ fn bullington(d: &[f64], h: &[f64], hts: f64, hrs: f64, wavelength: f64) -> f64 
     luc + (1.0 - (-luc / 6.0).exp()) * (10.0 + 0.02 * dtot)
 }
 
-fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, f_ghz: f64, vertical: bool) -> f64 {
+fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
+    let Path {
+        f_ghz,
+        vertical,
+        light,
+        ..
+    } = *path;
+    // The Recommendations round these to 21.88, 0.9575, 0.036 and 18: 0.1 dB at losses above 100 dB.
+    let per_km = PI * 1e12 / light;
+    let to_x = per_km.powf(1.0 / 3.0);
+    let to_y = 2.0 * (per_km * per_km / 1e9).powf(1.0 / 3.0);
+    let to_k = (2.0 * per_km).powf(-1.0 / 3.0);
+    let to_s = 60e-9 * light;
     let (er, sigma) = (22.0_f64, 0.003);
-    let s = (18.0 * sigma / f_ghz).powi(2);
-    let mut k = 0.036 / ((a_km * f_ghz).powf(1.0 / 3.0) * ((er - 1.0).powi(2) + s).powf(0.25));
+    let s = (to_s * sigma / f_ghz).powi(2);
+    let mut k = to_k / ((a_km * f_ghz).powf(1.0 / 3.0) * ((er - 1.0).powi(2) + s).powf(0.25));
     if vertical {
         k *= (er * er + s).sqrt();
     }
     let beta =
         (1.0 + 1.6 * k.powi(2) + 0.67 * k.powi(4)) / (1.0 + 4.5 * k.powi(2) + 1.53 * k.powi(4));
-    let x = 21.88 * beta * (f_ghz / (a_km * a_km)).powf(1.0 / 3.0) * d_km;
+    let x = to_x * beta * (f_ghz / (a_km * a_km)).powf(1.0 / 3.0) * d_km;
     let fx = if x >= 1.6 {
         11.0 + 10.0 * x.log10() - 17.6 * x
     } else {
         -20.0 * x.log10() - 5.6488 * x.powf(1.425)
     };
     let g = |h: f64| {
-        let b = beta * 0.9575 * beta * (f_ghz * f_ghz / a_km).powf(1.0 / 3.0) * h;
+        let b = beta * to_y * beta * (f_ghz * f_ghz / a_km).powf(1.0 / 3.0) * h;
         let g = if b > 2.0 {
             17.6 * (b - 1.1).sqrt() - 5.0 * (b - 1.1).log10() - 8.0
         } else {
@@ -92,7 +106,7 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, f_ghz: f64, vertical: bool
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
     let horizon = (2.0 * AE_KM / 1000.0).sqrt() * (h1.sqrt() + h2.sqrt());
     if d_km >= horizon {
-        return first_term(d_km, h1, h2, AE_KM, path.f_ghz, path.vertical);
+        return first_term(d_km, h1, h2, AE_KM, path);
     }
     let above = |h: f64, d: f64| h - 500.0 * d * d / AE_KM;
     let (mut low, mut high) = (0.0, d_km);
@@ -112,7 +126,7 @@ fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
         return 0.0;
     }
     let touching = 500.0 * (d_km / (h1.sqrt() + h2.sqrt())).powi(2);
-    let ft = first_term(d_km, h1, h2, touching, path.f_ghz, path.vertical);
+    let ft = first_term(d_km, h1, h2, touching, path);
     if ft < 0.0 {
         0.0
     } else {
