@@ -30,6 +30,9 @@ const ALIGNED: f64 = 0.02;
 /// Metres per degree of latitude, for the size of cells and the text of errors.
 const PER_DEGREE_M: f64 = 111_320.0;
 
+/// Tag of GDAL's metadata: XML with the scale, the offset and the unit of the values.
+const GDAL_METADATA: u16 = 42112;
+
 /// Coordinate system of a grid.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum System {
@@ -406,6 +409,21 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
             "has heights in the unit {unit} (key 4099); allowed: 9001, metres"
         ));
     }
+    let metadata = decoder.get_tag_ascii_string(Tag::Unknown(GDAL_METADATA));
+    for role in ["scale", "offset", "unittype"] {
+        let value = metadata
+            .as_ref()
+            .ok()
+            .and_then(|text| metadatum(text, role));
+        if let Some(value) = value.filter(|value| !["1", "0", "m", "metre"].contains(value)) {
+            return Err(format!(
+                "has heights with the {role} {value} (tag {GDAL_METADATA}); allowed: plain metres"
+            ));
+        }
+    }
+    if decoder.get_tag_u32(Tag::PhotometricInterpretation).ok() == Some(0) {
+        return Err("has inverted values (PhotometricInterpretation 0); allowed: 1".to_owned());
+    }
     let scale = decoder
         .get_tag_f64_vec(Tag::ModelPixelScaleTag)
         .unwrap_or_default();
@@ -451,6 +469,13 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
         heights,
         nodata,
     })
+}
+
+/// Returns the value of the item `role` of GDAL's metadata; `None` if there is none.
+fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
+    let (_, after) = text.split_once(&format!("role=\"{role}\""))?;
+    let (_, value) = after.split_once('>')?;
+    Some(value.split_once('<')?.0.trim())
 }
 
 /// Converts the values of a picture to heights.

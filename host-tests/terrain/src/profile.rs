@@ -24,7 +24,7 @@ pub const FREE: f64 = 0.6;
 const MOST_POINTS: f64 = 20_000.0;
 
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
-pub const SITE_ERROR_M: f64 = 50.0;
+pub const SITE_ERROR_M: f64 = 15.0;
 
 /// Terrain along the line from Tx to Rx.
 #[derive(Clone, Copy)]
@@ -107,11 +107,10 @@ impl<'a> Ground<'a> {
             let amsl_m = f64::from(site.amsl_mm) / 1e3;
             if (ground_m - amsl_m).abs() > SITE_ERROR_M {
                 return Err(format!(
-                    "site.{name}.amsl_m = {amsl_m}: the elevation files have {ground_m:.1} m there; allowed: a difference of at most {SITE_ERROR_M} m"
+                    "site.{name}.amsl_m = {amsl_m}: the elevation files have {ground_m:.1} m there; allowed: a difference of at most {SITE_ERROR_M} m (heights above the mean sea level; those of a satellite receiver may be above the ellipsoid, up to 100 m away)"
                 ));
             }
-            // The antenna is above the ground of both.
-            end.amsl_m = ground_m.max(amsl_m) + mast_m;
+            end.amsl_m = ground_m + mast_m;
         }
         let lat_deg = f64::from(sites[0].lat_e7) / 1e7;
         let step_m = terrain.cell_m(lat_deg) / 4.0;

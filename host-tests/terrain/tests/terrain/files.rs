@@ -14,6 +14,8 @@ pub(crate) struct Raster {
     pub(crate) nodata: Option<f32>,
     /// True if the tie point is a height, false if it is the corner of a cell.
     pub(crate) is_point: bool,
+    /// GDAL's metadata, XML.
+    pub(crate) metadata: Option<&'static str>,
 }
 
 impl Raster {
@@ -26,6 +28,7 @@ impl Raster {
             epsg: 4326,
             nodata: None,
             is_point: true,
+            metadata: None,
         }
     }
 
@@ -72,6 +75,9 @@ impl Raster {
         if let Some(nodata) = self.nodata {
             tags.write_tag(Tag::GdalNodata, nodata.to_string().as_str())
                 .unwrap();
+        }
+        if let Some(metadata) = self.metadata {
+            tags.write_tag(Tag::Unknown(42112), metadata).unwrap();
         }
         image.write_data(&values).unwrap();
     }

@@ -109,6 +109,7 @@ fn utm_grids_have_the_heights_of_an_independent_projection() {
             epsg,
             nodata: None,
             is_point: false,
+            metadata: None,
         };
         let file = folder.path().join("utm.tif");
         raster.write(&file, height);
@@ -158,6 +159,22 @@ fn unusable_files_and_places_are_named() {
         ..geographic()
     }
     .write(&file("swiss.tif"), |_, _| 1.0);
+    for (name, metadata) in [
+        (
+            "decimetres.tif",
+            r#"<Item name="SCALE" sample="0" role="scale">0.1</Item>"#,
+        ),
+        (
+            "feet.tif",
+            r#"<Item name="UNITTYPE" sample="0" role="unittype">ft</Item>"#,
+        ),
+    ] {
+        Raster {
+            metadata: Some(metadata),
+            ..geographic()
+        }
+        .write(&file(name), plane);
+    }
     std::fs::write(file("N47E008.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("zurich.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("text.tif"), "no picture").unwrap();
@@ -178,6 +195,14 @@ fn unusable_files_and_places_are_named() {
             &["N47E008.hgt: has 1000 bytes; allowed: 2 bytes for each of 1201 x 1201"],
         ),
         (&["zurich.hgt"], &["zurich.hgt: its name must begin with"]),
+        (
+            &["decimetres.tif"],
+            &["decimetres.tif: has heights with the scale 0.1 (tag 42112); allowed: plain metres"],
+        ),
+        (
+            &["feet.tif"],
+            &["feet.tif: has heights with the unittype ft (tag 42112); allowed: plain metres"],
+        ),
         (
             &["swiss.tif"],
             &["swiss.tif: has the EPSG code 2056; allowed: 4326"],

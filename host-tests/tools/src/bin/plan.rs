@@ -77,11 +77,18 @@ fn run(options: &Options) -> Result<(), Failure> {
             if let Some(file) = &options.svg {
                 command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
             }
-            let (terrain, error) = terrain(options, &scenario, elevation.as_ref(), &plan)?;
+            let (terrain, error) =
+                terrain(options, &scenario, elevation.as_ref(), (&plan, number))?;
             write_map(options, &scenario, &plan, terrain.as_ref())?;
             let next = match error {
                 Some(_) => String::new(),
-                None => write_out(options, &scenario, (&plan, number), radio.as_ref())?,
+                None => write_out(
+                    options,
+                    &scenario,
+                    (&plan, number),
+                    radio.as_ref(),
+                    elevation.as_ref(),
+                )?,
             };
             let rates = rates.map(listed);
             let known = elevation.as_ref().zip(terrain.as_ref());
@@ -235,7 +242,7 @@ fn compared(
         Ok(blind) => OverTerrain {
             blind_sir_db: Some(blind.terrain_sir_db),
             terrain_gain_db: Some(terrain.terrain_sir_db - blind.terrain_sir_db),
-            blind_problem: elevation.problem(&blind),
+            blind_problem: elevation.problem(&blind, false),
         },
         Err(line) => OverTerrain {
             blind_sir_db: None,
@@ -291,7 +298,7 @@ fn terrain(
     options: &Options,
     scenario: &Scenario,
     elevation: Option<&Elevation>,
-    plan: &Plan,
+    (plan, number): (&Plan, Number),
 ) -> Result<(Option<TerrainReport>, Option<String>), Failure> {
     let Some(elevation) = elevation else {
         return Ok((None, None));
@@ -304,11 +311,18 @@ fn terrain(
         let drawing = drawing.map_err(|error| Failure::input(format!("--profile: {error:?}")))?;
         save(file, "--profile", &drawing)?;
     }
-    let problem = elevation
-        .problem(&report)
-        .filter(|_| !options.terrain.allow_blocked);
-    let error = problem.map(|line| format!("{line}; --allow-blocked accepts it"));
-    Ok((Some(report), error))
+    let missed = match number {
+        Number::Meeting(target) if report.terrain_sir < target * (1.0 - options.tolerance) => {
+            Some(format!(
+                "the worst hop has {:.2} dB with terrain, below the target of {:.2} dB, which --target-sir finds without terrain: give --uavs and --altitude terrain",
+                report.terrain_sir_db,
+                db(target)
+            ))
+        }
+        _ => None,
+    };
+    let problem = elevation.problem(&report, options.terrain.allow_blocked);
+    Ok((Some(report), problem.or(missed)))
 }
 
 fn by_rate(
@@ -450,8 +464,7 @@ struct TerrainOptions {
     /// diffraction loss (ITU-R P.526), and the heights of the relays above the ground. Needs a scenario with a site
     #[arg(long, value_name = "FILE")]
     dem: Vec<PathBuf>,
-    /// Accept a plan with a blocked hop, or with a relay too low or too high above the ground. The limits
-    /// are terrain.above_ground_m and terrain.above_ground_max_m
+    /// Accept a plan with a blocked hop
     #[arg(long)]
     allow_blocked: bool,
     /// Draw ground, hops and their first Fresnel zones (SVG). Needs elevation files
@@ -589,6 +602,7 @@ fn write_out(
     scenario: &Scenario,
     (plan, number): (&Plan, Number),
     radio: Option<&Radio>,
+    elevation: Option<&Elevation>,
 ) -> Result<String, Failure> {
     let Some(file) = &options.out else {
         return Ok(String::new());
@@ -625,6 +639,17 @@ fn write_out(
         if rate_bps < target_bps * (1.0 - options.tolerance) {
             return Err(Failure::unmet(format!(
                 "--out {}: not written: the positions on which {relays} relays would agree carry {rate_bps:.6e} bit/s, below the target of {target_bps:.6e} bit/s; give a larger --uavs",
+                file.display()
+            )));
+        }
+    }
+    if let Some(elevation) = elevation {
+        let report = elevation
+            .report(scenario, &flown.plan)
+            .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
+        if let Some(line) = elevation.problem(&report, options.terrain.allow_blocked) {
+            return Err(Failure::unmet(format!(
+                "--out {}: not written: at the positions on which {relays} relays would agree, {line}",
                 file.display()
             )));
         }

@@ -80,12 +80,15 @@ impl Elevation {
     }
 
     /// Returns a line that says why the chain of `report` cannot be flown; `None` if it can.
-    pub fn problem(&self, report: &TerrainReport) -> Option<String> {
+    ///
+    /// Blocked hops are no reason if `allow_blocked`.
+    pub fn problem(&self, report: &TerrainReport, allow_blocked: bool) -> Option<String> {
         let most_m = self.spec.above_ground_max_m;
+        let blocked = report.blocked().filter(|_| !allow_blocked);
         let lines = [
-            report.blocked(),
             report.too_low(self.spec.above_ground_m),
             most_m.and_then(|most_m| report.too_high(most_m)),
+            blocked.map(|line| format!("{line}; --allow-blocked accepts it")),
         ];
         let lines: Vec<String> = lines.into_iter().flatten().collect();
         (!lines.is_empty()).then(|| lines.join("; "))
