@@ -7,6 +7,8 @@
 //! | SIR beyond [`LIMIT_DB`], also an infinite one | the limit |
 //! | text | without control characters and direction marks, at most [`LONGEST_TEXT`] characters |
 
+use serde_json::Value;
+
 use crate::snapshot::{LogLine, Position, Snapshot};
 
 /// Largest coordinate, m.
@@ -53,6 +55,17 @@ pub fn clean(snapshot: &mut Snapshot) {
         .retain(|area| area.iter().flatten().copied().all(is_near));
     for alarm in &mut snapshot.alarms {
         text(&mut alarm.text);
+    }
+    snapshot.desk.as_mut().map(clean_value);
+}
+
+/// Cleans all texts of a value.
+fn clean_value(value: &mut Value) {
+    match value {
+        Value::String(it) => text(it),
+        Value::Array(all) => all.iter_mut().for_each(clean_value),
+        Value::Object(all) => all.values_mut().for_each(clean_value),
+        _ => {}
     }
 }
 

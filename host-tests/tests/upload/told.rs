@@ -345,9 +345,13 @@ fn the_newer_upload_of_two_stations_is_flown() {
             let newer = usize::from(uploads[1].id() > uploads[0].id());
             let begun = wires.bench.now;
             let over = |it: &Wires| {
-                let flown = matches!(it.progress(ENDS[newer]), Progress::Flown { .. });
-                let other = it.progress(ENDS[1 - newer]);
-                flown && matches!(other, Progress::Outdated { .. } | Progress::Flown { .. })
+                let is_flown = |at: usize| matches!(it.progress(ENDS[at]), Progress::Flown { .. });
+                let is_over = |at: usize| {
+                    is_flown(at) || matches!(it.progress(ENDS[at]), Progress::Outdated { .. })
+                };
+                // Of two missions with one version the first one at the relays remains.
+                let is_first = versions[0] == versions[1] && is_flown(1 - newer);
+                (is_flown(newer) || is_first) && is_over(newer) && is_over(1 - newer)
             };
             assert!(
                 wires.until(300, over),

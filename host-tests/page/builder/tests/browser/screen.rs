@@ -284,7 +284,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
     let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
     let desk = serde_json::json!({
-        "sited": false, "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
+        "sited": false, "shown": "1,0x00ab", "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
         "preview": {
             "changes": [{ "value": "altitude", "old": "20 m", "new": "30 m" }], "worst_before": [1.0, null], "worst_after": [2.25, -3.5],
             "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34) }],
@@ -315,11 +315,24 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     let task = next();
     assert_eq!(
         (task.task, &task.body[..]),
-        (Task::Preview, "{\"altitude\":\"30\"}")
+        (
+            Task::Preview,
+            "{\"altitude\":\"30\",\"shown\":\"1,0x00ab\"}"
+        )
     );
     task.reply(Ok("{\"preview\":1}".to_owned()));
     browser.until("!byId('hold').disabled");
-    let press = "byId('hold').dispatchEvent(new PointerEvent('pointerdown'))";
+    let press = "byId('hold').dispatchEvent(new PointerEvent('pointerdown', { isPrimary: true }))";
+    // Other buttons and fingers do not hold it, and a press ends with the focus of the window.
+    for part in ["{ isPrimary: true, button: 2 }", "{}"] {
+        browser.run(&format!(
+            "byId('hold').dispatchEvent(new PointerEvent('pointerdown', {part}))"
+        ));
+        assert_eq!(browser.value("desk.held"), 0);
+    }
+    browser.run(press);
+    browser.run("window.dispatchEvent(new Event('blur'))");
+    assert_eq!(browser.value("desk.held"), 0);
     browser.run(press);
     thread::sleep(Duration::from_millis(700));
     browser.run("byId('hold').dispatchEvent(new PointerEvent('pointerup'))");
@@ -339,7 +352,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
         "{:?}",
         begun.elapsed()
     );
-    let body = "{\"preview\":1,\"digest\":\"0x1234\"}";
+    let body = "{\"preview\":1,\"digest\":\"0x1234\",\"time_s\":0}";
     assert_eq!((task.task, &task.body[..]), (Task::Upload, body));
     task.reply(Err("preview 1 was used already".to_owned()));
     browser
@@ -361,6 +374,28 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     );
     assert_eq!(browser.value("map.fitted"), true);
     task.reply(Err("no".to_owned()));
+    // An answer to values that were edited meanwhile is dropped, and so is the preview of an earlier run of the station.
+    browser.run("preview()");
+    let task = next();
+    browser.run("edited()");
+    task.reply(Ok("{\"preview\":1}".to_owned()));
+    thread::sleep(Duration::from_millis(500));
+    assert_eq!(browser.value("desk.mine"), Value::Null);
+    browser.run("preview()");
+    next().reply(Ok("{\"preview\":1}".to_owned()));
+    browser.until("!byId('hold').disabled");
+    browser.run("show({ ...received.last, run: 'another' })");
+    assert_eq!(browser.value("isReady()"), false);
+    // After its own upload the form is empty.
+    browser.run(
+        "desk.mine = 1; takeDesk({ token: desk.token, desk: { ...desk.state, stage: 'flown' } })",
+    );
+    assert_eq!(browser.value("Object.keys(values()).length"), 0);
+    // A task without an answer is given up.
+    browser.run("preview()");
+    let task = next();
+    browser.until("byId('desk-state').textContent.startsWith('No answer for 4 s')");
+    drop(task);
     save("desk", &browser.screenshot());
     // The browser reports each refused request.
     let errors = browser.errors();
