@@ -104,6 +104,8 @@ fn text(text: &mut String) {
 mod tests {
     #![allow(clippy::indexing_slicing, reason = "a test fails by it")]
 
+    use serde_json::json;
+
     use super::{clean, clean_line};
     use crate::snapshot::{
         Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot, Snapshot,
@@ -115,6 +117,20 @@ mod tests {
             y_m,
             altitude_m,
         }
+    }
+
+    #[test]
+    fn all_texts_of_the_desk_are_cleaned() {
+        let mut snapshot = Snapshot {
+            desk: Some(
+                json!({ "fault": "a\u{202e}b\n", "changes": [{ "old": "x".repeat(400) }], "number": 1 }),
+            ),
+            ..Snapshot::default()
+        };
+        clean(&mut snapshot);
+        let expected =
+            json!({ "fault": "ab", "changes": [{ "old": "x".repeat(300) }], "number": 1 });
+        assert_eq!(snapshot.desk, Some(expected));
     }
 
     #[test]

@@ -472,6 +472,11 @@ fn wrong_passwords_are_limited_and_a_page_without_one_is_refused() {
     let right = "Authorization: Basic OmNvcnJlY3QgaG9yc2U=\r\n";
     let wrong = "Authorization: Basic OmNvcnJlY3QgaG9yc2Y=\r\n";
     assert!(with(right).starts_with("HTTP/1.1 200 "));
+    // A foreign page's link with a wrong password is no try of this browser.
+    let link = format!("Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: navigate\r\n{wrong}");
+    for _ in 0..20 {
+        assert!(with(&link).starts_with("HTTP/1.1 403 "));
+    }
     let mut statuses: Vec<String> = Vec::new();
     thread::scope(|scope| {
         let tries: Vec<_> = (0..30).map(|_| scope.spawn(|| with(wrong))).collect();
