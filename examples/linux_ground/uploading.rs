@@ -71,7 +71,9 @@ pub(crate) struct Form {
     pub(crate) new: NewOptions,
     /// New position of the receiver in the coordinates of the present line, x and y in m.
     pub(crate) receiver_m: Option<[f32; 2]>,
-    /// Mission whose line the coordinates of the form are for, as [`name_of`] returns it; `None` without coordinates or a map.
+    /// Mission whose line the coordinates of the form are for, as [`name_of`] returns it.
+    ///
+    /// `None` without coordinates or a map.
     pub(crate) shown: Option<String>,
 }
 
@@ -521,7 +523,7 @@ impl Uploading {
     }
 }
 
-/// Returns the version of a mission and the digest of the upload that brought it, as the page sends them back.
+/// Returns a mission's version and the digest of its upload, as the page sends them back.
 pub(crate) fn name_of(version: u16, upload: Option<&Upload>) -> String {
     upload.map_or_else(
         || version.to_string(),

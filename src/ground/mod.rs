@@ -775,7 +775,7 @@ pub enum Progress {
         /// farther from the station.
         by: u16,
     },
-    /// The upload is outdated, because a relay has stored a newer mission, or another one with the same version.
+    /// The upload is outdated: a relay has stored a newer mission, or another with its version.
     Outdated {
         /// Version of the stored mission.
         version: u16,

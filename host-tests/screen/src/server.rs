@@ -165,7 +165,9 @@ pub struct Post {
 }
 
 impl Post {
-    /// Returns true if the program may do the task: the browser still waits, and from now on gets no refusal.
+    /// Returns true if the program may do the task.
+    ///
+    /// The browser still waits then, and from now on gets no refusal.
     pub fn begin(&self) -> bool {
         !self.is_settled.swap(true, Ordering::SeqCst)
     }
@@ -450,7 +452,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the address under which a computer is counted: one for all loopback addresses, and one for an IPv6 network of 64 bits.
+/// Returns the address under which a computer is counted.
+///
+/// It is one for all loopback addresses, and one for an IPv6 network of 64 bits.
 fn counted_as(peer: IpAddr) -> IpAddr {
     let peer = peer.to_canonical();
     match peer {

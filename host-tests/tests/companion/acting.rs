@@ -54,6 +54,19 @@ impl Page {
         self.sends(path, &body, ["", ""])
     }
 
+    /// Checks that an upload that was held on the way, or is without the time of the page, is refused.
+    fn refuses_old_times(&self, request: &Value) {
+        let refused = self.sends("/upload", request, ["", ""]);
+        assert!(refused.1.contains("missing field `time_s`"), "{refused:?}");
+        let mut request = request.clone();
+        request["time_s"] = json!(self.newest()["time_s"].as_f64().unwrap() - 6.0);
+        let refused = self.post("/upload", &request);
+        assert!(
+            refused.0 == 409 && refused.1.contains("must be at most 5 s"),
+            "{refused:?}"
+        );
+    }
+
     /// Returns the state of the tasks once it is at `stage`.
     fn until(&self, stage: &str) -> Value {
         let begun = Instant::now();
@@ -139,28 +152,14 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let refused = page.post("/upload", &json!({ "preview": 2, "digest": "0x0000" }));
     assert!(refused.1.contains("has the digest 0x"), "{refused:?}");
     assert!(!chain.relays[0].has_printed("uploaded: "));
-    let mut request = json!({ "preview": 2, "digest": digest });
-    // A request that was held on the way, or is without the time of the page, is refused.
-    let time_s = page.newest()["time_s"].as_f64().unwrap();
-    request["time_s"] = json!(time_s - 6.0);
-    let refused = page.post("/upload", &request);
-    assert!(
-        refused.0 == 409 && refused.1.contains("must be at most 5 s"),
-        "{refused:?}"
-    );
-    let refused = page.sends(
-        "/upload",
-        &json!({ "preview": 2, "digest": digest }),
-        ["", ""],
-    );
-    assert!(refused.1.contains("missing field `time_s`"), "{refused:?}");
+    let request = json!({ "preview": 2, "digest": digest });
+    page.refuses_old_times(&request);
     // A preview is not shown as the flown mission.
     let shown = page.newest();
     assert!(
         shown["desk"]["adopted"] == json!([]) && shown["desk"]["shown"] == "0",
         "{shown:#}"
     );
-    request["time_s"] = Value::Null;
     assert_eq!(page.post("/upload", &request).0, 200);
     // The same request again is refused at once, and later.
     let again = (
