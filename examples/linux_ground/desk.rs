@@ -2,8 +2,8 @@
 //!
 //! | request | answer |
 //! | --- | --- |
-//! | `preview`: values of the new mission by the names of the `--new-` options, and `receiver` as `X,Y` | the preview's number; the result is part of the snapshots |
-//! | `upload`: number and digest of the newest preview, which the page has shown | the upload begins. Each preview can be uploaded once |
+//! | `preview`: values of the new mission by the names of the `--new-` options, `receiver` as `X,Y`, and `shown`, the mission of the map | the preview's number; the result is part of the snapshots |
+//! | `upload`: number and digest of the newest preview, which the page has shown, and the time of the page's newest snapshot | the upload begins. Each preview can be uploaded once |
 //!
 //! Both use the stages of an upload from the command line.
 
@@ -15,7 +15,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Geodetic, Ground, Instant, Mission, Placement, Profile, Report, Sites, Upload, UploadError,
+    Duration, Geodetic, Ground, Instant, Mission, Placement, Profile, Report, Sites, Upload,
+    UploadError,
 };
 use uav_relay_linux::command::one_line;
 use uav_relay_linux::log::Log;
@@ -31,6 +32,15 @@ use crate::uploading::{Form, Preview, Uploading, digest_of};
 
 /// Distance from the agreed position at which a drone has arrived, m.
 const ARRIVED_M: f32 = 1.0;
+
+/// Largest age of the snapshot with which a page uploads, s. A request that was held on the way is older.
+const OLDEST_S: f64 = 5.0;
+
+/// Largest number of characters of a task's answer in the log.
+const LOGGED: usize = 300;
+
+/// Time after a refused task in which further ones are not logged.
+const QUIET: Duration = Duration::from_millis(1_000);
 
 /// Largest number of tasks that are handled at once.
 const AT_ONCE: usize = 4;
@@ -54,6 +64,8 @@ struct Words {
 struct Confirmed {
     preview: u32,
     digest: String,
+    /// Time of the newest snapshot that the page had, s.
+    time_s: f64,
 }
 
 /// Tasks of the page and of the status socket.
@@ -63,6 +75,8 @@ pub(crate) struct Desk {
     posts: Option<Receiver<Post>>,
     /// Number of previews so far.
     previews: u32,
+    /// Time from which on a refused task is logged.
+    logs_at: Instant,
 }
 
 /// Parts of a station that a task needs.
@@ -74,14 +88,19 @@ pub(crate) struct Parts<'a> {
 
 impl Desk {
     pub(crate) const fn new(posts: Option<Receiver<Post>>) -> Self {
-        Self { posts, previews: 0 }
+        Self {
+            posts,
+            previews: 0,
+            logs_at: Instant::ZERO,
+        }
     }
 
     /// Handles the tasks of the page that have arrived.
     pub(crate) fn turn(&mut self, now: Instant, log: &Log, mut parts: Parts<'_>) {
         let posts = self.posts.iter().flat_map(Receiver::try_iter);
         let posts: Vec<Post> = posts.take(AT_ONCE).collect();
-        for post in posts {
+        // A task whose browser has got a refusal already is dropped.
+        for post in posts.into_iter().filter(Post::begin) {
             let by = format!("the page at {}", post.peer);
             let reply = self.perform(now, log, &mut parts, post.task, &post.body, &by);
             post.reply(reply);
@@ -104,10 +123,11 @@ impl Desk {
                 let pairs: Option<BTreeMap<_, _>> = pairs.collect();
                 pairs.map(|it| (Task::Preview, json!(it)))
             }
-            ["upload", number, digest] => number
-                .parse::<u32>()
-                .ok()
-                .map(|number| (Task::Upload, json!({ "preview": number, "digest": digest }))),
+            ["upload", number, digest] => number.parse::<u32>().ok().map(|number| {
+                let time_s = now.as_micros() as f64 / 1e6;
+                let body = json!({ "preview": number, "digest": digest, "time_s": time_s });
+                (Task::Upload, body)
+            }),
             _ => None,
         };
         let reply = match task.filter(|_| parts.plan.options.stand) {
@@ -133,10 +153,17 @@ impl Desk {
             Task::Preview => ("preview", self.preview(now, parts, body)),
             Task::Upload => ("upload", upload(now, parts, body)),
         };
+        if reply.is_err() && now < self.logs_at {
+            return reply;
+        }
+        if reply.is_err() {
+            self.logs_at = now + QUIET;
+        }
         let fields = json!({ "task": name, "by": by, "done": reply.is_ok() });
         let text = reply
             .as_ref()
             .map_or_else(|why| format!("refused: {why}"), Clone::clone);
+        let text: String = text.chars().take(LOGGED).collect();
         log.event(now, "task", fields, format_args!("{name} by {by}: {text}"));
         reply
     }
@@ -174,6 +201,8 @@ fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
         .remove("receiver")
         .map(|text| place(&text))
         .transpose()?;
+    let has_coordinates = receiver_m.is_some() || given.contains_key("interferer");
+    let shown = given.remove("shown").filter(|_| has_coordinates);
     let moves_site = ["site-tx", "site-rx"]
         .iter()
         .any(|it| given.contains_key(*it));
@@ -198,6 +227,7 @@ fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
         number,
         new: words.new,
         receiver_m,
+        shown,
     })
 }
 
@@ -212,35 +242,53 @@ fn place(text: &str) -> Result<[f32; 2], String> {
 /// Starts the upload of a preview that the operator has confirmed.
 fn upload(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, String> {
     let asked: Confirmed = serde_json::from_str(body).map_err(|error| error.to_string())?;
+    let age_s = now.as_micros() as f64 / 1e6 - asked.time_s;
+    if !(-1.0..=OLDEST_S).contains(&age_s) {
+        return Err(format!(
+            "the page shows a state of {age_s:.1} s before: must be at most {OLDEST_S} s; look at the page again"
+        ));
+    }
     let uploading = parts.uploading.as_mut().ok_or("there is no preview")?;
     uploading.confirm(now, parts.ground, asked.preview, &asked.digest)?;
     Ok(json!({ "preview": asked.preview }).to_string())
 }
 
 /// Returns the state of previews and uploads for the page.
-pub(crate) fn state(plan: &Plan, reports: &[Report], uploading: Option<&Uploading>) -> Value {
+///
+/// `shown` is the mission of the page's map, as [`name_of`](crate::uploading::name_of) returns it; `None` if it is unknown.
+pub(crate) fn state(
+    plan: &Plan,
+    shown: Option<&str>,
+    reports: &[Report],
+    uploading: Option<&Uploading>,
+) -> Value {
     let is_sited = plan.sited.is_some();
     if plan.loaded.mission.field().is_some() {
         return json!({ "why": UploadError::Field.to_string() });
     }
     let Some(uploading) = uploading else {
-        return json!({ "sited": is_sited });
+        return json!({ "sited": is_sited, "shown": shown });
     };
     let upload = uploading.upload();
     let version = upload.map(Upload::version);
-    let flying = reports.iter().filter(|it| Some(it.version) == version);
+    // Reports have no digest: before that they may be of another mission with this version.
+    let is_adopted = uploading.is_adopted();
+    let flying = reports
+        .iter()
+        .filter(|it| is_adopted && Some(it.version) == version);
     let arrived = flying
         .clone()
         .filter(|it| has_arrived(it))
         .map(|it| it.relay);
     json!({
         "sited": is_sited,
+        "shown": shown,
         "number": uploading.number(),
         "stage": uploading.stage(),
         "fault": uploading.fault(),
         "version": version,
         "digest": upload.map(digest_of),
-        "preview": uploading.preview().map(|it| preview(plan, it)),
+        "preview": uploading.shown(),
         "adopted": flying.map(|it| it.relay).collect::<Vec<_>>(),
         "arrived": arrived.collect::<Vec<_>>(),
         "relays": plan.loaded.mission.relays(),
@@ -254,7 +302,8 @@ fn has_arrived(report: &Report) -> bool {
     })
 }
 
-fn preview(plan: &Plan, preview: &Preview) -> Value {
+/// Returns a preview for the page.
+pub(crate) fn preview(plan: &Plan, preview: &Preview) -> Value {
     let Preview {
         before,
         after,

@@ -214,11 +214,11 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
     let state = match progress {
         Progress::Stored { by } => {
             format!(
-                "relay {by} has stored version {version} of the mission, but the chain does not fly it yet"
+                "relay {by} has stored version {version} of the mission, but the chain does not fly it yet; the relays may still adopt it"
             )
         }
         Progress::Adopted { by } => format!(
-            "relay {by} flies version {version} of the mission, but has not reported that all other relays do, too"
+            "relay {by} flies version {version} of the mission, but has not reported that all other relays do, too; they may still adopt it"
         ),
         // The ground has only asked so far.
         Progress::Idle => format!(

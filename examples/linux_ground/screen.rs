@@ -13,7 +13,7 @@ use uav_relay_screen::{Post, Screen};
 
 use crate::desk::state;
 use crate::options::Plan;
-use crate::uploading::Uploading;
+use crate::uploading::{Uploading, name_of};
 
 /// Time between two snapshots.
 const PERIOD: Duration = Duration::from_millis(200);
@@ -80,9 +80,10 @@ impl Web {
         }
         self.next_at = now + PERIOD;
         let version = self.view.version().unwrap_or(0);
-        let own = uploading.and_then(Uploading::upload);
+        let own = uploading.filter(|it| it.is_adopted());
+        let own = own.and_then(Uploading::upload);
         let answered = ground.flown().and_then(|flown| flown.upload.as_ref());
-        let mut uploads = own.into_iter().chain(answered).chain(self.flown.as_ref());
+        let mut uploads = answered.into_iter().chain(own).chain(self.flown.as_ref());
         let upload = uploads.find(|it| it.version() == version).copied();
         self.flown = upload;
         let is_known = version == 0 || upload.is_some();
@@ -118,7 +119,8 @@ impl Web {
         };
         let reports: Vec<_> = ground.reports().collect();
         let mut snapshot = self.view.snapshot(now, &chain, &reports, frames);
-        snapshot.desk = Some(state(plan, &reports, uploading));
+        let shown = is_known.then(|| name_of(version, upload.as_ref()));
+        snapshot.desk = Some(state(plan, shown.as_deref(), &reports, uploading));
         self.screen.show(snapshot);
         self.next_at
     }

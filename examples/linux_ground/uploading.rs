@@ -5,26 +5,27 @@
 //! | asking | a relay has reported its mission, and the upload is in range and newer than the relays' | computing |
 //! | asking | the upload is out of range or not newer | over |
 //! | computing | the relays' new positions are computed, and the upload fits the geofence | confirming, or uploading with `--yes`; over with `--dry-run` |
-//! | computing | the upload is outside the geofence | over |
+//! | computing | the upload is outside the geofence, or for the page the moves cannot be computed although no interference is measured | over |
 //! | confirming | the operator answers `y` | uploading |
 //! | confirming | the operator holds the page's button | asking again; then uploading, or over if the chain flies another mission by now |
 //! | confirming | any other answer | over |
 //! | uploading | the chain flies it, refuses it, or has a newer one | over |
 //! | asking or uploading | `--timeout` expired; for the page while asking 15 s | over |
 //!
-//! The positions are computed by a thread of their own, at most one at a time, so that the relays are answered meanwhile.
+//! An upload that has failed is no longer offered to the chain. The positions are computed by a thread of their own, at most one at a time, so that the relays are answered meanwhile.
 
 use std::io::Write as _;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-use uav_relay::{Duration, FlownMission, Ground, Instant, Progress, Upload};
+use serde_json::Value;
+use uav_relay::{Duration, FlownMission, Ground, Instant, Interference, Progress, Upload};
 use uav_relay_linux::log::Log;
 
-use crate::change;
 use crate::forecast::{Move, moves};
 use crate::new::{Basis, NewOptions};
 use crate::options::Plan;
 use crate::report::{self, FenceViolation};
+use crate::{change, desk};
 
 /// Maximum time that a relay may take to send the values of the mission that it flies.
 const VALUES_TIMEOUT: Duration = Duration::from_millis(5_000);
@@ -70,6 +71,10 @@ pub(crate) struct Form {
     pub(crate) new: NewOptions,
     /// New position of the receiver in the coordinates of the present line, x and y in m.
     pub(crate) receiver_m: Option<[f32; 2]>,
+    /// Mission whose line the coordinates of the form are for, as [`name_of`] returns it.
+    ///
+    /// `None` without coordinates or a map.
+    pub(crate) shown: Option<String>,
 }
 
 /// Missions before and after an upload, and the moves of the relays.
@@ -94,6 +99,8 @@ pub(crate) struct Uploading {
     based_on: (u16, Option<Upload>),
     forecast: Option<Receiver<Option<Vec<Move>>>>,
     preview: Option<Preview>,
+    /// Preview for the page.
+    shown: Value,
     /// True once the operator has held the page's button.
     is_confirmed: bool,
     fault: Option<String>,
@@ -123,6 +130,7 @@ impl Uploading {
             based_on: (0, None),
             forecast: None,
             preview: None,
+            shown: Value::Null,
             is_confirmed: false,
             fault: None,
             progress: Progress::Idle,
@@ -154,8 +162,17 @@ impl Uploading {
         self.form.as_ref().map(|form| form.number)
     }
 
-    pub(crate) const fn preview(&self) -> Option<&Preview> {
-        self.preview.as_ref()
+    /// Returns the preview for the page; `Null` before there is one.
+    pub(crate) const fn shown(&self) -> &Value {
+        &self.shown
+    }
+
+    /// Returns true if a relay has reported that it flies this upload.
+    pub(crate) const fn is_adopted(&self) -> bool {
+        matches!(
+            self.progress,
+            Progress::Adopted { .. } | Progress::Flown { .. }
+        )
     }
 
     /// Returns the reason why the upload has failed.
@@ -171,8 +188,9 @@ impl Uploading {
             Stage::Computing(_) => "computing",
             Stage::Confirming => "ready",
             Stage::Uploading => "uploading",
+            Stage::Ended if matches!(self.progress, Progress::Flown { .. }) => "flown",
             Stage::Ended if self.fault.is_some() => "failed",
-            Stage::Ended => "flown",
+            Stage::Ended => "dry run",
         }
     }
 
@@ -245,14 +263,28 @@ impl Uploading {
         let (Stage::Confirming, Some(upload)) = (self.stage, self.upload) else {
             return None;
         };
-        if matches!(line.trim(), "y" | "Y" | "yes") {
-            return self.start(now, plan, ground, upload);
+        let outcome = if matches!(line.trim(), "y" | "Y" | "yes") {
+            self.start(now, plan, ground, upload)
+        } else {
+            let version = upload.version();
+            failed(format!(
+                "--version {version}: not confirmed, so nothing was uploaded"
+            ))
+        };
+        self.finish(ground, outcome)
+    }
+
+    /// Records the result of an upload that has ended. A failed one is no longer offered to the chain.
+    fn finish(&mut self, ground: &mut Ground, outcome: Outcome) -> Outcome {
+        if let Some(outcome) = &outcome {
+            self.stage = Stage::Ended;
+            self.late_at = None;
+            self.fault = outcome.as_ref().err().map(|fault| fault.line.clone());
+            if outcome.is_err() {
+                ground.cancel();
+            }
         }
-        self.stage = Stage::Ended;
-        let version = upload.version();
-        failed(format!(
-            "--version {version}: not confirmed, so nothing was uploaded"
-        ))
+        outcome
     }
 
     /// Continues the upload; returns its result once it has ended.
@@ -269,12 +301,7 @@ impl Uploading {
             (Stage::Uploading, Some(upload)) => self.follow(now, log, plan, &upload, ground),
             _ => None,
         };
-        if let Some(outcome) = &outcome {
-            self.stage = Stage::Ended;
-            self.late_at = None;
-            self.fault = outcome.as_ref().err().map(|fault| fault.line.clone());
-        }
-        outcome
+        self.finish(ground, outcome)
     }
 
     fn await_mission(
@@ -340,6 +367,14 @@ impl Uploading {
             }
             return self.start(now, plan, ground, upload);
         }
+        let of = name_of(flown.version, flown.upload.as_ref());
+        if let Some(shown) = self.form.as_ref().and_then(|form| form.shown.as_ref())
+            && *shown != of
+        {
+            return failed(format!(
+                "the map shows mission {shown}, but the chain has mission {of} (version and digest), whose line may be another: look at the coordinates again"
+            ));
+        }
         let version = self.version.unwrap_or(flown.version.saturating_add(1));
         if flown.version > version || self.form.is_some() && flown.version == version {
             return failed(report::outdated(version, flown.version));
@@ -374,11 +409,13 @@ impl Uploading {
             .spawn(compute);
         self.forecast = Some(forecast);
         self.based_on = basis;
-        self.preview = Some(Preview {
+        let preview = Preview {
             before,
             after,
             moves: None,
-        });
+        };
+        self.shown = desk::preview(plan, &preview);
+        self.preview = Some(preview);
         (self.stage, self.upload, self.late_at) = (Stage::Computing(now), Some(upload), None);
         None
     }
@@ -403,10 +440,18 @@ impl Uploading {
         self.forecast = None;
         let (version, options) = (upload.version(), &plan.options);
         change::log_moves(log, now, moves.as_deref());
-        let fence = FenceViolation::of(&plan.loaded.mission, &upload).filter(|_| !options.no_fence);
+        let is_fenced = !options.no_fence || self.form.is_some();
+        let fence = FenceViolation::of(&plan.loaded.mission, &upload).filter(|_| is_fenced);
         let outside = fence.map(|fence| fence.line(moves.as_deref()));
+        let mut is_predicted = true;
         if let Some(preview) = &mut self.preview {
+            let missions = [&preview.before, &preview.after];
+            let is_measured = missions
+                .iter()
+                .any(|it| it.config.interference == Interference::Unknown);
+            is_predicted = is_measured || moves.is_some();
             preview.moves = moves;
+            self.shown = desk::preview(plan, preview);
         }
         if let Some(outside) = outside {
             return failed(match self.form {
@@ -415,6 +460,12 @@ impl Uploading {
                     format!("--version {version}: {outside}; --no-fence uploads it nevertheless")
                 }
             });
+        }
+        if self.form.is_some() && !is_predicted {
+            return failed(
+                "the moves of the relays cannot be computed: the simulated relays refused the mission, or did not agree on it within 10 s"
+                    .to_owned(),
+            );
         }
         (self.stage, self.upload) = (Stage::Confirming, Some(upload));
         if self.form.is_some() {
@@ -470,6 +521,14 @@ impl Uploading {
         };
         failed(fault)
     }
+}
+
+/// Returns a mission's version and the digest of its upload, as the page sends them back.
+pub(crate) fn name_of(version: u16, upload: Option<&Upload>) -> String {
+    upload.map_or_else(
+        || version.to_string(),
+        |it| format!("{version},{}", digest_of(it)),
+    )
 }
 
 /// Returns the digest of an upload as the page shows it.

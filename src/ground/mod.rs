@@ -7,7 +7,7 @@
 //! | `Adopted` | flies the new mission; not all of its view are known to | poll every second |
 //! | `Flown` | all of its view fly the mission; relays outside a view take no part until they do | done |
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
-//! | `Outdated` | holds a newer mission | done: the upload needs a larger version |
+//! | `Outdated` | holds a newer mission, or before any relay holds the upload another mission with its version | done: the upload needs a larger version |
 
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
@@ -163,8 +163,7 @@ impl Ground {
     /// The polled relay also sends the uploaded mission that it has stored, if any. The ground station thus learns
     /// the changes of earlier uploads.
     pub fn request_flown(&mut self, now: Instant) {
-        self.upload = None;
-        self.progress = Progress::Idle;
+        self.cancel();
         self.flown = None;
         self.query_number = match self.query_number.wrapping_add(1) {
             0 => 1,
@@ -190,6 +189,17 @@ impl Ground {
         self.progress = Progress::Offering;
         self.start(now);
         Ok(())
+    }
+
+    /// Ends an upload or a query in progress: nothing more is offered to the relays.
+    ///
+    /// A relay that has stored the mission passes it on all the same.
+    pub fn cancel(&mut self) {
+        self.upload = None;
+        self.progress = Progress::Idle;
+        self.offer_number = None;
+        self.due = false;
+        self.repeat_at = None;
     }
 
     /// Schedules the first hello of an upload or a query, to the relay that is polled now.
@@ -339,9 +349,7 @@ impl Ground {
 
     /// Returns true while the query for the mission that the relays fly is unanswered.
     const fn is_querying(&self) -> bool {
-        self.upload.is_none()
-            && self.query_number != 0
-            && !matches!(&self.flown, Some(flown) if flown.is_known())
+        self.upload.is_none() && self.repeat_at.is_some()
     }
 
     /// Returns true if `upload` answers the query for the mission that the relays fly.
@@ -411,6 +419,14 @@ impl Ground {
         } else if holds > mission_id {
             Progress::Outdated {
                 version: hello.latest_mission.version,
+            }
+        } else if holds < mission_id
+            && holds.version == mission_id.version
+            && matches!(self.progress, Progress::Offering)
+        {
+            // Another station has uploaded with the same version. This upload has reached no relay, and is based on an older mission.
+            Progress::Outdated {
+                version: holds.version,
             }
         } else if holds < mission_id {
             // A relay also answers an offer with a hello. Only an answer to a question causes an offer, otherwise the exchange
@@ -759,9 +775,9 @@ pub enum Progress {
         /// farther from the station.
         by: u16,
     },
-    /// The upload is outdated, because a relay has stored a newer mission.
+    /// The upload is outdated: a relay has stored a newer mission, or another with its version.
     Outdated {
-        /// Version of the newer mission.
+        /// Version of the stored mission.
         version: u16,
     },
 }

@@ -7,6 +7,8 @@
 //! | SIR beyond [`LIMIT_DB`], also an infinite one | the limit |
 //! | text | without control characters and direction marks, at most [`LONGEST_TEXT`] characters |
 
+use serde_json::Value;
+
 use crate::snapshot::{LogLine, Position, Snapshot};
 
 /// Largest coordinate, m.
@@ -54,6 +56,17 @@ pub fn clean(snapshot: &mut Snapshot) {
     for alarm in &mut snapshot.alarms {
         text(&mut alarm.text);
     }
+    snapshot.desk.as_mut().map(clean_value);
+}
+
+/// Cleans all texts of a value.
+fn clean_value(value: &mut Value) {
+    match value {
+        Value::String(it) => text(it),
+        Value::Array(all) => all.iter_mut().for_each(clean_value),
+        Value::Object(all) => all.values_mut().for_each(clean_value),
+        _ => {}
+    }
 }
 
 /// Cleans the text of a log line.
@@ -91,6 +104,8 @@ fn text(text: &mut String) {
 mod tests {
     #![allow(clippy::indexing_slicing, reason = "a test fails by it")]
 
+    use serde_json::json;
+
     use super::{clean, clean_line};
     use crate::snapshot::{
         Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot, Snapshot,
@@ -102,6 +117,20 @@ mod tests {
             y_m,
             altitude_m,
         }
+    }
+
+    #[test]
+    fn all_texts_of_the_desk_are_cleaned() {
+        let mut snapshot = Snapshot {
+            desk: Some(
+                json!({ "fault": "a\u{202e}b\n", "changes": [{ "old": "x".repeat(400) }], "number": 1 }),
+            ),
+            ..Snapshot::default()
+        };
+        clean(&mut snapshot);
+        let expected =
+            json!({ "fault": "ab", "changes": [{ "old": "x".repeat(300) }], "number": 1 });
+        assert_eq!(snapshot.desk, Some(expected));
     }
 
     #[test]

@@ -58,7 +58,7 @@ use std::net::SocketAddr;
 pub use alarms::{list, named};
 pub use clean::clean;
 pub use request::{FILES, Task};
-pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, Post, Screen};
+pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, MAX_STREAMS, Post, Screen};
 pub use snapshot::{
     Alarm, Condition, Fence, Frame, Hop, InterfererSnapshot, LogLine, Node, Position,
     RelaySnapshot, Snapshot, Urgency,

@@ -3,7 +3,7 @@
 //! A request is refused unless it is for the address that it arrived at, with the password if there is one, and is a GET without a body or
 //! a POST with the page's token. The check of `Host` prevents DNS rebinding: a foreign name that resolves to this computer.
 //! Requests of other sites' pages are refused if the browser marks them: by `Origin`, or by `Sec-Fetch-Site`, which browsers send to
-//! loopback addresses but not to other addresses by plain HTTP. Only a link to `/` may be on another site. A foreign page's GET without
+//! loopback addresses but not to other addresses by plain HTTP. Only a link to `/` may be on another site, and only without a password. A foreign page's GET without
 //! either header is answered, and the headers of the response tell the browser to keep the answer from that page. A POST must have an
 //! `Origin`, a JSON body, and the token, which only pages of this server can read; a foreign page's POST would first need a permission
 //! (CORS) that no answer gives.
@@ -178,7 +178,9 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access
     let target = request.path.unwrap_or_default();
     let path = target.split('?').next().unwrap_or_default();
     let is_foreign = values("sec-fetch-site").any(|site| !matches!(site, "same-origin" | "none"));
-    let is_link = path == "/" && values("sec-fetch-mode").eq(["navigate"]);
+    // With a password a link could carry a wrong one, which would count as a try of this browser.
+    let is_link =
+        path == "/" && values("sec-fetch-mode").eq(["navigate"]) && access.password.is_none();
     if is_foreign && !is_link {
         return FOREIGN;
     }

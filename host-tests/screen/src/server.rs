@@ -30,6 +30,21 @@ pub const MAX_CONNECTIONS: usize = 64;
 /// Largest number of open connections from one other computer, so that it leaves room for others.
 pub const MAX_PER_ADDRESS: usize = 16;
 
+/// Largest number of streams of snapshots, so that they leave room for files and tasks.
+pub const MAX_STREAMS: usize = 56;
+
+/// Number of connections that only this computer gets.
+const OWN: usize = 8;
+
+/// Largest number of connections that have not yet given the password, from all other computers.
+const MAX_UNKNOWN: usize = 16;
+
+/// Largest number of connections that have not yet given the password, from this computer.
+const MAX_UNKNOWN_OWN: usize = 32;
+
+/// Largest number of connections that have not yet given the password, from one other computer.
+const MAX_UNKNOWN_PER_ADDRESS: usize = 8;
+
 /// Number of log lines that the server keeps for browsers that open the page later.
 const LINES: usize = 1_000;
 
@@ -89,9 +104,19 @@ struct Shared {
     tasks: Option<SyncSender<Post>>,
     /// Addresses and times of wrong passwords in the last [`TRIES_TIME`].
     tries: Mutex<VecDeque<(IpAddr, Instant)>>,
-    /// Remote address of each open connection.
-    peers: Mutex<Vec<IpAddr>>,
+    /// Remote address and state of each open connection.
+    peers: Mutex<Vec<(IpAddr, Stage)>>,
     has_ended: AtomicBool,
+}
+
+/// State of a connection.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Stage {
+    /// A request with the password, if there is one, has not arrived yet.
+    Unknown,
+    Known,
+    /// Snapshots are being sent.
+    Streaming,
 }
 
 /// Newest snapshot that is not yet written as JSON, and the log lines since the last one that was.
@@ -135,9 +160,18 @@ pub struct Post {
     /// Address of the browser.
     pub peer: IpAddr,
     reply: SyncSender<Result<String, String>>,
+    /// True once the program does the task, or the browser has got a refusal.
+    is_settled: Arc<AtomicBool>,
 }
 
 impl Post {
+    /// Returns true if the program may do the task.
+    ///
+    /// The browser still waits then, and from now on gets no refusal.
+    pub fn begin(&self) -> bool {
+        !self.is_settled.swap(true, Ordering::SeqCst)
+    }
+
     /// Answers the task: with JSON, or with the reason why the program does not do it. It never waits.
     pub fn reply(self, reply: Result<String, String>) {
         // A browser may have left.
@@ -326,13 +360,13 @@ impl Shared {
 
     /// Counts a wrong password from `peer`, and returns the answer: a refusal after too many of them.
     ///
-    /// While an address is refused, the right password is refused, too. Many addresses can make all other computers wait, but not
-    /// this one, from which a tunnel comes.
+    /// While an address is refused, the right password is refused, too, except for a task with the token, which cannot be guessed. Many
+    /// addresses can make all other computers wait, but not this one, from which a tunnel comes.
     fn limited(&self, answer: Answer, peer: IpAddr) -> Answer {
-        if self.access.password.is_none() {
+        if self.access.password.is_none() || matches!(answer, Answer::Post(..)) {
             return answer;
         }
-        let (peer, now) = (peer.to_canonical(), Instant::now());
+        let (peer, now) = (counted_as(peer), Instant::now());
         let mut tries = lock(&self.tries);
         tries.retain(|(_, at)| now.duration_since(*at) < TRIES_TIME);
         let own = tries.iter().filter(|(by, _)| *by == peer).count();
@@ -348,18 +382,31 @@ impl Shared {
     /// Passes a task to the program, and returns the response with its answer.
     fn perform(&self, task: Task, content: &[u8], peer: IpAddr) -> String {
         let (reply, answer) = sync_channel(1);
+        let is_settled = Arc::new(AtomicBool::new(false));
         let post = Post {
             task,
             body: String::from_utf8_lossy(content).into_owned(),
             peer,
             reply,
+            is_settled: Arc::clone(&is_settled),
         };
         let is_sent = self
             .tasks
             .as_ref()
             .is_some_and(|it| it.try_send(post).is_ok());
-        let answer = is_sent.then(|| answer.recv_timeout(REPLY_TIME).ok());
-        match answer.flatten() {
+        let answered = || {
+            let late = |_| {
+                // A program that has begun the task by now answers it.
+                let has_begun = is_settled.swap(true, Ordering::SeqCst);
+                answer.recv_timeout(if has_begun {
+                    REPLY_TIME
+                } else {
+                    Duration::ZERO
+                })
+            };
+            answer.recv_timeout(REPLY_TIME).or_else(late).ok()
+        };
+        match is_sent.then(answered).flatten() {
             Some(answer) => replied(&answer),
             None => format!("{}{}", head(FULL), body(FULL)),
         }
@@ -405,21 +452,66 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Connection that counts toward [`MAX_CONNECTIONS`] and [`MAX_PER_ADDRESS`] until it is dropped.
-struct Counted(Arc<Shared>, IpAddr);
+/// Returns the address under which a computer is counted.
+///
+/// It is one for all loopback addresses, and one for an IPv6 network of 64 bits.
+fn counted_as(peer: IpAddr) -> IpAddr {
+    let peer = peer.to_canonical();
+    match peer {
+        _ if peer.is_loopback() => Ipv4Addr::LOCALHOST.into(),
+        IpAddr::V6(ip) => Ipv6Addr::from_bits(ip.to_bits() >> 64 << 64).into(),
+        IpAddr::V4(_) => peer,
+    }
+}
+
+/// Connection that counts toward the limits of connections until it is dropped.
+struct Counted(Arc<Shared>, (IpAddr, Stage));
 
 impl Counted {
     /// Counts a connection from `peer`; `None` beyond a limit.
     fn new(shared: &Arc<Shared>, peer: IpAddr) -> Option<Self> {
-        let peer = peer.to_canonical();
+        let peer = counted_as(peer);
+        let stage = match shared.access.password {
+            Some(_) => Stage::Unknown,
+            None => Stage::Known,
+        };
+        let is_own = peer.is_loopback();
         let mut peers = lock(&shared.peers);
-        let same = peers.iter().filter(|it| **it == peer).count();
-        let has_room =
-            peers.len() < MAX_CONNECTIONS && (peer.is_loopback() || same < MAX_PER_ADDRESS);
+        let same = peers.iter().filter(|(by, _)| *by == peer);
+        let unknown = |(_, stage): &&(IpAddr, Stage)| *stage == Stage::Unknown;
+        let like = peers.iter().filter(|(by, _)| by.is_loopback() == is_own);
+        let has_room = if is_own {
+            peers.len() < MAX_CONNECTIONS
+        } else {
+            peers.len() < MAX_CONNECTIONS - OWN
+                && same.clone().count() < MAX_PER_ADDRESS
+                && same.filter(unknown).count() < MAX_UNKNOWN_PER_ADDRESS
+        };
+        let most = if is_own { MAX_UNKNOWN_OWN } else { MAX_UNKNOWN };
+        let has_room = has_room && like.filter(unknown).count() < most;
         has_room.then(|| {
-            peers.push(peer);
-            Self(Arc::clone(shared), peer)
+            peers.push((peer, stage));
+            Self(Arc::clone(shared), (peer, stage))
         })
+    }
+
+    /// Records that the request has been accepted. Returns false if it is for a stream too many.
+    fn accept(&mut self, answer: Answer) -> bool {
+        let stage = match answer {
+            Answer::Events => Stage::Streaming,
+            Answer::Refused(..) => return true,
+            _ => Stage::Known,
+        };
+        let mut peers = lock(&self.0.peers);
+        let streams = peers.iter().filter(|(_, it)| *it == Stage::Streaming);
+        if stage == Stage::Streaming && streams.count() >= MAX_STREAMS {
+            return false;
+        }
+        if let Some(own) = peers.iter_mut().find(|it| **it == self.1) {
+            own.1 = stage;
+        }
+        self.1.1 = stage;
+        true
     }
 }
 
@@ -444,7 +536,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
             sleep(Duration::from_millis(10));
             continue;
         };
-        let Some(counted) = Counted::new(shared, peer.ip()) else {
+        let Some(mut counted) = Counted::new(shared, peer.ip()) else {
             // The buffer of a new connection is empty, so this does not wait.
             _ = stream.set_nonblocking(true);
             _ = stream.write_all(format!("{}{}", head(FULL), body(FULL)).as_bytes());
@@ -455,16 +547,20 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
         let thread = Builder::new().name("screen: browser".to_owned());
         _ = thread
             .stack_size(STACK)
-            .spawn(move || _ = serve(stream, &counted.0));
+            .spawn(move || _ = serve(stream, &mut counted));
     }
 }
 
 /// Answers the request of one connection.
-fn serve(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
+fn serve(mut stream: TcpStream, counted: &mut Counted) -> io::Result<()> {
+    let shared = Arc::clone(&counted.0);
     let (own, peer) = (stream.local_addr()?, stream.peer_addr()?.ip());
     let mut buffer = [0; MAX_REQUEST];
     let (answer, content) = read(&mut stream, &mut buffer, own, &shared.access)?;
-    let answer = shared.limited(answer, peer);
+    let mut answer = shared.limited(answer, peer);
+    if !counted.accept(answer) {
+        answer = FULL;
+    }
     let response = match answer {
         Answer::Post(task, _) => shared.perform(task, content, peer),
         _ => format!("{}{}", head(answer), body(answer)),
@@ -549,10 +645,13 @@ fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
 mod tests {
     #![allow(clippy::expect_used, reason = "a test fails by it")]
 
-    use std::net::IpAddr;
+    use std::net::{IpAddr, Ipv4Addr};
     use std::sync::Arc;
 
-    use super::{Counted, MAX_CONNECTIONS, MAX_PER_ADDRESS, Shared, lock};
+    use super::{
+        Answer, Counted, MAX_CONNECTIONS, MAX_PER_ADDRESS, MAX_STREAMS, MAX_TRIES, MAX_UNKNOWN,
+        MAX_UNKNOWN_OWN, Shared, TOO_MANY, Task, WRONG_PASSWORD, lock,
+    };
 
     #[test]
     fn one_other_computer_leaves_room_for_others() {
@@ -567,10 +666,67 @@ mod tests {
         // A connection that ends makes room.
         drop(first.pop());
         first.push(from("192.0.2.1").expect("room"));
+        // One IPv6 network is one computer.
+        let third: Vec<_> = (0..MAX_CONNECTIONS)
+            .filter_map(|at| from(&format!("2001:db8::{at:x}:1")))
+            .collect();
+        assert_eq!(third.len(), MAX_PER_ADDRESS);
         // Loopback connections have the limit of all connections.
         let rest: Vec<_> = std::iter::from_fn(|| from("127.0.0.1")).collect();
-        assert_eq!(rest.len(), MAX_CONNECTIONS - MAX_PER_ADDRESS - 1);
-        drop((first, second, rest));
+        assert_eq!(rest.len(), MAX_CONNECTIONS - 2 * MAX_PER_ADDRESS - 1);
+        drop((first, second, third, rest));
         assert!(lock(&shared.peers).is_empty());
+    }
+
+    #[test]
+    fn connections_without_the_password_leave_room_for_those_with_it() {
+        let mut own = Shared::default();
+        own.access.password = Some("correct horse".to_owned());
+        let shared = Arc::new(own);
+        let from = |text: &str| Counted::new(&shared, text.parse::<IpAddr>().expect(text));
+        let mut known = from("192.0.2.1").expect("room");
+        assert!(known.accept(Answer::Events));
+        let others: Vec<_> = (0..MAX_CONNECTIONS)
+            .filter_map(|at| from(&format!("198.51.100.{}", at % 20)))
+            .collect();
+        assert_eq!(others.len(), MAX_UNKNOWN);
+        // Also loopback connections, from any loopback address.
+        let local: Vec<_> = (0..MAX_CONNECTIONS)
+            .filter_map(|at| from(&format!("127.0.{at}.1")))
+            .collect();
+        assert_eq!(local.len(), MAX_UNKNOWN_OWN);
+        drop(local);
+        let mut tunnelled: Vec<_> = std::iter::from_fn(|| {
+            let mut next = from("127.0.0.1")?;
+            next.accept(Answer::Events).then_some(next)
+        })
+        .collect();
+        assert_eq!(tunnelled.len(), MAX_CONNECTIONS - 1 - MAX_UNKNOWN);
+        drop(others);
+        tunnelled.extend(std::iter::from_fn(|| {
+            let mut next = from("127.0.0.1")?;
+            next.accept(Answer::Events).then_some(next)
+        }));
+        assert_eq!(tunnelled.len(), MAX_STREAMS - 1);
+        assert!(from("127.0.0.1").is_some_and(|mut it| it.accept(Answer::Post(Task::Upload, 2))));
+        drop((known, tunnelled));
+        assert!(lock(&shared.peers).is_empty());
+    }
+
+    #[test]
+    fn all_loopback_addresses_share_the_limit_of_wrong_passwords() {
+        let mut shared = Shared::default();
+        shared.access.password = Some("correct horse".to_owned());
+        let refused = (0..200_u8).filter(|at| {
+            let peer = Ipv4Addr::new(127, 0, 0, *at).into();
+            shared.limited(WRONG_PASSWORD, peer) == TOO_MANY
+        });
+        assert_eq!(refused.count(), 200 - MAX_TRIES);
+        assert_eq!(lock(&shared.tries).len(), MAX_TRIES);
+        // A task with the token was sent by a page that had the password.
+        let own = Ipv4Addr::LOCALHOST.into();
+        assert_eq!(shared.limited(Answer::Events, own), TOO_MANY);
+        let task = Answer::Post(Task::Upload, 2);
+        assert_eq!(shared.limited(task, own), task);
     }
 }

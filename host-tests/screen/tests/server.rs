@@ -17,7 +17,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use uav_relay_screen::{
-    Hop, LogLine, MAX_CONNECTIONS, Node, Position, RelaySnapshot, Screen, ScreenError, Snapshot,
+    Hop, LogLine, MAX_STREAMS, Node, Position, Post, RelaySnapshot, Screen, ScreenError, Snapshot,
     Task,
 };
 
@@ -366,12 +366,15 @@ fn fifty_browsers_get_the_newest_snapshot_and_too_many_are_refused() {
     println!("50 browsers have the snapshot after {:?}", begun.elapsed());
     for _ in 0..100 {
         // On a busy machine the server drops browsers that this test has not read for 10 s.
-        while screen.connections() < MAX_CONNECTIONS {
+        while screen.connections() < MAX_STREAMS {
             browsers.push(events(&screen));
             thread::sleep(Duration::from_millis(5));
         }
-        let response = asked(&screen, &get(&screen, "/"));
+        let response = asked(&screen, &get(&screen, "/events"));
         assert!(response.starts_with("HTTP/1.1 503 "), "{response}");
+        // Streams leave room for files and tasks.
+        let response = asked(&screen, &get(&screen, "/"));
+        assert!(response.starts_with("HTTP/1.1 200 "), "{response}");
     }
     // Browsers that have left make room.
     drop(browsers);
@@ -469,6 +472,11 @@ fn wrong_passwords_are_limited_and_a_page_without_one_is_refused() {
     let right = "Authorization: Basic OmNvcnJlY3QgaG9yc2U=\r\n";
     let wrong = "Authorization: Basic OmNvcnJlY3QgaG9yc2Y=\r\n";
     assert!(with(right).starts_with("HTTP/1.1 200 "));
+    // A foreign page's link with a wrong password is no try of this browser.
+    let link = format!("Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: navigate\r\n{wrong}");
+    for _ in 0..20 {
+        assert!(with(&link).starts_with("HTTP/1.1 403 "));
+    }
     let mut statuses: Vec<String> = Vec::new();
     thread::scope(|scope| {
         let tries: Vec<_> = (0..30).map(|_| scope.spawn(|| with(wrong))).collect();
@@ -571,6 +579,17 @@ fn only_tasks_with_the_token_reach_the_program_and_nobody_waits_for_it() {
         "50 unanswered tasks are refused after {:?}",
         begun.elapsed()
     );
-    assert!(posts.try_iter().count() <= 4);
+    // A task whose browser got a refusal is not done later.
+    let late: Vec<_> = posts.try_iter().collect();
+    assert!(late.len() <= 4 && !late.iter().any(Post::begin));
+    // A task that has begun is answered, however late.
+    thread::scope(|scope| {
+        let response = scope.spawn(|| asked(&screen, &good));
+        let task = posts.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(task.begin() && !task.begin());
+        thread::sleep(Duration::from_secs(6));
+        task.reply(Ok("{}".to_owned()));
+        assert!(response.join().unwrap().starts_with("HTTP/1.1 200 "));
+    });
     flight.end("tasks");
 }

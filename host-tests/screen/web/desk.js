@@ -4,16 +4,23 @@
 /** Time for which the button has to be held, ms. */
 const HOLD = 1000;
 
-/** `mine` is the number of the preview of the values in the form, or null; `held` is the timer of the button. */
-const desk = { token: null, state: {}, mine: null, held: 0, note: "" };
+/** Largest delay of the timer of the button, ms: on a busier page the button may have been released before. */
+const DELAY = 300;
 
-const metres = (value) => value.toFixed(1);
+/** Time in which a task has to be answered, ms. A request that the browser or a tunnel holds back is given up. */
+const ANSWER = 4000;
+
+/** `mine` is the number of the preview of the values in the form, or null; `turn` counts edits; `held` is the timer of the button. */
+const desk = { token: null, state: {}, mine: null, turn: 0, held: 0, note: "" };
+
+const metres = (value) => number(value, 1);
 
 /** Sends a task. Returns the answer; a refusal is an error with the reason. */
 async function post(path, body) {
   const headers = { "Content-Type": "application/json", "X-Relay-Token": desk.token };
   // The address of the page may contain the password, which `fetch` refuses; the origin does not.
-  const response = await fetch(location.origin + path, { method: "POST", headers, body: JSON.stringify(body) });
+  const signal = AbortSignal.timeout(ANSWER);
+  const response = await fetch(location.origin + path, { method: "POST", headers, body: JSON.stringify(body), signal });
   const text = (await response.text()).trim();
   if (!response.ok) throw new Error(text || response.statusText);
   return JSON.parse(text);
@@ -25,29 +32,40 @@ function values() {
   return Object.fromEntries(pairs.filter(([, value]) => value));
 }
 
+/** Returns the text about a task that has failed. */
+const failure = (error) => (error.name === "TimeoutError" ? `No answer for ${ANSWER / 1000} s: the state shows whether the station does it.` : `Refused: ${error.message}.`);
+
 async function preview() {
   edited();
+  const { turn } = desk;
+  let number = null;
+  let note = "";
   try {
-    desk.mine = (await post("/preview", values())).preview;
+    number = (await post("/preview", { ...values(), shown: desk.state.shown ?? "unknown" })).preview;
   } catch (error) {
-    desk.note = `Refused: ${error.message}.`;
+    note = failure(error);
   }
+  // An answer to earlier values is dropped.
+  if (turn !== desk.turn) return;
+  desk.mine = number;
+  desk.note = note;
   describe();
 }
 
 async function upload() {
   const { number: preview, digest } = desk.state;
   try {
-    await post("/upload", { preview, digest });
+    await post("/upload", { preview, digest, time_s: received.last.time_s });
   } catch (error) {
-    desk.note = `Refused: ${error.message}.`;
+    desk.note = failure(error);
   }
   describe();
 }
 
-/** Forgets the preview of earlier values. */
+/** Forgets the preview of earlier values, or of another run of the program. */
 function edited() {
   release();
+  desk.turn += 1;
   desk.mine = null;
   desk.note = "";
   describe();
@@ -64,6 +82,11 @@ function takeDesk({ token, desk: state }) {
   if (!token || !state) return;
   byId("form").hidden = Boolean(state.why);
   for (const it of document.querySelectorAll("#form .sited")) it.hidden = !state.sited;
+  if (state.stage === "flown" && state.number === desk.mine) {
+    // The values are flown now, and the line may be another.
+    byId("form").reset();
+    edited();
+  }
   describe();
 }
 
@@ -82,6 +105,7 @@ function stateText({ why, number, stage, fault, version, adopted, arrived, relay
     uploading: `is being uploaded as version ${version}`,
     flown: `is flown as version ${version}`,
     failed: `has failed: ${fault}`,
+    "dry run": "was not uploaded",
   };
   const progress = stage === "uploading" || stage === "flown" ? `; adopted by ${adopted.length} of ${relays} (${listed(adopted)}), arrived: ${listed(arrived)}` : "";
   return `${what} ${words[stage]}${progress}`;
@@ -126,9 +150,12 @@ function release() {
 function hold() {
   if (!isReady() || desk.held) return;
   byId("hold").classList.add("held");
+  const begun = performance.now();
+  const { number, digest } = desk.state;
   desk.held = setTimeout(() => {
     release();
-    upload();
+    const isSame = number === desk.state.number && digest === desk.state.digest;
+    if (isReady() && isSame && performance.now() - begun < HOLD + DELAY) upload();
   }, HOLD);
 }
 
@@ -147,8 +174,9 @@ byId("form").addEventListener("submit", (event) => {
 });
 byId("form").addEventListener("input", edited);
 const button = byId("hold");
-button.addEventListener("pointerdown", hold);
+button.addEventListener("pointerdown", (event) => event.button === 0 && event.isPrimary && hold());
 for (const end of ["pointerup", "pointerleave", "pointercancel", "blur", "keyup"]) button.addEventListener(end, release);
+for (const [target, end] of [[window, "blur"], [document, "visibilitychange"]]) target.addEventListener(end, release);
 button.addEventListener("contextmenu", (event) => event.preventDefault());
 button.addEventListener("keydown", (event) => {
   if (event.key !== " " && event.key !== "Enter") return;

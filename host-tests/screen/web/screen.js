@@ -93,6 +93,7 @@ function show(snapshot) {
   if (received.last && snapshot.run !== received.last.run) {
     map.forget();
     alarms.forget();
+    edited();
   }
   received.snapshots += 1;
   received.last = snapshot;

@@ -26,6 +26,11 @@ impl Page {
         Self { address, token }
     }
 
+    /// Returns the newest snapshot.
+    fn newest(&self) -> Value {
+        snapshots(&self.address).next().unwrap()
+    }
+
     /// Sends a task, with `change` made to the request. Returns the status and the answer.
     fn sends(&self, path: &str, body: &Value, change: [&str; 2]) -> (u16, String) {
         let (own, body, token) = (&self.address, body.to_string(), &self.token);
@@ -42,7 +47,24 @@ impl Page {
     }
 
     fn post(&self, path: &str, body: &Value) -> (u16, String) {
-        self.sends(path, body, ["", ""])
+        let mut body = body.clone();
+        if path == "/upload" && body["time_s"].is_null() {
+            body["time_s"] = self.newest()["time_s"].take();
+        }
+        self.sends(path, &body, ["", ""])
+    }
+
+    /// Checks that an upload that was held on the way, or is without the time of the page, is refused.
+    fn refuses_old_times(&self, request: &Value) {
+        let refused = self.sends("/upload", request, ["", ""]);
+        assert!(refused.1.contains("missing field `time_s`"), "{refused:?}");
+        let mut request = request.clone();
+        request["time_s"] = json!(self.newest()["time_s"].as_f64().unwrap() - 6.0);
+        let refused = self.post("/upload", &request);
+        assert!(
+            refused.0 == 409 && refused.1.contains("must be at most 5 s"),
+            "{refused:?}"
+        );
     }
 
     /// Returns the state of the tasks once it is at `stage`.
@@ -131,6 +153,13 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     assert!(refused.1.contains("has the digest 0x"), "{refused:?}");
     assert!(!chain.relays[0].has_printed("uploaded: "));
     let request = json!({ "preview": 2, "digest": digest });
+    page.refuses_old_times(&request);
+    // A preview is not shown as the flown mission.
+    let shown = page.newest();
+    assert!(
+        shown["desk"]["adopted"] == json!([]) && shown["desk"]["shown"] == "0",
+        "{shown:#}"
+    );
     assert_eq!(page.post("/upload", &request).0, 200);
     // The same request again is refused at once, and later.
     let again = (
@@ -143,10 +172,24 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     chain.settles_at(&uploaded);
     let state = page.until("flown");
     assert_eq!(state["version"], 1);
+    // Coordinates of a map of another mission are refused.
+    // The relays' reports have the version with a delay.
+    let name = format!("1,{}", digest.as_str().unwrap());
+    let mut shown = snapshots(&page.address);
+    assert!(shown.any(|it| it["desk"]["shown"] == name[..]));
+    let of_before = json!({ "receiver": "990,0", "shown": "0" });
+    assert_eq!(page.post("/preview", &of_before).0, 200);
+    let why = page.until("failed")["fault"].take();
+    assert!(
+        why.as_str()
+            .unwrap()
+            .starts_with("the map shows mission 0, but the chain has mission 1,0x"),
+        "{why}"
+    );
 
     // The other end of the chain uploads a mission after the preview.
     assert_eq!(page.post("/preview", &json!({ "noise": "1e-9" })).0, 200);
-    let request = json!({ "preview": 3, "digest": page.until("ready")["digest"] });
+    let request = json!({ "preview": 4, "digest": page.until("ready")["digest"] });
     let (tty, signed) = (chain.media[0].tty(3), chain.files.signed("key", "rx"));
     Relay::ground(&format!(
         "--of 2 --end rx --shared --tty {tty} {signed} --version 2 --new-tx-power 2 --yes"
@@ -154,7 +197,7 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     .succeeds();
     assert_eq!(page.post("/upload", &request).0, 200);
     let state = page.until("failed");
-    let why = "preview 3: computed for version 1 of the mission, but the chain has another mission now, version 2: make a new preview";
+    let why = "preview 4: computed for version 1 of the mission, but the chain has another mission now, version 2: make a new preview";
     assert_eq!(state["fault"], why);
     station.stopped();
     for relay in &mut chain.relays {

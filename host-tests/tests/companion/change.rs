@@ -3,11 +3,12 @@
 use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use crate::binary::ground;
 use crate::chain::Chain;
 use crate::medium::QUIET;
-use crate::process::{Relay, bits, wait_until, words};
+use crate::process::{Relay, bits, lines_of, wait_until, words};
 use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
@@ -248,6 +249,52 @@ fn at_a_terminal(options: &str, answer: &str) -> (Option<i32>, String) {
     wait_until(|| child.try_wait().unwrap().is_some());
     let status = child.wait().unwrap().code();
     (status, String::from_utf8(shown).unwrap())
+}
+
+#[test]
+fn an_upload_that_has_timed_out_does_not_reach_relays_that_come_back() {
+    let mut bench = Bench::new();
+    bench.agreed();
+    let terminal = Pty::new();
+    let tty = || {
+        let mut both = File::options();
+        both.read(true).write(true).open(terminal.path()).unwrap()
+    };
+    let options = bench.options("1", "--new-interferer 80,700,-300 --stand --timeout 3");
+    let mut child = Command::new(ground())
+        .args(words(&options))
+        .stdin(Stdio::from(tty()))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut errors = child.stderr.take().unwrap();
+    let (mut shown, mut byte) = (Vec::new(), [0]);
+    while !shown.ends_with(b"[y/N] ") {
+        assert_eq!(errors.read(&mut byte).unwrap(), 1);
+        shown.push(byte[0]);
+    }
+    for relay in bench.0.relays.drain(..) {
+        relay.stopped();
+    }
+    let mut wire = File::from(terminal.wire.try_clone().unwrap());
+    wire.write_all(b"y\n").unwrap();
+    let lines = lines_of(child.stdout.take().unwrap());
+    let line = lines
+        .iter()
+        .find(|line| line.contains("not flown: "))
+        .unwrap();
+    assert!(line.contains("--timeout 3: not finished"), "{line}");
+    for index in [1, 2] {
+        let signed = bench.0.files.signed("key", &format!("epoch{index}"));
+        let own = format!("--distance 1343.795 --band 20,40 {signed}");
+        bench.0.relays.push(bench.0.relay(index, &own));
+    }
+    bench.agreed();
+    std::thread::sleep(Duration::from_secs(10));
+    assert!(!bench.0.relays[0].has_printed("uploaded: "));
+    child.kill().unwrap();
+    child.wait().unwrap();
 }
 
 #[test]

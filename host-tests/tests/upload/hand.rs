@@ -60,8 +60,8 @@ fn exchange(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) ->
             relay.handle_bytes(now, port, &frame[..len]);
         }
         relay.handle_timeout(now);
-        for (by, bytes) in bench::sent(relay, now) {
-            assert_eq!(by, port);
+        let sent = bench::sent(relay, now).into_iter();
+        for (_, bytes) in sent.filter(|(by, _)| *by == port) {
             ground.handle_bytes(&bytes);
         }
         events.extend(bench::events(relay));
@@ -195,6 +195,49 @@ fn a_single_relay_flies_an_upload_and_reports_it() {
         assert_eq!(events, []);
         assert_eq!(ground.progress(), Progress::Outdated { version: 2 });
         assert_eq!(relay.version(), 2);
+    }
+}
+
+#[test]
+fn a_cancelled_upload_is_not_offered_to_a_relay_that_comes_later() {
+    let base = mission(1);
+    let mut relay = alone(base, Wiring::Pair);
+    let mut ground = Ground::new(&base, Side::Upstream, 7, Wiring::Pair, auth(1));
+    ground.upload(Instant::ZERO, new_place(&base, 1)).unwrap();
+    let mut frame = [0; MAX_FRAME];
+    for ms in 0..10_000 {
+        ground.handle_timeout(Instant::from_millis(ms));
+        while ground.poll_transmit(&mut frame).is_some() {}
+    }
+    ground.cancel();
+    assert_eq!(ground.poll_timeout(), None);
+    let events = exchange(&mut ground, &mut relay, Port::Upstream, 10_000);
+    assert_eq!(
+        (events.contains(&Event::Uploaded), relay.version()),
+        (false, 0)
+    );
+    assert_eq!(ground.progress(), Progress::Idle);
+    // The next upload is not disturbed.
+    let now = Instant::from_millis(12_000);
+    ground.upload(now, new_place(&base, 1)).unwrap();
+    exchange(&mut ground, &mut relay, Port::Upstream, 12_000);
+    assert_eq!(relay.version(), 1);
+}
+
+#[test]
+fn a_mission_of_another_station_is_not_replaced_by_one_with_its_version() {
+    let base = mission(1);
+    let uploads = [1.0, 2.0].map(|x_m| Upload::new(&base, 1, moved(&base, x_m, 0.0)).unwrap());
+    for [first, second] in [uploads, [uploads[1], uploads[0]]] {
+        let mut relay = alone(base, Wiring::Pair);
+        let mut ground = Ground::new(&base, Side::Upstream, 7, Wiring::Pair, auth(1));
+        let mut other = Ground::new(&base, Side::Downstream, 7, Wiring::Pair, auth(1));
+        ground.upload(Instant::ZERO, first).unwrap();
+        exchange(&mut ground, &mut relay, Port::Upstream, 0);
+        other.upload(Instant::from_millis(2_000), second).unwrap();
+        let events = exchange(&mut other, &mut relay, Port::Downstream, 2_000);
+        assert!(!events.contains(&Event::Uploaded), "{events:?}");
+        assert_eq!(other.progress(), Progress::Outdated { version: 1 });
     }
 }
 

@@ -276,21 +276,26 @@ fn only_alarms_that_last_sound_and_are_in_the_title() {
     assert_eq!(listed, 2);
 }
 
+/// Returns the state of a station with a preview that can be uploaded.
+fn ready() -> Value {
+    let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
+    serde_json::json!({
+        "sited": false, "shown": "1,0x00ab", "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
+        "preview": {
+            "changes": [{ "value": "altitude", "old": "20 m", "new": "30 m" }], "worst_before": [1.0, null], "worst_after": [2.25, -3.5],
+            "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34) }],
+            "targets": [[412.34, 0.0]],
+        },
+    })
+}
+
 #[test]
 fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     let (own, password) = ("127.0.0.1:0".parse().unwrap(), "secret-7".to_owned());
     let (screen, posts) = Screen::start_acting(own, Some(password)).unwrap();
     let url = screen.url().replace("//", "//operator:secret-7@");
     let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
-    let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
-    let desk = serde_json::json!({
-        "sited": false, "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
-        "preview": {
-            "changes": [{ "value": "altitude", "old": "20 m", "new": "30 m" }], "worst_before": [1.0, null], "worst_after": [2.25, -3.5],
-            "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34) }],
-            "targets": [[412.34, 0.0]],
-        },
-    });
+    let desk = ready();
     let _shown = Shown::on(screen, move || Snapshot {
         desk: Some(desk.clone()),
         ..full(3, 0.0)
@@ -315,11 +320,24 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     let task = next();
     assert_eq!(
         (task.task, &task.body[..]),
-        (Task::Preview, "{\"altitude\":\"30\"}")
+        (
+            Task::Preview,
+            "{\"altitude\":\"30\",\"shown\":\"1,0x00ab\"}"
+        )
     );
     task.reply(Ok("{\"preview\":1}".to_owned()));
     browser.until("!byId('hold').disabled");
-    let press = "byId('hold').dispatchEvent(new PointerEvent('pointerdown'))";
+    let press = "byId('hold').dispatchEvent(new PointerEvent('pointerdown', { isPrimary: true }))";
+    // Other buttons and fingers do not hold it, and a press ends with the focus of the window.
+    for part in ["{ isPrimary: true, button: 2 }", "{}"] {
+        browser.run(&format!(
+            "byId('hold').dispatchEvent(new PointerEvent('pointerdown', {part}))"
+        ));
+        assert_eq!(browser.value("desk.held"), 0);
+    }
+    browser.run(press);
+    browser.run("window.dispatchEvent(new Event('blur'))");
+    assert_eq!(browser.value("desk.held"), 0);
     browser.run(press);
     thread::sleep(Duration::from_millis(700));
     browser.run("byId('hold').dispatchEvent(new PointerEvent('pointerup'))");
@@ -339,7 +357,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
         "{:?}",
         begun.elapsed()
     );
-    let body = "{\"preview\":1,\"digest\":\"0x1234\"}";
+    let body = "{\"preview\":1,\"digest\":\"0x1234\",\"time_s\":0}";
     assert_eq!((task.task, &task.body[..]), (Task::Upload, body));
     task.reply(Err("preview 1 was used already".to_owned()));
     browser
@@ -365,6 +383,44 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     // The browser reports each refused request.
     let errors = browser.errors();
     assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
+}
+
+#[test]
+fn a_preview_of_other_values_or_of_an_earlier_start_cannot_be_uploaded() {
+    let own = "127.0.0.1:0".parse().unwrap();
+    let (screen, posts) = Screen::start_acting(own, None).unwrap();
+    let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
+    let shown = Shown::on(screen, || Snapshot {
+        desk: Some(ready()),
+        ..full(3, 0.0)
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(4));
+    browser.until("!byId('desk').hidden");
+    browser.run("byId('desk').open = true; byId('form').elements.altitude.value = '30'");
+    // An answer to values that were edited meanwhile is dropped, and so is the preview of an earlier run of the station.
+    browser.run("preview()");
+    let task = next();
+    browser.run("edited()");
+    task.reply(Ok("{\"preview\":1}".to_owned()));
+    thread::sleep(Duration::from_millis(500));
+    assert_eq!(browser.value("desk.mine"), Value::Null);
+    browser.run("preview()");
+    next().reply(Ok("{\"preview\":1}".to_owned()));
+    browser.until("!byId('hold').disabled");
+    browser.run("show({ ...received.last, run: 'another' })");
+    assert_eq!(browser.value("isReady()"), false);
+    browser.until("received.last.run !== 'another'");
+    // After its own upload the form is empty.
+    browser.run(
+        "desk.mine = 1; takeDesk({ token: desk.token, desk: { ...desk.state, stage: 'flown' } })",
+    );
+    assert_eq!(browser.value("Object.keys(values()).length"), 0);
+    // A task without an answer is given up.
+    browser.run("preview()");
+    let task = next();
+    browser.until("byId('desk-state').textContent.startsWith('No answer for 4 s')");
+    drop(task);
 }
 
 /// Returns a snapshot of `relays` relays that move, with everything that the map can show.
