@@ -114,15 +114,8 @@ fn run(options: &Options) -> Result<(), Failure> {
         Ok(Planned {
             plan: None, rates, ..
         }) => {
-            let rates = rates.map(listed);
-            let error = rates.as_ref().map(too_fast).unwrap_or_default();
-            let why = Why::Plain(error);
-            let report = PlanReport::unmet(&why, None, Number::Of(0), options.unit());
-            let report = PlanReport {
-                uavs: None,
-                ..report
-            };
-            show(options, &report.with_rates(rates).in_noise(&scenario.noise))
+            let report = slower(rates.map(listed), options);
+            show(options, &report.in_noise(&scenario.noise))
         }
         Err(NoPlan::Wrong(line)) => {
             let file = options.file();
@@ -138,6 +131,17 @@ fn run(options: &Options) -> Result<(), Failure> {
             &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
         ),
     }
+}
+
+/// Returns the report of a data rate that no number of relays carries.
+fn slower(rates: Option<RateReport>, options: &Options) -> PlanReport {
+    let error = rates.as_ref().map(too_fast).unwrap_or_default();
+    let why = Why::Plain(error);
+    PlanReport {
+        uavs: None,
+        ..PlanReport::unmet(&why, None, Number::Of(0), options.unit())
+    }
+    .with_rates(rates)
 }
 
 /// Result of planning: the plan, the request that it answers, and the data rates.
@@ -303,9 +307,7 @@ fn terrain(
     let Some(elevation) = elevation else {
         return Ok((None, None));
     };
-    let report = elevation
-        .report(scenario, plan)
-        .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
+    let (report, problem) = over(options, elevation, scenario, plan)?;
     if let Some(file) = &options.terrain.profile {
         let drawing = draw(&chart(&report, scenario), "profile of the chain");
         let drawing = drawing.map_err(|error| Failure::input(format!("--profile: {error:?}")))?;
@@ -321,8 +323,21 @@ fn terrain(
         }
         _ => None,
     };
-    let problem = elevation.problem(&report, options.terrain.allow_blocked);
     Ok((Some(report), problem.or(missed)))
+}
+
+/// Returns the terrain below `plan`, and the reason why it cannot be flown there.
+fn over(
+    options: &Options,
+    elevation: &Elevation,
+    scenario: &Scenario,
+    plan: &Plan,
+) -> Result<(TerrainReport, Option<String>), Failure> {
+    let report = elevation
+        .report(scenario, plan)
+        .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
+    let problem = elevation.problem(&report, options.terrain.allow_blocked);
+    Ok((report, problem))
 }
 
 fn by_rate(
@@ -643,16 +658,13 @@ fn write_out(
             )));
         }
     }
-    if let Some(elevation) = elevation {
-        let report = elevation
-            .report(scenario, &flown.plan)
-            .map_err(|line| Failure::input(format!("{}: {line}", options.file())))?;
-        if let Some(line) = elevation.problem(&report, options.terrain.allow_blocked) {
-            return Err(Failure::unmet(format!(
-                "--out {}: not written: at the positions on which {relays} relays would agree, {line}",
-                file.display()
-            )));
-        }
+    if let Some(elevation) = elevation
+        && let Some(line) = over(options, elevation, scenario, &flown.plan)?.1
+    {
+        return Err(Failure::unmet(format!(
+            "--out {}: not written: at the positions on which {relays} relays would agree, {line}",
+            file.display()
+        )));
     }
     let text = match &options.scenario {
         Some(scenario) => std::fs::read_to_string(scenario)
