@@ -17,6 +17,9 @@ const FEW: usize = 10;
 /// Time until an alarm, in addition to the time that the chain itself needs to notice the fault, s.
 const SOON_S: f64 = 2.0;
 
+/// Time that reports wait for an agreement after a loss or a restart, s: `src/docs/flight.md`, Telemetry.
+const WAIT_S: f64 = 2.0;
+
 /// Tty of the channel for a second node with a relay's number.
 pub(crate) const SECOND: usize = 9;
 
@@ -35,7 +38,7 @@ const TWO: &str = "critical two nodes have the number #";
 ///
 /// An autopilot reports its mode every second. A companion waits 3 s for a silent autopilot, and 1 s for a position. A
 /// station waits 5 s for a report, and 15 s for a drone that does not move. Relays notice a missing quorum 15 s after the
-/// losses and an attempt to agree. After a loss or a restart, reports wait up to 2 s for an agreement.
+/// losses and an attempt to agree.
 const SCRIPT: [&[Fault]; 15] = [
     &[
         ("pilot", 3, 1.0, RELEASED),
@@ -45,13 +48,17 @@ const SCRIPT: [&[Fault]; 15] = [
     ],
     &[
         ("kill", 4, 5.0, LOST),
-        ("reboot", 7, 3.0, RELEASED),
-        ("rtl", 2, 3.0, RELEASED),
+        // The mode arrives after 1 s, and the report waits for the agreement without relay 4.
+        ("reboot", 7, 1.0 + WAIT_S, RELEASED),
+        // As for relay 7.
+        ("rtl", 2, 1.0 + WAIT_S, RELEASED),
     ],
     &[
         ("cut", 2, 5.0, LOST),
-        ("gps", 5, 3.0, BLIND),
-        ("pilot", 8, 3.0, RELEASED),
+        // A position is missed after 1 s, and the report waits for the agreement without relay 2.
+        ("gps", 5, 1.0 + WAIT_S, BLIND),
+        // The mode arrives after 1 s; the report waits, too.
+        ("pilot", 8, 1.0 + WAIT_S, RELEASED),
     ],
     &[
         ("refuse", 5, 17.0, STUCK),
@@ -176,6 +183,13 @@ impl Stage {
             );
             if it["cleared_s"].is_null() {
                 failures.push(format!("{group:?}: does not end: {it}"));
+            }
+        }
+        let hurt: Vec<u64> = group.iter().flat_map(|it| hurt(it.0, it.1)).collect();
+        for it in &new {
+            let text = it["text"].as_str().unwrap();
+            if subject(text).is_some_and(|it| !hurt.contains(&it)) {
+                failures.push(format!("{group:?}: a relay without a fault: {text}"));
             }
         }
         for fault in group {
@@ -311,6 +325,21 @@ impl Stage {
             );
         }
     }
+}
+
+/// Returns the relays that a fault concerns.
+fn hurt(what: &str, relay: usize) -> std::ops::RangeInclusive<u64> {
+    match what {
+        "no quorum" => 4..=8,
+        _ => relay as u64..=relay as u64,
+    }
+}
+
+/// Returns the relay that an alarm is about; `None` if it is about the whole chain.
+fn subject(text: &str) -> Option<u64> {
+    let rest = text.strip_prefix("relay ")?;
+    let end = rest.find(|it: char| !it.is_ascii_digit());
+    rest[..end.unwrap_or(rest.len())].parse().ok()
 }
 
 /// Returns true if an alarm begins with `start`, and no digit follows.
