@@ -31,7 +31,7 @@ const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 /// Age of a nearer relay's report from which the reports of the relays behind it may have no way.
 const UNSURE_AFTER: Duration = Duration::from_millis(2_500);
 
-/// Age of a nearer relay's report from which the relays behind it have had the time to find another way.
+/// Age of a nearer relay's report from which the relays behind it have found another way.
 const CLOSED_AFTER: Duration = SILENT_AFTER.times(2);
 
 /// Time for which the rejection of a frame is shown.
@@ -358,7 +358,7 @@ impl StationView {
         all
     }
 
-    /// Returns true if a relay nearer to the station has just become silent: it may have been on the way of the reports.
+    /// Returns true if a relay nearer to the station, a possible way of the reports, has just become silent.
     fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
         let all = self.known.values().map(|it| &it.report);
         let mut nearer = all.filter(|it| match end {

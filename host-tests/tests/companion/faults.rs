@@ -17,7 +17,7 @@ const FEW: usize = 7;
 /// Time until an alarm, in addition to the time that the chain itself needs to notice the fault, s.
 const SOON_S: f64 = 2.0;
 
-/// Time that reports wait for an agreement after a loss or a restart, s: `src/docs/flight.md`, Telemetry.
+/// Time that reports wait for an agreement after a loss, s: see `src/docs/flight.md`, Telemetry.
 const WAIT_S: f64 = 2.0;
 
 /// Fault: command, relay (0: the chain), time that the chain itself needs to notice it, s, and alarm. `#` in the alarm
@@ -107,7 +107,7 @@ impl Stage {
         Self { chain, flown, page }
     }
 
-    /// Runs the faults of the script, as many as COUNT says, or only those of the groups of the list ONLY, from 0.
+    /// Runs as many faults as COUNT says, or only those of the groups in the list ONLY, from 0.
     pub(crate) fn run(&mut self) {
         let count = std::env::var("COUNT").map_or(FEW, |it| it.parse().unwrap());
         let mut left = count;
