@@ -34,6 +34,8 @@ pub struct Report {
     pub neighbours: [Option<u16>; 2],
     /// True for a neighbour that this relay does not receive now.
     pub silent: [bool; 2],
+    /// True while another node with this relay's number has been received within three `dead_after`.
+    pub is_duplicated: bool,
     /// Last measured interference at this relay, W, to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
@@ -93,10 +95,11 @@ impl Report {
             agreed: None,
             phase: numbered(&PHASES, digit(1) + 1).unwrap_or(Phase::Idle),
             holds_lease: state / 2048 % 2 == 1,
-            control: numbered(&CONTROLS, state / 4096),
+            control: numbered(&CONTROLS, state / 4096 % 6),
             hold_reasons: [8, 64].map(|unit| numbered(&HOLDS, digit(unit))),
             neighbours: [None; 2],
             silent: [512, 1024].map(|unit| state / unit % 2 == 1),
+            is_duplicated: state >= 6 * 4096,
             interference_w: None,
             version: 0,
         };
@@ -126,12 +129,13 @@ mod tests {
             let entry = Entry::new(2, 0, state, Coarse::of(None));
             Report::of(&entry, None, Instant::ZERO)
         };
-        for holds_lease in [false, true] {
+        for (holds_lease, is_duplicated) in [(false, false), (true, false), (false, true)] {
             let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * 4;
-            let report = report(rest + 2048 * u16::from(holds_lease));
+            let flags = 2048 * u16::from(holds_lease) + 24_576 * u16::from(is_duplicated);
+            let report = report(rest + flags);
             assert_eq!(
-                (report.holds_lease, report.phase),
-                (holds_lease, Phase::Holding)
+                (report.holds_lease, report.is_duplicated, report.phase),
+                (holds_lease, is_duplicated, Phase::Holding)
             );
             assert_eq!(report.silent, [false, true]);
             assert_eq!(

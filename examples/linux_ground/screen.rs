@@ -105,6 +105,7 @@ impl Web {
             } else {
                 flown.as_ref()
             },
+            end: plan.end,
             relays: loaded.relays(),
             profiles: &plan.loaded.profiles,
             is_estimated: false,

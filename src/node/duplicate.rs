@@ -167,6 +167,14 @@ impl IndexClaims {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
+    /// Returns true if another node with this relay's number has been received within three `dead_after`.
+    ///
+    /// A passive node sends claims again after up to 2.25 `dead_after`.
+    pub(crate) fn is_observed(&self, now: Instant, settings: &Settings) -> bool {
+        let [own, _] = self.observed;
+        own.is_some_and(|at| now.since(at) < settings.dead_after.times(3))
+    }
+
     /// Returns the sender of `claim`, a claim to this relay's node number: this relay or another node.
     pub(crate) fn rival(&self, claim: Claim) -> Sender {
         if claim.number | RAISED == self.number | RAISED {

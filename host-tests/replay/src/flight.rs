@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::axis::Axis;
 use uav_relay::wire::message::{Detail, Entry, Message};
-use uav_relay::{GuardConfig, Instant, Mission, Phase, Placement, Profile, Report, Upload};
+use uav_relay::{GuardConfig, Instant, Mission, Phase, Placement, Profile, Report, Side, Upload};
 use uav_relay_screen::chain::{Chain, SILENT_AFTER, seconds};
 use uav_relay_screen::station::{Frames, StationView};
 use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
@@ -248,6 +248,8 @@ struct Recorder<'a> {
     loaded: Option<&'a Loaded>,
     view: StationView,
     uploads: BTreeMap<u16, Upload>,
+    /// End of the chain from which the last Watch of a station came.
+    end: Side,
     /// Number of reports and of frames that have been used.
     used: [usize; 2],
     received: u32,
@@ -278,6 +280,7 @@ impl<'a> Recorder<'a> {
             loaded,
             view: StationView::default(),
             uploads: BTreeMap::new(),
+            end: Side::Upstream,
             used: [0; 2],
             received: 0,
             newest: BTreeMap::new(),
@@ -295,6 +298,12 @@ impl<'a> Recorder<'a> {
             match &frame.message {
                 Some(Message::Offer { upload, .. }) => {
                     self.uploads.insert(upload.version(), *upload);
+                }
+                Some(Message::Watch { .. }) if frame.header.sender == 0 => {
+                    self.end = Side::Upstream;
+                }
+                Some(Message::Watch { .. }) if frame.header.sender > flight.relays => {
+                    self.end = Side::Downstream;
                 }
                 Some(Message::Report(_)) => self.received += 1,
                 _ => {}
@@ -346,6 +355,7 @@ impl<'a> Recorder<'a> {
             .filter(|_| version == 0 || upload.is_some() && sites.is_none());
         let chain = Chain {
             mission: uploaded.as_ref().or(base.map(|it| &it.mission)),
+            end: self.end,
             relays,
             profiles: self.loaded.map_or(&[], |it| it.profiles.as_slice()),
             is_estimated: false,

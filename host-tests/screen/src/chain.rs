@@ -3,7 +3,7 @@
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Geofence, HoldReason, Instant, Interference, Mission, Phase, Placement, Profile, Report,
+    Geofence, HoldReason, Instant, Interference, Mission, Phase, Placement, Profile, Report, Side,
 };
 
 use crate::alarms::Alarms;
@@ -25,6 +25,8 @@ pub fn seconds(at: Instant) -> f64 {
 pub struct Chain<'a> {
     /// Mission that the chain flies; `None` if it is unknown. Rx, the SIRs and the interferer are then unknown, too.
     pub mission: Option<&'a Mission>,
+    /// End of the chain at which the station is.
+    pub end: Side,
     /// Number of relays that are listed even if they have not reported.
     pub relays: u16,
     /// Altitude and power of relays that differ from the mission's common ones, by number.

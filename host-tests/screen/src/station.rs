@@ -4,8 +4,9 @@
 //! | --- | --- |
 //! | a relay has not reported yet | notice |
 //! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`], or for one and a half times as long as it recently was, up to 10 s | critical, one for the relay |
+//! | the same without a neighbour's report, within 10 s of the last report of a relay nearer to the station that is silent, too | none yet: the reports may have to find another way |
 //! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
-//! | no quorum, no feasible positions | critical |
+//! | no quorum, no feasible positions, two nodes with a relay's number | critical |
 //! | autopilot without a position, or its link lost after it was there | critical |
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
@@ -18,7 +19,7 @@
 use std::collections::BTreeMap;
 
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::{Duration, Instant, Phase, Placement, Report};
+use uav_relay::{Duration, Instant, Phase, Placement, Report, Side};
 
 use crate::alarms::{Alarms, Lasting, Reason, named};
 use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
@@ -26,6 +27,12 @@ use crate::snapshot::{LogLine, Snapshot};
 
 /// Time without any frame after which no alarm about a single relay begins: the station may be cut off.
 const QUIET_AFTER: Duration = Duration::from_millis(2_000);
+
+/// Age of a nearer relay's report from which the reports of the relays behind it may have no way.
+const UNSURE_AFTER: Duration = Duration::from_millis(2_500);
+
+/// Age of a nearer relay's report from which the relays behind it have found another way.
+const CLOSED_AFTER: Duration = SILENT_AFTER.times(2);
 
 /// Time for which the rejection of a frame is shown.
 const REJECTED_FOR: Duration = Duration::from_millis(30_000);
@@ -181,7 +188,7 @@ impl StationView {
         self.count(now, frames, is_new);
         self.follow_version(now);
         self.drop_answered_claims(now);
-        let lasting = self.lasting(now, chain.relays);
+        let lasting = self.lasting(now, chain);
         self.alarms.settle(seconds(now), lasting);
         let reports: Vec<Report> = self.known.values().map(|it| it.report).collect();
         Snapshot {
@@ -269,7 +276,7 @@ impl StationView {
         claims.map(|(by, _)| *by).collect()
     }
 
-    fn lasting(&self, now: Instant, relays: u16) -> Vec<Lasting> {
+    fn lasting(&self, now: Instant, chain: &Chain<'_>) -> Vec<Lasting> {
         let mut all = Vec::new();
         let mut add = |reason, subject, by: Vec<u16>, note| all.push((reason, subject, by, note));
         let quiet = now.since(self.frame_at);
@@ -282,7 +289,7 @@ impl StationView {
             add(Reason::ChainSilent, 0, Vec::new(), note);
         }
         let is_unknown = |it: &u16| !self.known.contains_key(it);
-        let unknown: Vec<u16> = (1..=relays).filter(is_unknown).collect();
+        let unknown: Vec<u16> = (1..=chain.relays).filter(is_unknown).collect();
         if !unknown.is_empty() {
             let note = if received == 0 && self.known.is_empty() {
                 "; nothing received from the chain yet".to_owned()
@@ -304,7 +311,9 @@ impl StationView {
             let after = known.silent_after();
             let is_late = now.since(known.report.at) >= after;
             // While nothing at all is received, an alarm that has begun stays, and none begins.
-            let begins = quiet < QUIET_AFTER && now.since(heard_at) >= after;
+            let begins = quiet < QUIET_AFTER
+                && now.since(heard_at) >= after
+                && !self.may_be_behind(now, chain.end, number);
             let is_silent = is_late && (begins || self.alarms.lasts(Reason::Lost, number));
             if is_silent || !by.is_empty() {
                 let note = match (is_late, by.is_empty()) {
@@ -315,6 +324,7 @@ impl StationView {
                 add(Reason::Lost, number, by, note);
             }
             let own = [
+                (Reason::Duplicate, known.report.is_duplicated),
                 (Reason::Blind, known.is_blind()),
                 (Reason::LinkLost, known.is_link_lost),
                 (Reason::Released, known.is_released),
@@ -346,6 +356,16 @@ impl StationView {
             }
         }
         all
+    }
+
+    /// Returns true if a relay nearer to the station, a possible way of the reports, has just become silent.
+    fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
+        let all = self.known.values().map(|it| &it.report);
+        let mut nearer = all.filter(|it| match end {
+            Side::Upstream => it.relay < number,
+            Side::Downstream => it.relay > number,
+        });
+        nearer.any(|it| (UNSURE_AFTER..CLOSED_AFTER).contains(&now.since(it.at)))
     }
 
     /// Returns the gaps that relays report now, for an alarm about relays that may be behind one.

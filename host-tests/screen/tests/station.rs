@@ -12,7 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::{Instant, Mission, Phase, Placement, Report};
+use uav_relay::{Instant, Mission, Phase, Placement, Report, Side};
 use uav_relay_screen::chain::Chain;
 use uav_relay_screen::station::{Frames, StationView};
 use uav_relay_screen::{Condition, Snapshot};
@@ -42,6 +42,7 @@ fn healthy(relay: u16) -> Report {
         hold_reasons: [None; 2],
         neighbours: [Some(relay - 1).filter(|it| *it > 0), next],
         silent: [false; 2],
+        is_duplicated: false,
         interference_w: None,
         version: 0,
     }
@@ -91,6 +92,7 @@ impl Watched {
     fn show(&mut self) {
         let chain = Chain {
             mission: Some(&self.mission),
+            end: Side::Upstream,
             relays: RELAYS,
             profiles: &[],
             is_estimated: false,
@@ -134,6 +136,7 @@ impl Watched {
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
             "skipsback" => (report.neighbours[0], report.silent[0]) = (Some(relay - 2), false),
             "deafnext" | "nonextyet" => report.silent[1] = true,
+            "duplicated" => report.is_duplicated = true,
             "deafback" => report.silent[0] = true,
             other => panic!("{other}"),
         }

@@ -94,6 +94,11 @@ impl Relay {
         }
     }
 
+    /// Returns the new lines of the error output.
+    pub(crate) fn errors(&mut self) -> Vec<String> {
+        self.errors.try_iter().collect()
+    }
+
     /// Returns true if a line that the process has printed contains `part`.
     pub(crate) fn has_printed(&mut self, part: &str) -> bool {
         self.seen.extend(self.lines.try_iter());

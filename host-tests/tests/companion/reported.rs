@@ -7,7 +7,7 @@ use serde_json::Value;
 use uav_relay_scenario::Scenario;
 
 use crate::chain::{Chain, simulated};
-use crate::faults::{SECOND, Stage};
+use crate::faults::Stage;
 use crate::files::write;
 use crate::medium::{Medium, QUIET};
 use crate::peer::{Peer, ReceivedMessage, Site, TX, apart_m, distance_to_m, on_earth, options};
@@ -189,7 +189,7 @@ pub(crate) fn station(chain: &Chain, tty: &str) -> Relay {
 
 #[test]
 fn the_page_shows_eight_flying_relays_and_their_faults() {
-    let chain = Chain::on_channel(8, Medium::paced(SECOND + 1, 57_600));
+    let chain = Chain::on_channel(8, Medium::paced(9, 57_600));
     let mut station = station(&chain, &format!("{} --shared", chain.media[0].tty(8)));
     let mut page = Page::open(&mut station);
     let distance_m = distance_to_m(RX);

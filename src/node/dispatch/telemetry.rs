@@ -38,7 +38,7 @@ impl Node {
             return None;
         }
         let own = if cfg!(feature = "telemetry") {
-            self.own()
+            self.own(now)
         } else {
             Own::default()
         };
@@ -61,13 +61,15 @@ impl Node {
         }
     }
 
-    fn own(&self) -> Own {
+    fn own(&self, now: Instant) -> Own {
         let hold = |side| self.hold_reason(side).map_or(0, |reason| reason as u16 + 1);
         let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
         let sides = [Side::Upstream, Side::Downstream];
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
         let holds_lease = u16::from(self.lease().is_some());
-        let state = self.phase() as u16 + 8 * a + 64 * b + 512 * (c + 2 * d + 4 * holds_lease);
+        let is_duplicated = u16::from(self.duplicate.is_observed(now, &self.member.settings));
+        let flags = 512 * (c + 2 * d + 4 * holds_lease) + 24_576 * is_duplicated;
+        let state = self.phase() as u16 + 8 * a + 64 * b + flags;
         (state, [self.setpoint(), self.agreed_place()])
     }
 }

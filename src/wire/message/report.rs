@@ -16,7 +16,7 @@ const MOST_ENTRIES: usize = 4;
 const UNKNOWN: i32 = -(1 << 23);
 
 /// Number of states of a relay: see [`Entry::state`].
-const STATES: u16 = 24_576;
+const STATES: u16 = 49_152;
 
 /// Largest upper half of a finite positive f32.
 const LARGEST: u16 = 0x7F7F;
@@ -95,9 +95,9 @@ impl Entry {
         self.relay.number()
     }
 
-    /// Returns the number of the state. Its digits are the phase, two hold reasons, flags and the control state.
+    /// Returns the number of the state. Its digits are the phase, two hold reasons, flags, the control state and a flag.
     ///
-    /// Their units are 1, 8, 64, 512 and 4096.
+    /// Their units are 1, 8, 64, 512, 4096 and 24576.
     pub const fn state(&self) -> u16 {
         self.state.number()
     }

@@ -8,7 +8,7 @@ mod alarms;
 use std::collections::BTreeMap;
 
 use uav_relay::flight::axis::Axis;
-use uav_relay::{Geofence, Instant, Report};
+use uav_relay::{Geofence, Instant, Report, Side};
 use uav_relay_screen::alarms::Alarms;
 use uav_relay_screen::{Condition, LogLine, Snapshot, chain};
 
@@ -68,6 +68,7 @@ impl LiveView {
         let reports: Vec<Report> = self.known.values().copied().collect();
         let state = chain::Chain {
             mission: Some(chain.mission()),
+            end: Side::Upstream,
             relays: 0,
             profiles: &profiles,
             is_estimated,

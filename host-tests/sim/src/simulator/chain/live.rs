@@ -75,6 +75,7 @@ impl Chain {
                     .map(|side| relay.hold_reason(side)),
                 neighbours: relay.neighbours(),
                 silent: [false; 2],
+                is_duplicated: false,
                 interference_w: None,
                 version: relay.version(),
             };
