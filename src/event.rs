@@ -115,6 +115,9 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
+    /// This relay, which requested it by `Relay::leave`, is no member of the chain any more: the others have closed up,
+    /// and its drone may fly away.
+    MayLeave,
 }
 
 /// Events that concern no node and that the firmware receives first, before those that concern a node. The other
@@ -146,6 +149,7 @@ const POLLED_LAST: &[Event] = &[
     Event::Adopted,
     Event::NewEstimate,
     Event::InterfererUnclear,
+    Event::MayLeave,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.
@@ -193,7 +197,7 @@ impl NodeEvent {
 /// Raised events that the firmware has not polled yet, with the nodes that they concern.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
-    events: u16,
+    events: u32,
     /// Raised events that concern a node at the upstream [0] and the downstream [1] side. Bit i stands for
     /// `NodeEvent::ALL[i]`.
     kinds: [u8; 2],
@@ -202,11 +206,11 @@ pub(crate) struct Pending {
 
 impl Pending {
     #[inline(never)] // a search, in every place where an event is raised
-    fn bit(event: Event) -> u16 {
+    fn bit(event: Event) -> u32 {
         POLLED_FIRST
             .iter()
             .chain(POLLED_LAST)
-            .zip(0..16)
+            .zip(0..32)
             .find(|(known, _)| **known == event)
             .map_or(0, |(_, bit)| 1 << bit)
     }

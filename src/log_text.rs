@@ -108,6 +108,7 @@ fn text(event: Event) -> defmt::Str {
             "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
         ),
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
+        Event::MayLeave => defmt::intern!("the chain has closed up: this drone may fly away"),
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }

@@ -156,6 +156,10 @@ impl Report {
                 "interferer unclear",
                 "the measurements do not fit a single interferer on the ground, or are too few; the relays keep their last estimate",
             ),
+            Event::MayLeave => tell(
+                "may leave",
+                "the other relays have closed up, so this drone may fly away",
+            ),
             other => self.node_event(now, other, relay),
         }
     }

@@ -547,6 +547,7 @@ impl Ground {
                 active: false,
                 active_in_view: false,
                 refused: false,
+                outside: false,
                 offer_number: if is_query { self.query_number } else { 0 },
             })
         };

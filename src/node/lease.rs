@@ -47,7 +47,7 @@ use super::context::{PAUSE, earliest, longest_lease, tenths};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Message, Pulse, Pulsed};
+use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
@@ -85,6 +85,14 @@ pub(crate) struct Lease {
     /// Slowly decaying maximum of recent round trips of lease renewals through the chain.
     round_trip: Duration,
     circulation: Circulation,
+    /// Orders of the leader in the last renewal of this view.
+    orders: Orders,
+    /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
+    requests: Option<Requests>,
+    /// Number of relays of the view when no relay requested to leave; known at the leader.
+    complement: u16,
+    /// Start of the wait for a spare or for the relays' motion: the last view, or the first request to leave.
+    waits_since: Instant,
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -106,7 +114,48 @@ impl Lease {
             next_at: None,
             round_trip: Duration::from_micros(0),
             circulation: Circulation::new(seed),
+            orders: Orders::NONE,
+            requests: None,
+            complement: 0,
+            waits_since: now,
         }
+    }
+
+    /// Returns the leader's last orders in this view.
+    pub(crate) const fn orders(&self) -> Orders {
+        self.orders
+    }
+
+    /// Returns true if all relays of the view have the leader's last orders, as far as this relay knows.
+    pub(crate) fn has_completed(&self) -> bool {
+        self.current.is_some() && !self.circulation.is_outstanding()
+    }
+
+    /// Returns the leader's orders for the next renewal, by the requests in the last one.
+    ///
+    /// A relay may leave once all relays are in place. If there is a spare, it joins first, unless the view already has
+    /// more relays than without requests. Neither wait is longer than the maximum duration of a lease.
+    fn next_orders(&mut self, context: &Context<'_>) -> Orders {
+        let Some(requests) = self.requests else {
+            return Orders::NONE;
+        };
+        let relays = context.mission().relays();
+        let mut orders = Orders {
+            in_place: requests.in_place,
+            ..Orders::NONE
+        };
+        if requests.leaver == 0 || self.complement == 0 {
+            self.complement = relays;
+            self.waits_since = context.now;
+        }
+        let late = context.now.since(self.waits_since) >= longest_lease(context.settings());
+        if requests.leaver == 0 {
+        } else if requests.spare != 0 && relays <= self.complement && !late {
+            orders.joiner = requests.spare;
+        } else if requests.in_place || late {
+            orders.leaver = requests.leaver;
+        }
+        orders
     }
 
     /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. A lease
@@ -170,6 +219,7 @@ impl Lease {
         let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
         self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
         self.accepted = (view, rest);
+        self.waits_since = now;
         self.end();
     }
 
@@ -181,6 +231,8 @@ impl Lease {
         self.current = None;
         self.next_at = None;
         self.circulation.withdraw();
+        self.orders = Orders::NONE;
+        self.requests = None;
     }
 
     /// Records that all members have accepted this relay's view. Leases of earlier views then end by the time from
@@ -237,6 +289,7 @@ impl Lease {
             // Another node with this relay's index has agreed on the position.
             return Effects::FOREIGN;
         }
+        self.orders = pulse.orders;
         self.join_renewal(context, pulse.number, pulse.lease);
         effects
     }
@@ -266,17 +319,22 @@ impl Lease {
         self.current = Some(Current { number, span });
         self.circulation.start(context.now);
         if context.is_last() {
-            self.complete_renewal(context);
+            self.complete_renewal(context, None);
         }
     }
 
     /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal.
-    fn complete_renewal(&mut self, context: &Context<'_>) {
+    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this one.
+    fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
             return;
         };
+        let own = Requests {
+            in_place: context.requests.in_place && self.is_agreed,
+            ..context.requests
+        };
+        self.requests = Some(received.map_or(own, |received| received.merge(own)));
         self.vouched_until = self
             .vouched_until
             .max(context.now + from_tenths(current.span));
@@ -329,7 +387,7 @@ impl Lease {
         }
         let forwarded_at = self.circulation.started_at();
         if pulsed.done {
-            self.complete_renewal(context);
+            self.complete_renewal(context, Some(pulsed.requests));
         } else {
             let path = context.path_to_last();
             self.circulation.on_in_progress(context.now, path);
@@ -349,6 +407,7 @@ impl Lease {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
             let span = self.announced_span(context.settings());
+            self.orders = self.next_orders(context);
             self.join_renewal(context, number.wrapping_add(1), span);
         }
         let lapsed = self.until().is_some_and(|at| at <= now);
@@ -373,6 +432,7 @@ impl Lease {
             number: current.number,
             view_digest: context.digest(),
             lease: current.span,
+            orders: self.orders,
         }))
     }
 
@@ -384,6 +444,7 @@ impl Lease {
             number: current.number,
             view_digest: context.digest(),
             done: reply == Reply::Result,
+            requests: self.requests.unwrap_or(Requests::NONE),
         }))
     }
 

@@ -42,4 +42,4 @@ pub(crate) mod sample;
 mod steering;
 pub(crate) mod view;
 
-pub(crate) use dispatch::Node;
+pub(crate) use dispatch::{Node, departure};

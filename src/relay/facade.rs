@@ -7,6 +7,7 @@ use crate::geodetic::Sites;
 use crate::guard::HoldReason;
 use crate::mission::{Interference, Mission, Profile};
 use crate::node::Node;
+use crate::node::departure::Departure;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
@@ -714,6 +715,39 @@ impl Relay {
     #[doc(hidden)]
     pub fn report_control(&mut self, state: crate::flight::autopilot::state::State) {
         self.node.reporting.handle_control(state as u16 + 1);
+    }
+
+    /// Requests to leave the chain, because the drone has to land soon. `endurance_s` is the remaining endurance of the
+    /// drone, s; `None` if it is unknown. Call it again when that changes.
+    ///
+    /// The relay holds its place until [`Event::MayLeave`]. Before this relay has taken part in anything, it makes the
+    /// relay a spare: it waits outside of the chain until the leader calls it to replace another relay. The first
+    /// leader cannot be a spare. See [`docs::batteries`](crate::docs::batteries). Takes constant time.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Departure, DepartureRefusal, Instant, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// relay.leave(Instant::from_millis(1_000), Some(240));
+    /// let refused = Departure::Refused(DepartureRefusal::Wires);
+    /// assert_eq!(relay.departure(Instant::from_millis(1_000)), refused, "two wires per relay");
+    /// ```
+    pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
+        let now = self.clock.advance(now);
+        self.node.leave(now, endurance_s);
+    }
+
+    /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
+    pub fn stay(&mut self, now: Instant) {
+        let now = self.clock.advance(now);
+        self.node.stay(now);
+    }
+
+    /// Returns the state of this relay's departure at `now`. Takes constant time.
+    pub fn departure(&self, now: Instant) -> Departure {
+        self.node.departure(now)
     }
 
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See

@@ -207,6 +207,9 @@ impl Node {
             }
         };
         self.apply(now, effects);
+        if let Message::Pulse(_) | Message::Pulsed(_) = message {
+            self.follow_orders(now);
+        }
     }
 
     /// Records that the neighbour at `side` was alive at time `at` or later. It has replied to a message sent at that

@@ -11,6 +11,7 @@
 //! | `setpoint` | setpoint, and reports of the drone |
 //! | `adoption` | adoption of a decided view and its mission |
 //! | `claims` | claims to this node's number |
+//! | `departure` | relays that leave the chain, or wait outside of it |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
 //! | `telemetry` | reports of this relay's state, and those that it hands on |
@@ -40,9 +41,11 @@ use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Claim, Proposal};
+use departure::Leaving;
 
 mod adoption;
 mod claims;
+pub(crate) mod departure;
 mod hellos;
 mod incoming;
 mod offers;
@@ -106,6 +109,7 @@ impl Node {
                 lease: Lease::new(!seed.rotate_left(16), now, settings),
                 update: MissionUpdate::new(&member, seed.rotate_left(4), now),
                 round: Round::new(leads, number, profile, settings, seed, now),
+                leaving: Leaving::default(),
             },
             steering: Steering::NONE,
             reporting: Reporting::default(),
@@ -338,6 +342,7 @@ pub(super) struct Layers {
     pub(super) lease: Lease,
     pub(super) update: MissionUpdate,
     pub(super) round: Round,
+    pub(super) leaving: Leaving,
 }
 
 impl Layers {
@@ -351,6 +356,7 @@ impl Layers {
             latest: self.update.latest(),
             end: self.neighbours.at(onward).has_no_peer(),
             other_leases: self.lease.other_leases(now),
+            requests: self.requests(now, member),
         }
     }
 

@@ -29,6 +29,7 @@ impl Node {
     pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {
         self.steering.handle_position(measured_at, place);
         self.reporting.handle_position(measured_at, place);
+        self.layers.leaving.record_place(place);
         self.steer(now);
     }
 

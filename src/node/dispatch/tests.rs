@@ -95,6 +95,7 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
         active: true,
         active_in_view: false,
         refused: false,
+        outside: false,
         offer_number: 9,
     })
 }

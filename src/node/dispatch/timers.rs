@@ -28,6 +28,7 @@ impl Node {
             self.on_solved(now);
         }
         self.drop_links_if_expired(now);
+        self.return_if_expired(now);
         for side in [Side::Upstream, Side::Downstream] {
             if self.layers.neighbours.at(side).is_due(now) {
                 self.on_neighbour_timeout(now, side);

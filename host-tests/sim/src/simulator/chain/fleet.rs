@@ -2,9 +2,9 @@
 
 use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::{Duration, HoldReason, Instant, Side};
+use uav_relay::{Departure, Duration, HoldReason, Instant, Side};
 
-use super::{Chain, QueuedEvent};
+use super::{Chain, Member, QueuedEvent};
 use crate::simulator::drones::{Flight, Nearest, Point, apart, placement, point};
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::TimelineEvent;
@@ -285,8 +285,35 @@ impl Chain {
             }
         }
         self.keep(flight.nearest(now));
+        if self.setup.track {
+            let serving = self.serving(&flight);
+            self.outcome.serving.push((now, serving));
+        }
         self.queue.put(now + flight.step, 0, QueuedEvent::Fly);
         self.flight = Some(flight);
+    }
+
+    /// Returns the drones that relay data now, by relay number from 1, with their true positions.
+    fn serving(&self, flight: &Flight) -> Vec<(u16, Point)> {
+        let living = || {
+            let all = self.members.iter().enumerate();
+            all.filter(|(_, member)| member.killed.is_none())
+        };
+        let inside = |member: &Member| {
+            !matches!(
+                member.relay.departure(self.now),
+                Departure::Spare | Departure::Free
+            )
+        };
+        let newest = living().filter(|(_, member)| inside(member));
+        let newest = newest.map(|(_, member)| member.relay.view()).max();
+        living()
+            .filter(|(_, member)| {
+                let holds = member.relay.departure(self.now) == Departure::Outside;
+                holds || inside(member) && Some(member.relay.view()) == newest
+            })
+            .filter_map(|(index, member)| Some((member.node, flight.true_position(index)?)))
+            .collect()
     }
 
     /// Records `nearest`, two drones and their distance, if it is the closest approach of the run so far.

@@ -1,0 +1,357 @@
+//! Departure: a relay leaves the chain while it still holds its place, or waits outside of it as a spare.
+//!
+//! Requests travel to the leader in the replies to lease renewals, orders from the leader in the renewals (see `lease`). The states
+//! and rules are in [`docs::batteries`](crate::docs::batteries).
+//!
+//! | event | action |
+//! | --- | --- |
+//! | `leave`, before this relay has taken part in anything | go outside as a spare |
+//! | order to leave; hello of a neighbour that has selected the relay beyond | go outside; keep the setpoint |
+//! | order for the neighbour to leave, received by all | ask the nodes beyond it for a hello; at the end of the chain: give up the neighbour |
+//! | hello of the node beyond the neighbour that is ordered to leave | select it |
+//! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
+//! | outside, hello of a member that the view without this relay is complete and in place | raise `MayLeave` |
+//! | outside, called or `stay`, or not free for eight times `dead_after` | join as a relay that was lost |
+
+use super::{Layers, Node};
+use crate::event::Event;
+use crate::node::context::{Member, longest_lease};
+use crate::node::neighbour::hearing::CANDIDATES;
+use crate::place::Placement;
+use crate::settings::Wiring;
+use crate::side::Side;
+use crate::time::Instant;
+use crate::view::ViewId;
+use crate::wire::message::{Hello, Requests};
+
+/// Maximum distance of a drone in place from its agreed position, m.
+const IN_PLACE_M: f32 = 3.0;
+
+/// Time after which a departure counts as blocked, in units of `dead_after`: the neighbours do not receive each other. It is
+/// requested again after the same time.
+const BLOCKED_AFTER: u32 = 4;
+
+/// State of a relay that leaves the chain or waits outside of it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Departure {
+    /// Member of the chain, or about to join it.
+    Member,
+    /// Departure requested: the relay holds its place until the leader's order.
+    Requested,
+    /// Departure requested, but not possible now. The relay holds its place; the reason may pass.
+    Refused(DepartureRefusal),
+    /// Outside of the chain, as a spare that the leader may call.
+    Spare,
+    /// Outside of the chain: the others close up. The relay holds its place.
+    Outside,
+    /// Outside of the chain: the drone may fly away.
+    Free,
+}
+
+/// Reason why a relay cannot leave the chain now.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum DepartureRefusal {
+    /// Departure refused: over two wires per relay the neighbours cannot receive each other.
+    Wires,
+    /// Departure refused: the remaining relays would have no quorum, or there are none.
+    Quorum,
+    /// Departure refused: the numbers of the two neighbours differ by more than four.
+    Gap,
+    /// Departure refused for a minute: the two neighbours have not selected each other.
+    Neighbours,
+}
+
+error_texts!(DepartureRefusal {
+    Wires => "a relay with two wires cannot leave the chain: its neighbours do not receive each other",
+    Quorum => "the relay cannot leave the chain: the remaining relays would have no quorum",
+    Gap => "the relay cannot leave the chain: the numbers of its neighbours differ by more than 4",
+    Neighbours => "the relay cannot leave the chain now: its neighbours have not selected each other",
+});
+
+/// Departure of this relay, and what it knows of spares.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Leaving {
+    requested: bool,
+    /// Remaining endurance, s; `None` if unknown.
+    endurance_s: Option<u16>,
+    /// Time at which this relay went outside of the chain; `None` inside.
+    outside_since: Option<Instant>,
+    spare: bool,
+    free: bool,
+    /// Time of the first order to leave since the request; `None` before.
+    ordered_at: Option<Instant>,
+    /// Last reported position of the drone; `None` before any.
+    place: Option<Placement>,
+    /// Spare that was received last, and when.
+    heard_spare: Option<(u16, Instant)>,
+}
+
+impl Leaving {
+    pub(crate) const fn is_outside(&self) -> bool {
+        self.outside_since.is_some()
+    }
+
+    /// Returns true if this relay waits outside of the chain until it is called.
+    pub(crate) const fn is_spare(&self) -> bool {
+        self.spare
+    }
+
+    pub(crate) const fn record_place(&mut self, place: Placement) {
+        self.place = Some(place);
+    }
+}
+
+impl Layers {
+    /// Returns the reason why this relay cannot leave the chain now; `None` if it can.
+    fn departure_refusal(&self, now: Instant, member: &Member) -> Option<DepartureRefusal> {
+        let Member {
+            node,
+            mission,
+            settings,
+            view,
+            ..
+        } = member;
+        let relays = u32::from(mission.relays());
+        let proposer = match *view {
+            ViewId::LOADED => mission.leader(),
+            view => view.proposer(),
+        };
+        let weight = 2 * relays.saturating_sub(1) + u32::from(proposer != *node);
+        let [before, after] =
+            [Side::Upstream, Side::Downstream].map(|side| self.neighbours.at(side).node());
+        let blocked = settings.dead_after.times(BLOCKED_AFTER);
+        let ordered_for = self.leaving.ordered_at.map(|at| now.since(at));
+        if settings.wiring == Wiring::Pair {
+            Some(DepartureRefusal::Wires)
+        } else if relays < 2 || settings.quorum && weight <= relays {
+            Some(DepartureRefusal::Quorum)
+        } else if before != 0 && after.saturating_sub(before) > CANDIDATES {
+            Some(DepartureRefusal::Gap)
+        } else if ordered_for.is_some_and(|span| blocked <= span && span < blocked.times(2)) {
+            Some(DepartureRefusal::Neighbours)
+        } else {
+            None
+        }
+    }
+
+    /// Returns the requests of this relay to the leader.
+    pub(super) fn requests(&self, now: Instant, member: &Member) -> Requests {
+        let Leaving {
+            requested,
+            endurance_s,
+            place,
+            heard_spare,
+            ..
+        } = self.leaving;
+        let leaves = requested && self.departure_refusal(now, member).is_none();
+        let ordered = self.lease.orders().leaver == member.node;
+        let known = heard_spare.filter(|(_, at)| now.since(*at) < member.settings.dead_after);
+        let agreed = self.round.agreed_place();
+        Requests {
+            leaver: if leaves { member.node } else { 0 },
+            endurance_s: if ordered {
+                0
+            } else {
+                endurance_s.unwrap_or(u16::MAX)
+            },
+            spare: known.map_or(0, |(node, _)| node),
+            in_place: agreed.is_some_and(|agreed| place.is_none_or(|place| is_near(place, agreed))),
+        }
+    }
+}
+
+/// Returns true if a drone at `place` is in place at the agreed position `agreed`.
+fn is_near(place: Placement, agreed: Placement) -> bool {
+    [
+        place.x_m - agreed.x_m,
+        place.y_m - agreed.y_m,
+        place.altitude_m - agreed.altitude_m,
+    ]
+    .iter()
+    .all(|off_m| off_m.abs() <= IN_PLACE_M)
+}
+
+impl Node {
+    /// Requests to leave the chain. `endurance_s` is the remaining endurance of the drone, s; `None` if unknown. A relay that
+    /// has not taken part in anything since its start becomes a spare.
+    pub(crate) fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
+        let leaving = &mut self.layers.leaving;
+        leaving.endurance_s = endurance_s;
+        if leaving.requested {
+            return;
+        }
+        leaving.requested = true;
+        leaving.ordered_at = None;
+        if self.searches() && self.layers.round.is_fresh() {
+            self.go_outside(now, true);
+        }
+    }
+
+    /// Cancels the departure: this relay stays in the chain, or joins it again.
+    pub(crate) fn stay(&mut self, now: Instant) {
+        self.layers.leaving.requested = false;
+        self.come_back(now);
+    }
+
+    pub(crate) fn departure(&self, now: Instant) -> Departure {
+        let leaving = &self.layers.leaving;
+        match self.layers.departure_refusal(now, &self.member) {
+            _ if leaving.free => Departure::Free,
+            _ if leaving.spare => Departure::Spare,
+            _ if leaving.is_outside() => Departure::Outside,
+            _ if !leaving.requested => Departure::Member,
+            Some(refusal) => Departure::Refused(refusal),
+            None => Departure::Requested,
+        }
+    }
+
+    /// Leaves the view: this relay has no neighbours, and no relay selects it. It keeps its setpoint.
+    fn go_outside(&mut self, now: Instant, spare: bool) {
+        self.become_active(now);
+        self.layers.view.request.stop();
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).give_up(now, true);
+        }
+        let leaving = &mut self.layers.leaving;
+        leaving.outside_since = Some(now);
+        leaving.spare = spare;
+    }
+
+    /// Joins the chain again, as a relay that was lost; no effect inside.
+    fn come_back(&mut self, now: Instant) {
+        let leaving = &mut self.layers.leaving;
+        if leaving.outside_since.take().is_none() {
+            return;
+        }
+        leaving.spare = false;
+        leaving.free = false;
+        leaving.ordered_at = None;
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).give_up(now, false);
+        }
+        if self.layers.round.is_fresh() {
+            self.await_first(now);
+        } else {
+            self.layers.view.request.request_now(now);
+        }
+    }
+
+    /// Returns this relay to the chain if it is outside and could not become free for too long.
+    pub(super) fn return_if_expired(&mut self, now: Instant) {
+        let Leaving {
+            outside_since,
+            spare,
+            free,
+            ..
+        } = self.layers.leaving;
+        let most = longest_lease(&self.member.settings);
+        if !spare && !free && outside_since.is_some_and(|at| now.since(at) >= most) {
+            self.come_back(now);
+        }
+    }
+
+    /// Returns true if `node` at `side` is between this relay and its neighbour there, or beyond the end of the chain.
+    fn is_beside(&self, side: Side, node: u16) -> bool {
+        let own = self.member.node;
+        let neighbour = self.layers.neighbours.at(side).node();
+        neighbour == 0 || node.abs_diff(own) < neighbour.abs_diff(own)
+    }
+
+    /// Returns true if node `to` at `side`, outside of the chain, is to be told that it is free: the view without it is agreed
+    /// on and its relays are in place.
+    pub(super) fn frees(&self, side: Side, to: u16) -> bool {
+        let lease = &self.layers.lease;
+        let complete = lease.is_whole() && lease.orders().in_place;
+        complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
+    }
+
+    /// Returns true if node `to` at `side`, outside of the chain, is called to join it.
+    pub(super) fn calls(&self, side: Side, to: u16) -> bool {
+        self.layers.lease.orders().joiner == to && self.is_beside(side, to)
+    }
+
+    /// Follows the leader's orders in the last lease renewal.
+    pub(super) fn follow_orders(&mut self, now: Instant) {
+        let orders = self.layers.lease.orders();
+        if orders.leaver == self.member.node && self.layers.leaving.requested {
+            let blocked = self.member.settings.dead_after.times(2 * BLOCKED_AFTER);
+            let at = self.layers.leaving.ordered_at;
+            let at = at.filter(|at| now.since(*at) < blocked);
+            self.layers.leaving.ordered_at = Some(at.unwrap_or(now));
+        }
+        for side in [Side::Upstream, Side::Downstream] {
+            if orders.joiner != 0
+                && self.side_of(orders.joiner) == Some(side)
+                && self.is_beside(side, orders.joiner)
+            {
+                self.schedule_hello(side, orders.joiner, true);
+            }
+            let neighbour = self.layers.neighbours.at(side);
+            let leaves =
+                orders.leaver != 0 && neighbour.node() == orders.leaver && neighbour.is_agreed();
+            // Before the renewal has completed, relays beyond may not have the order.
+            if !leaves || !self.layers.lease.has_completed() {
+                continue;
+            }
+            let Member { index, mission, .. } = &self.member;
+            let is_end = match side {
+                Side::Upstream => *index <= 2,
+                Side::Downstream => index.saturating_add(1) >= mission.relays(),
+            };
+            if is_end {
+                self.layers.neighbours.at_mut(side).give_up(now, true);
+                self.steering.set_neighbour(side, None);
+                self.schedule_hello(side, orders.leaver, true);
+            } else {
+                self.layers.neighbours.at_mut(side).schedule_hellos();
+            }
+        }
+        self.review_neighbours(now);
+    }
+
+    /// Handles the part of a hello of node `from` that concerns relays outside of the chain. Returns true if nothing else
+    /// in the hello counts: this relay or the sender is outside.
+    pub(super) fn on_departure(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        hello: &Hello,
+    ) -> bool {
+        let (own, settings) = (self.member.node, self.member.settings);
+        let is_neighbour = self.layers.neighbours.at(side).node() == from;
+        if self.layers.leaving.is_outside() {
+            self.layers
+                .neighbours
+                .at_mut(side)
+                .record_unselected(now, &settings);
+            let leaving = &mut self.layers.leaving;
+            if hello.outside && !hello.fresh && !leaving.spare && !leaving.free {
+                leaving.free = true;
+                self.raise(Event::MayLeave);
+            } else if hello.ready && !hello.outside && leaving.spare {
+                leaving.requested = false;
+                self.come_back(now);
+            }
+            return true;
+        }
+        if hello.outside && hello.fresh {
+            if is_neighbour {
+                self.layers.neighbours.at_mut(side).give_up(now, false);
+                self.steering.set_neighbour(side, None);
+            } else if hello.ready && self.is_beside(side, from) {
+                self.layers.leaving.heard_spare = Some((from, now));
+            }
+            return true;
+        }
+        let ordered = self.layers.lease.orders().leaver == own && self.layers.leaving.requested;
+        if is_neighbour && ordered && hello.neighbour != own {
+            self.go_outside(now, false);
+            return true;
+        }
+        false
+    }
+}
