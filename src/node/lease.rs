@@ -133,7 +133,7 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal, by the requests in the last one.
     ///
-    /// A relay may leave once all relays are in place. If there is a spare, it joins first, unless the view already has
+    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If there is a spare, it joins first, unless the view already has
     /// more relays than without requests. Neither wait is longer than the maximum duration of a lease.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let Some(requests) = self.requests else {
@@ -149,10 +149,9 @@ impl Lease {
             self.waits_since = context.now;
         }
         let late = context.now.since(self.waits_since) >= longest_lease(context.settings());
-        if requests.leaver == 0 {
-        } else if requests.spare != 0 && relays <= self.complement && !late {
+        if requests.leaver != 0 && requests.spare != 0 && relays <= self.complement && !late {
             orders.joiner = requests.spare;
-        } else if requests.in_place || late {
+        } else if requests.in_place && self.orders.in_place || late {
             orders.leaver = requests.leaver;
         }
         orders
@@ -444,7 +443,10 @@ impl Lease {
             number: current.number,
             view_digest: context.digest(),
             done: reply == Reply::Result,
-            requests: self.requests.unwrap_or(Requests::NONE),
+            requests: self
+                .requests
+                .filter(|_| reply == Reply::Result)
+                .unwrap_or(Requests::NONE),
         }))
     }
 

@@ -45,6 +45,10 @@ pub(crate) enum ScheduledEvent {
     Off(usize),
     /// Event: an operator informs the relay that the other drone with its index is gone.
     Clear(usize),
+    /// Event: the relay requests to leave the chain, with this remaining endurance, s.
+    Leave(usize, Option<u16>),
+    /// Event: the relay cancels its departure, or joins the chain again.
+    Stay(usize),
     /// Event: the link from `from` to `to` is cut. Several cuts of one link add up.
     Cut {
         from: usize,
@@ -307,6 +311,18 @@ impl Air {
                 let drone = &mut self.drones[at];
                 let now = drone.clock(self.now_us);
                 drone.relay.clear_duplicate_index(now);
+                return Some(at);
+            }
+            ScheduledEvent::Leave(at, endurance_s) => {
+                let drone = &mut self.drones[at];
+                let now = drone.clock(self.now_us);
+                drone.relay.leave(now, endurance_s);
+                return Some(at);
+            }
+            ScheduledEvent::Stay(at) => {
+                let drone = &mut self.drones[at];
+                let now = drone.clock(self.now_us);
+                drone.relay.stay(now);
                 return Some(at);
             }
             ScheduledEvent::Cut { from, to } => self.cuts[from * all + to] += 1,

@@ -24,7 +24,7 @@ use crate::time::Instant;
 use crate::view::ViewId;
 use crate::wire::message::{Hello, Requests};
 
-/// Maximum distance of a drone in place from its agreed position, m.
+/// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
 const IN_PLACE_M: f32 = 3.0;
 
 /// Time after which a departure counts as blocked, in units of `dead_after`: the neighbours do not receive each other. It is
@@ -85,8 +85,12 @@ pub(crate) struct Leaving {
     ordered_at: Option<Instant>,
     /// Last reported position of the drone; `None` before any.
     place: Option<Placement>,
+    /// Current setpoint; `None` before the first agreement.
+    setpoint: Option<Placement>,
     /// Spare that was received last, and when.
     heard_spare: Option<(u16, Instant)>,
+    /// Relay outside of the chain, on this side, that has to be told when it may leave.
+    waiting: Option<(Side, u16)>,
 }
 
 impl Leaving {
@@ -101,6 +105,24 @@ impl Leaving {
 
     pub(crate) const fn record_place(&mut self, place: Placement) {
         self.place = Some(place);
+    }
+
+    pub(crate) const fn record_setpoint(&mut self, setpoint: Option<Placement>) {
+        self.setpoint = setpoint;
+    }
+
+    /// Returns true if the drone has arrived at the setpoint, as far as its position is known.
+    fn is_in_place(&self) -> bool {
+        self.setpoint.is_some_and(|setpoint| {
+            self.place.is_none_or(|place| {
+                let off_m = [
+                    place.x_m - setpoint.x_m,
+                    place.y_m - setpoint.y_m,
+                    place.altitude_m - setpoint.altitude_m,
+                ];
+                off_m.iter().all(|off_m| off_m.abs() <= IN_PLACE_M)
+            })
+        })
     }
 }
 
@@ -142,36 +164,23 @@ impl Layers {
         let Leaving {
             requested,
             endurance_s,
-            place,
             heard_spare,
             ..
         } = self.leaving;
         let leaves = requested && self.departure_refusal(now, member).is_none();
         let ordered = self.lease.orders().leaver == member.node;
         let known = heard_spare.filter(|(_, at)| now.since(*at) < member.settings.dead_after);
-        let agreed = self.round.agreed_place();
         Requests {
             leaver: if leaves { member.node } else { 0 },
-            endurance_s: if ordered {
+            endurance_s: if ordered || !leaves {
                 0
             } else {
                 endurance_s.unwrap_or(u16::MAX)
             },
             spare: known.map_or(0, |(node, _)| node),
-            in_place: agreed.is_some_and(|agreed| place.is_none_or(|place| is_near(place, agreed))),
+            in_place: self.leaving.is_in_place(),
         }
     }
-}
-
-/// Returns true if a drone at `place` is in place at the agreed position `agreed`.
-fn is_near(place: Placement, agreed: Placement) -> bool {
-    [
-        place.x_m - agreed.x_m,
-        place.y_m - agreed.y_m,
-        place.altitude_m - agreed.altitude_m,
-    ]
-    .iter()
-    .all(|off_m| off_m.abs() <= IN_PLACE_M)
 }
 
 impl Node {
@@ -282,6 +291,11 @@ impl Node {
             let at = at.filter(|at| now.since(*at) < blocked);
             self.layers.leaving.ordered_at = Some(at.unwrap_or(now));
         }
+        if orders.in_place
+            && let Some((side, node)) = self.layers.leaving.waiting.take()
+        {
+            self.schedule_hello(side, node, false);
+        }
         for side in [Side::Upstream, Side::Downstream] {
             if orders.joiner != 0
                 && self.side_of(orders.joiner) == Some(side)
@@ -332,7 +346,7 @@ impl Node {
             if hello.outside && !hello.fresh && !leaving.spare && !leaving.free {
                 leaving.free = true;
                 self.raise(Event::MayLeave);
-            } else if hello.ready && !hello.outside && leaving.spare {
+            } else if hello.ready && !hello.fresh && leaving.spare {
                 leaving.requested = false;
                 self.come_back(now);
             }
@@ -342,7 +356,9 @@ impl Node {
             if is_neighbour {
                 self.layers.neighbours.at_mut(side).give_up(now, false);
                 self.steering.set_neighbour(side, None);
-            } else if hello.ready && self.is_beside(side, from) {
+            } else if !hello.ready {
+                self.layers.leaving.waiting = Some((side, from));
+            } else if self.is_beside(side, from) {
                 self.layers.leaving.heard_spare = Some((from, now));
             }
             return true;

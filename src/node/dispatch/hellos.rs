@@ -271,7 +271,7 @@ impl Node {
             passes,
         };
         if neighbour.consider_candidate(candidate, now, settings) {
-            let tells = neighbour.should_report_found();
+            let tells = neighbour.should_report_found() && !passes;
             neighbour.latest_mission = Some(hello.latest_mission);
             layers
                 .update

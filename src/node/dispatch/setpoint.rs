@@ -21,9 +21,13 @@ impl Node {
     }
 
     pub(super) fn steer(&mut self, now: Instant) {
-        if self.steering.steer(now, self.wanted_place()) {
+        let wanted = self.wanted_place();
+        if self.steering.steer(now, wanted) {
             self.raise(Event::SetpointChanged);
         }
+        self.layers
+            .leaving
+            .record_setpoint(self.steering.setpoint(wanted));
     }
 
     pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {

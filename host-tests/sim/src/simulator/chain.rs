@@ -172,7 +172,7 @@ impl Chain {
             event,
             QueuedEvent::Kill
                 | QueuedEvent::Boot
-                | QueuedEvent::Leave
+                | QueuedEvent::Leave(_)
                 | QueuedEvent::Stay
                 | QueuedEvent::Partition
                 | QueuedEvent::Upload
@@ -234,7 +234,7 @@ impl Chain {
                 self.film(index);
                 return;
             }
-            QueuedEvent::Leave => member.relay.leave(now, None),
+            QueuedEvent::Leave(endurance_s) => member.relay.leave(now, endurance_s),
             QueuedEvent::Stay => member.relay.stay(now),
             QueuedEvent::Bytes { port, bytes } => {
                 // The relay must accept any fragmentation of the byte stream: split at a random offset.
@@ -442,8 +442,9 @@ impl Chain {
         for &(index, at) in &setup.boots {
             queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Boot);
         }
-        for &(index, at) in &setup.leaves {
-            queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Leave);
+        for &(index, at, endurance_s) in &setup.leaves {
+            let event = QueuedEvent::Leave(endurance_s);
+            queue.put(at, usize::from(index.saturating_sub(1)), event);
         }
         for &(index, at) in &setup.stays {
             queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Stay);
@@ -602,8 +603,8 @@ pub enum QueuedEvent {
     Kill,
     /// The relay is switched on again.
     Boot,
-    /// The relay requests to leave the chain.
-    Leave,
+    /// The relay requests to leave the chain, with this remaining endurance, s.
+    Leave(Option<u16>),
     /// The relay cancels its departure.
     Stay,
     /// A partition or a one-way link failure begins or ends.

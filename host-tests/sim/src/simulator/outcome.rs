@@ -217,8 +217,8 @@ pub struct Outcome {
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
     pub margin_m: f64,
     /// Drones that relay data at each time step of simple drones, with [`Setup::track`](super::setup::Setup::track):
-    /// relay number from 1, and true position. These are the members of the newest view that a relay has accepted, and
-    /// the relays that hold their places until they may leave.
+    /// relay number from 1, and true position. These are the living relays with a setpoint, without spares and relays
+    /// that may leave.
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
     pub margin_at: Option<Nearest>,

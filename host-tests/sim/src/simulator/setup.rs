@@ -87,8 +87,10 @@ pub struct Setup {
     ///
     /// A relay keeps only what it has stored: an uploaded mission, and its record of votes on views.
     pub boots: Vec<(u16, Instant)>,
-    /// Relays that request to leave the chain: number from 1 and time. They are switched off once they may leave.
-    pub leaves: Vec<(u16, Instant)>,
+    /// Relays that request to leave the chain: number from 1, time, and remaining endurance, s, if known.
+    ///
+    /// They are switched off once they may leave.
+    pub leaves: Vec<(u16, Instant, Option<u16>)>,
     /// Relays that cancel their departure: number from 1 and time.
     pub stays: Vec<(u16, Instant)>,
     /// Relays that wait outside of the chain from the start until the leader calls them, by number from 1.

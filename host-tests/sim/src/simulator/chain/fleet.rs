@@ -295,23 +295,16 @@ impl Chain {
 
     /// Returns the drones that relay data now, by relay number from 1, with their true positions.
     fn serving(&self, flight: &Flight) -> Vec<(u16, Point)> {
-        let living = || {
-            let all = self.members.iter().enumerate();
-            all.filter(|(_, member)| member.killed.is_none())
-        };
-        let inside = |member: &Member| {
-            !matches!(
+        let serves = |member: &Member| {
+            let is_out = matches!(
                 member.relay.departure(self.now),
                 Departure::Spare | Departure::Free
-            )
+            );
+            member.killed.is_none() && member.relay.setpoint().is_some() && !is_out
         };
-        let newest = living().filter(|(_, member)| inside(member));
-        let newest = newest.map(|(_, member)| member.relay.view()).max();
-        living()
-            .filter(|(_, member)| {
-                let holds = member.relay.departure(self.now) == Departure::Outside;
-                holds || inside(member) && Some(member.relay.view()) == newest
-            })
+        let serving = self.members.iter().enumerate();
+        serving
+            .filter(|(_, member)| serves(member))
             .filter_map(|(index, member)| Some((member.node, flight.true_position(index)?)))
             .collect()
     }
