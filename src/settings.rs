@@ -150,6 +150,12 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
     /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
+    /// Duration of the motion to a newly agreed position: the setpoint moves there in 32 equal steps; 0 for one step.
+    ///
+    /// If all drones arrive together, no hop is worse on the way than before or after ([`docs::batteries`](crate::docs::batteries)).
+    /// Choose it so that the longest way, about a spacing of the chain, takes no more than the drones' usual speed. The same for
+    /// all relays of a chain.
+    pub respacing: Duration,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
     /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
     /// Set it on all relays of a chain, or on none.
@@ -194,6 +200,7 @@ impl Settings {
         quorum: true,
         without_quorum: WithoutQuorum::Hold,
         guard: None,
+        respacing: Duration::from_micros(0),
         sited: false,
     };
 

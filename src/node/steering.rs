@@ -1,5 +1,6 @@
 //! Setpoint on the way to the agreed position. Limited by the [guard](crate::guard), or without a guard the agreed position.
 
+use super::context::{earliest, tenths};
 use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
@@ -21,7 +22,15 @@ pub(crate) struct Steering {
     remind_at: Option<Instant>,
     /// Setpoint last reported to the firmware; `None` if there was no setpoint.
     reported_setpoint: Option<Placement>,
+    /// Agreed position of the last call, and the place to fly to now, which moves there in steps.
+    agreed: Option<Placement>,
+    wanted: Option<Placement>,
+    /// Motion to the agreed position: its first place, its start, and the time of its next step. `None` at the position.
+    motion: Option<(Placement, Instant, Instant)>,
 }
+
+/// Number of steps of a motion to a new agreed position, as a power of two.
+const STEPS: u32 = 5;
 
 impl Steering {
     /// State before [`begin`](Self::begin): no guard, and no setpoint.
@@ -29,6 +38,9 @@ impl Steering {
         guard: None,
         remind_at: None,
         reported_setpoint: None,
+        agreed: None,
+        wanted: None,
+        motion: None,
     };
 
     /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
@@ -49,8 +61,15 @@ impl Steering {
     }
 
     /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
-    /// setpoint has changed.
-    pub(crate) fn steer(&mut self, now: Instant, agreed: Option<Placement>) -> bool {
+    /// setpoint has changed. A motion to a new position takes `span`.
+    pub(crate) fn steer(
+        &mut self,
+        now: Instant,
+        agreed: Option<Placement>,
+        span: Duration,
+    ) -> bool {
+        self.advance(now, agreed, span);
+        let agreed = self.wanted;
         if let Some(agreed) = agreed
             && let Some(guard) = self.guard()
         {
@@ -69,9 +88,49 @@ impl Steering {
         changed
     }
 
+    /// Moves the place to fly to by the steps that are due on the way to the position `agreed`.
+    fn advance(&mut self, now: Instant, agreed: Option<Placement>, span: Duration) {
+        if agreed != self.agreed {
+            self.agreed = agreed;
+            self.motion = self
+                .wanted
+                .filter(|_| agreed.is_some() && span > Duration::from_micros(0))
+                .map(|from| (from, now, now));
+        }
+        self.wanted = agreed;
+        let (Some((from, since, at)), Some(to)) = (&mut self.motion, agreed) else {
+            return;
+        };
+        let steps =
+            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(span).max(1));
+        let Some(part) = u8::try_from(steps)
+            .ok()
+            .filter(|steps| *steps >> STEPS == 0)
+        else {
+            self.motion = None;
+            return;
+        };
+        if *at <= now {
+            *at = now + Duration::from_micros((span.as_micros() >> STEPS).max(1));
+        }
+        let part = f32::from(part) / 32.0;
+        let between = |from: f32, to: f32| from + (to - from) * part;
+        self.wanted = Some(Placement {
+            x_m: between(from.x_m, to.x_m),
+            y_m: between(from.y_m, to.y_m),
+            altitude_m: between(from.altitude_m, to.altitude_m),
+        });
+    }
+
+    /// Returns true while the setpoint moves to a new agreed position.
+    pub(crate) const fn is_moving(&self) -> bool {
+        self.motion.is_some()
+    }
+
     pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
         match &self.guard {
             Some(guard) if GUARD => guard.setpoint(),
+            _ if self.is_moving() => self.wanted,
             _ => agreed,
         }
     }
@@ -157,7 +216,7 @@ impl Steering {
         self.guard()?.poll()
     }
 
-    pub(crate) const fn next_timeout(&self) -> Option<Instant> {
-        self.remind_at
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        earliest(self.remind_at, self.motion.map(|(.., at)| at))
     }
 }

@@ -85,7 +85,7 @@ pub(crate) struct Leaving {
     ordered_at: Option<Instant>,
     /// Last reported position of the drone; `None` before any.
     place: Option<Placement>,
-    /// Current setpoint; `None` before the first agreement.
+    /// Current setpoint; `None` before the first agreement, and while it moves to a new position.
     setpoint: Option<Placement>,
     /// Spare that was received last, and when.
     heard_spare: Option<(u16, Instant)>,

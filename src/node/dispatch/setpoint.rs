@@ -6,7 +6,7 @@ use crate::guard::HoldReason;
 use crate::node::context::Member;
 use crate::place::Placement;
 use crate::side::Side;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 impl Node {
     /// Returns the agreed position, changed as `Settings::without_quorum` requires if there is no quorum. `None`
@@ -22,12 +22,17 @@ impl Node {
 
     pub(super) fn steer(&mut self, now: Instant) {
         let wanted = self.wanted_place();
-        if self.steering.steer(now, wanted) {
+        let span = if self.layers.view.has_no_quorum() {
+            Duration::from_micros(0)
+        } else {
+            self.member.settings.respacing
+        };
+        if self.steering.steer(now, wanted, span) {
             self.raise(Event::SetpointChanged);
         }
-        self.layers
-            .leaving
-            .record_setpoint(self.steering.setpoint(wanted));
+        let setpoint = self.steering.setpoint(wanted);
+        let arrives = setpoint.filter(|_| !self.steering.is_moving());
+        self.layers.leaving.record_setpoint(arrives);
     }
 
     pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {
