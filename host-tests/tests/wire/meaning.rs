@@ -157,27 +157,8 @@ pub(crate) fn message(wire_message: &WireMessage) -> Message {
             upload: upload(wire_message, &of),
             offer_number: of.word("offer_number"),
         },
-        "Pulse" => Message::Pulse(Pulse {
-            number: of.word("number"),
-            view_digest: of.word("view_digest"),
-            lease: of.word("lease_ds"),
-            orders: Orders {
-                leaver: of.word("leaver"),
-                joiner: of.word("joiner"),
-                in_place: of.flag("in_place", 0),
-            },
-        }),
-        "Pulsed" => Message::Pulsed(Pulsed {
-            number: of.word("number"),
-            view_digest: of.word("view_digest"),
-            done: of.flag("done", 0),
-            requests: Requests {
-                leaver: of.word("leaver"),
-                endurance_s: of.word("endurance_s"),
-                spare: of.word("spare"),
-                in_place: of.flag("in_place", 0),
-            },
-        }),
+        "Pulse" => Message::Pulse(pulse(&of)),
+        "Pulsed" => Message::Pulsed(pulsed(&of)),
         "Sense" | "Sensed" => sense(wire_message, &of),
         "Level" => Message::Level {
             mission: of.word("mission"),
@@ -271,6 +252,33 @@ fn reports(of: &MessageFields<'_>) -> Reports {
         report.entries.push(entry).unwrap();
     }
     report
+}
+
+fn pulse(of: &MessageFields<'_>) -> Pulse {
+    Pulse {
+        number: of.word("number"),
+        view_digest: of.word("view_digest"),
+        lease: of.word("lease_ds"),
+        orders: Orders {
+            leaver: of.word("leaver"),
+            joiner: of.word("joiner"),
+            in_place: of.flag("in_place", 0),
+        },
+    }
+}
+
+fn pulsed(of: &MessageFields<'_>) -> Pulsed {
+    Pulsed {
+        number: of.word("number"),
+        view_digest: of.word("view_digest"),
+        done: of.flag("done", 0),
+        requests: Requests {
+            leaver: of.word("leaver"),
+            endurance_s: of.word("endurance_s"),
+            spare: of.word("spare"),
+            in_place: of.flag("in_place", 0),
+        },
+    }
 }
 
 fn hello(of: &MessageFields<'_>) -> Hello {

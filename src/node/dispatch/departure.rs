@@ -160,6 +160,7 @@ impl Layers {
     }
 
     /// Returns the requests of this relay to the leader.
+    #[inline(never)] // called from many places
     pub(super) fn requests(&self, now: Instant, member: &Member) -> Requests {
         let Leaving {
             requested,
