@@ -115,8 +115,8 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
-    /// This relay, which requested it by `Relay::leave`, is no member of the chain any more: the others have closed up,
-    /// and its drone may fly away.
+    /// This relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
+    /// fly away.
     MayLeave,
 }
 

@@ -150,7 +150,7 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
     /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// Duration of the motion to a newly agreed position: the setpoint moves there in 32 equal steps; 0 for one step.
+    /// Duration of the motion to a newly agreed position. The setpoint moves there in 32 equal steps; 0 for one step.
     ///
     /// If all drones arrive together, no hop is worse on the way than before or after ([`docs::batteries`](crate::docs::batteries)).
     /// Choose it so that the longest way, about a spacing of the chain, takes no more than the drones' usual speed. The same for

@@ -91,7 +91,7 @@ pub(crate) struct Lease {
     requests: Option<Requests>,
     /// Number of relays of the view when no relay requested to leave; known at the leader.
     complement: u16,
-    /// Start of the wait for a spare or for the relays' motion: the last view, or the first request to leave.
+    /// Start of the wait for a spare or for the relays' motion. It is the last view, or the first request to leave.
     waits_since: Instant,
 }
 

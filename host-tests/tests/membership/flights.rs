@@ -70,7 +70,7 @@ fn drones_keep_away_from_a_silent_hovering_drone() {
     }
 }
 
-/// Checks that drones keep apart while a relay leaves, also from its drone, which then hovers at its place.
+/// Checks that drones keep apart while a relay leaves. Its drone then hovers at its place.
 #[test]
 fn drones_keep_away_from_a_relay_that_leaves() {
     let mut free = 0;

@@ -29,7 +29,8 @@ fn freed(outcome: &Outcome, relay: u16) -> Option<f64> {
     times.first().map(|at| at - AT_S as f64)
 }
 
-/// Returns the setup of the paper's chain of `relays` in which the relays `leaves` request to leave, with these endurances.
+/// Returns the paper's chain of `relays` in which some request to leave. `leaves` has their numbers and endurances,
+/// s.
 fn departing(relays: u16, leaves: &[(u16, Option<u16>)]) -> Setup {
     let mut setup = paper(relays);
     let leaves = leaves
@@ -47,7 +48,7 @@ fn is_loss(what: TimelineEvent) -> bool {
     )
 }
 
-/// Checks that each relay can leave, and that no relay reports a loss, an expired lease or a missing quorum.
+/// Checks that each relay can leave. No relay reports a loss, an expired lease or a missing quorum.
 #[test]
 fn every_relay_leaves_without_a_timeout() {
     for leaver in ALL {
@@ -64,7 +65,8 @@ fn every_relay_leaves_without_a_timeout() {
     }
 }
 
-/// Checks that relays leave one at a time: the least endurance first, then the lower number, unknown endurance last.
+/// Checks that relays leave one at a time. The least endurance is first, then the lower number; an unknown one is
+/// last.
 #[test]
 fn relays_leave_in_order_of_need() {
     let setup = departing(
@@ -107,7 +109,7 @@ fn a_relay_at_a_wide_gap_is_refused() {
     assert_eq!(freed(&outcome, 3), None);
 }
 
-/// Checks that a departure that is cancelled at any time, and one of a relay that dies at any time, end as they should.
+/// Checks departures that are cancelled at any time, and those of relays that die at any time.
 #[test]
 fn a_departure_ends_well_if_the_relay_stays_or_dies() {
     for (leaver, tenths) in [1, 4, 8]
@@ -156,7 +158,7 @@ fn departures_survive_a_bad_channel() {
     }
 }
 
-/// Checks that a spare joins before a relay leaves, wherever both are, and that the chain is then complete without it.
+/// Checks that a spare joins before a relay leaves, wherever both are. The chain is then complete.
 #[test]
 fn a_spare_joins_before_a_relay_leaves() {
     for (spare, leaver) in [
@@ -191,8 +193,8 @@ fn a_spare_joins_before_a_relay_leaves() {
     }
 }
 
-/// Draws a scene: 500 m to 3 km long, nine like relays, the interferer at any x between Tx and Rx and a tenth of the distance to
-/// the whole distance beside the line.
+/// Draws a scene of nine like relays, 500 m to 3 km long, with an interferer beside the line. Its x is between Tx and
+/// Rx, its y a tenth to the whole of the distance.
 fn scene(rng: &mut ChaCha8Rng) -> Link {
     let mut link = Link::paper(9);
     let distance_m = rng.random_range(500.0..3_000.0);
@@ -207,7 +209,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Link {
     link
 }
 
-/// Draws one of the scenes of the planner's tests, many of which have an interferer on the line or beyond its ends.
+/// Draws one of the scenes of the planner's tests. Many have an interferer on the line or beyond its ends.
 fn any_scene(rng: &mut ChaCha8Rng) -> Link {
     let style = Style {
         relays: 9..=9,
@@ -243,7 +245,7 @@ fn worst_hop(link: &Link, serving: &[(u16, Point)]) -> f64 {
     sir(&chain(link, places.len()), &places).unwrap_or(0.0)
 }
 
-/// Returns the SIR of the worst hop at the worst moment after `AT_S`, as a share of the optimum of eight relays, and that time, s.
+/// Returns the worst share of the optimum of eight relays after `AT_S`, and its time, s.
 ///
 /// The data takes the better route: with or without each of the relays `moving`, which join or leave.
 fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
@@ -274,13 +276,13 @@ fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
 
 /// Result of the replacement of one relay in one scene.
 struct Replaced {
-    /// SIR at the worst moment, as a share of the optimum of eight relays: announced, and as a loss without a spare.
+    /// Worst shares of the optimum of eight relays: announced, and as a loss without a spare.
     shares: [f64; 2],
     free: Option<f64>,
     text: String,
 }
 
-/// Replaces a random relay of eight in the scene `link` by a random spare, and lets the same relay fail in another run.
+/// Replaces a random relay of eight by a random spare. In another run the same relay fails.
 ///
 /// The spare hovers 15 m beside the position that it has among nine relays.
 fn replaced(link: &Link, rng: &mut ChaCha8Rng, seed: u64) -> Replaced {
@@ -350,13 +352,13 @@ fn replaced_in(name: &str, scene: fn(&mut ChaCha8Rng) -> Link) -> Vec<Replaced> 
     all
 }
 
-/// Returns the number of results with at least `least` of the optimum of eight relays at the worst moment.
+/// Returns the number of results whose worst share of the optimum is at least `least`.
 fn at_least(all: &[Replaced], least: f64) -> usize {
     let good = all.iter().filter(|one| one.shares[0] >= least);
     good.count()
 }
 
-/// Checks that each relay may leave, and how much of the optimum of eight relays the chain has at the worst moment.
+/// Checks that each relay may leave, and the worst share of the optimum of eight relays.
 #[test]
 fn a_replacement_beside_the_line_leaves_almost_no_gap() {
     let all = replaced_in("beside the line", scene);

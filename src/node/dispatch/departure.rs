@@ -1,4 +1,4 @@
-//! Departure: a relay leaves the chain while it still holds its place, or waits outside of it as a spare.
+//! Departure: a relay leaves the chain while it holds its place, or waits outside as a spare.
 //!
 //! Requests travel to the leader in the replies to lease renewals, orders from the leader in the renewals (see `lease`). The states
 //! and rules are in [`docs::batteries`](crate::docs::batteries).
@@ -27,8 +27,8 @@ use crate::wire::message::{Hello, Requests};
 /// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
 const IN_PLACE_M: f32 = 3.0;
 
-/// Time after which a departure counts as blocked, in units of `dead_after`: the neighbours do not receive each other. It is
-/// requested again after the same time.
+/// Time after which a departure counts as blocked, in units of `dead_after`. The neighbours then do not receive each
+/// other. It is requested again after the same time.
 const BLOCKED_AFTER: u32 = 4;
 
 /// State of a relay that leaves the chain or waits outside of it.
@@ -263,15 +263,15 @@ impl Node {
         }
     }
 
-    /// Returns true if `node` at `side` is between this relay and its neighbour there, or beyond the end of the chain.
+    /// Returns true if `node` is between this relay and its neighbour at `side`, or beyond the end.
     fn is_beside(&self, side: Side, node: u16) -> bool {
         let own = self.member.node;
         let neighbour = self.layers.neighbours.at(side).node();
         neighbour == 0 || node.abs_diff(own) < neighbour.abs_diff(own)
     }
 
-    /// Returns true if node `to` at `side`, outside of the chain, is to be told that it is free: the view without it is agreed
-    /// on and its relays are in place.
+    /// Returns true if node `to` at `side`, outside of the chain, may leave. The view without it is agreed on and its
+    /// relays are in place.
     pub(super) fn frees(&self, side: Side, to: u16) -> bool {
         let lease = &self.layers.lease;
         let complete = lease.is_whole() && lease.orders().in_place;

@@ -64,7 +64,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Checks departures and joins: a relay leaves, or a spare (outside from the start) joins before another relay leaves.
+/// Checks that a relay that leaves, or a spare that joins before, keeps one sequence of views.
 #[test]
 fn departures_and_joins_keep_one_sequence_of_views() {
     for (relays, outside, (cuts, proposals, reboots, moves)) in [
@@ -86,7 +86,7 @@ fn departures_and_joins_keep_one_sequence_of_views() {
     }
 }
 
-/// Checks that the model check finds the fault of a departure that reduces the quorum before it is agreed on.
+/// Checks that the model check finds a departure that reduces the quorum before it is agreed on.
 #[test]
 fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     let check = Check {

@@ -295,7 +295,7 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by the relays from the last one to the sender, in the reply to a lease renewal.
+/// Requests to the leader by the relays from the last one to the sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {

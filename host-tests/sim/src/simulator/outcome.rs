@@ -216,8 +216,8 @@ pub struct Outcome {
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
     pub margin_m: f64,
-    /// Drones that relay data at each time step of simple drones, with [`Setup::track`](super::setup::Setup::track):
-    /// relay number from 1, and true position. These are the living relays with a setpoint, without spares and relays
+    /// Drones that relay data at each time step: relay number from 1, and true position. Recorded for simple drones
+    /// with [`Setup::track`](super::setup::Setup::track). These are the living relays with a setpoint, without spares and relays
     /// that may leave.
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
