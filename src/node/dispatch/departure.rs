@@ -364,6 +364,14 @@ impl Node {
             }
             return true;
         }
+        let leaving = &mut self.layers.leaving;
+        // A spare that was called counts as one until it has joined: the departure waits for it.
+        if let Some((node, at)) = &mut leaving.heard_spare
+            && *node == from
+            && !is_neighbour
+        {
+            *at = now;
+        }
         let ordered = self.layers.lease.orders().leaver == own && self.layers.leaving.requested;
         if is_neighbour && ordered && hello.neighbour != own {
             self.go_outside(now, false);
