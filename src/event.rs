@@ -21,10 +21,13 @@ pub enum Event {
     /// relay 1, or relay N if the mission gives the interference as a distribution along x. `Relay::restart`, a new
     /// view or a new mission makes the leader try again.
     Infeasible,
-    /// The neighbour at `side` has been silent for `Settings::dead_after` (15 s by default). With two links the relay
-    /// keeps sending heartbeat requests to it; on a shared channel it searches for another node at that side. An
-    /// operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space around its last
-    /// position.
+    /// The neighbour at `side` is lost.
+    ///
+    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and at least 16 requests. On a
+    /// channel that loses frames both take longer, at most eight times `dead_after`.
+    /// With two links the relay keeps sending heartbeat requests to it; on a shared channel it searches for another
+    /// node at that side. An operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space
+    /// around its last position.
     NeighbourLost {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,

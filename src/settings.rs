@@ -137,9 +137,9 @@ pub struct Settings {
     /// bytes (a sweep), includes the computation, and is scaled for longer messages.
     pub hop_time: Duration,
     /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
-    /// `dead_after`.
+    /// `dead_after`, and more on a channel that loses frames.
     pub probe_after: Duration,
-    /// Silence after which a neighbour is lost, and minimum duration of a lease; above `probe_after`.
+    /// Minimum silence of a lost neighbour, and minimum duration of a lease; above `probe_after`.
     pub dead_after: Duration,
     /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the
     /// previous view, or half of them including its proposer. Without this rule, the parts of a split chain would

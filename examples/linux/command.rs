@@ -23,14 +23,15 @@ pub fn read<T: Parser>(
             let _ = error.print();
             return ExitCode::SUCCESS;
         }
-        refuse(&first(&error.to_string()))
+        refuse(&one_line(&error))
     })?;
     Ok((options, beyond))
 }
 
 /// Returns the first paragraph of clap's error as one line, with the suggested spelling. Other tips and the usage are
 /// dropped.
-fn first(text: &str) -> String {
+pub fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
     let mut lines = text.lines().map(str::trim);
     let wrong: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
     let line = wrong.join(" ").trim_start_matches("error: ").to_owned();

@@ -1,6 +1,6 @@
 //! Log lines for an upload's changes: each value that differs, and the distance that each relay moves.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use uav_relay::{Band, Instant, Interference, MissionConfig, Placement};
 use uav_relay_linux::log::Log;
 use uav_relay_linux::site::degrees;
@@ -9,9 +9,8 @@ use crate::forecast::Move;
 use crate::new::Basis;
 
 pub(crate) fn log_changes(log: &Log, now: Instant, before: &Basis, after: &Basis) {
-    let pairs = values(before).into_iter().zip(values(after));
     let mut is_same = true;
-    for ((name, old), (_, new)) in pairs.filter(|((_, old), (_, new))| old != new) {
+    for (name, old, new) in changes(before, after) {
         is_same = false;
         let fields = json!({ "value": name, "old": old, "new": new });
         let what = format_args!("new mission, {name}: {old} -> {new}");
@@ -20,6 +19,16 @@ pub(crate) fn log_changes(log: &Log, now: Instant, before: &Basis, after: &Basis
     if is_same {
         log.line(now, "change", "none");
     }
+}
+
+/// Returns the name of each value that differs, and the value before and after, as text with its unit.
+pub(crate) fn changes(
+    before: &Basis,
+    after: &Basis,
+) -> impl Iterator<Item = (&'static str, String, String)> {
+    let pairs = values(before).into_iter().zip(values(after));
+    let pairs = pairs.map(|((name, old), (_, new))| (name, old, new));
+    pairs.filter(|(_, old, new)| old != new)
 }
 
 /// Returns the values of a mission with their names, each value as text with its unit.
@@ -80,21 +89,26 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     ]
 }
 
+/// Returns the move of a relay as JSON.
+pub(crate) fn fields(moved: &Move) -> Value {
+    let place = |at: Placement| json!({ "x_m": at.x_m, "y_m": at.y_m, "h_m": at.altitude_m });
+    let (from, to) = (place(moved.before), place(moved.after));
+    json!({ "relay": moved.index, "metres": moved.metres, "from": from, "to": to })
+}
+
 pub(crate) fn log_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
     let Some(moves) = moves else {
         let what = "the moves of the relays cannot be computed in advance: either the relays measure the interference, or the new mission has no positions with an SIR above 0";
         log.line(now, "move", what);
         return;
     };
-    let place = |at: Placement| json!({ "x_m": at.x_m, "y_m": at.y_m, "h_m": at.altitude_m });
-    for Move {
-        index,
-        before,
-        after,
-        metres,
-    } in moves
-    {
-        let fields = json!({ "relay": index, "metres": metres, "from": place(*before), "to": place(*after) });
+    for moved in moves {
+        let Move {
+            index,
+            before,
+            after,
+            metres,
+        } = moved;
         let at = |p: &Placement| {
             format!(
                 "x {:.1} m, y {:.1} m, altitude {:.1} m",
@@ -103,6 +117,6 @@ pub(crate) fn log_moves(log: &Log, now: Instant, moves: Option<&[Move]>) {
         };
         let (from, to) = (at(before), at(after));
         let what = format_args!("relay {index} moves {metres:.1} m, from {from} to {to}");
-        log.event(now, "move", fields, what);
+        log.event(now, "move", fields(moved), what);
     }
 }

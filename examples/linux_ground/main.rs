@@ -15,8 +15,8 @@
 //! `--version` than the one before. The epoch file must be this program's own.
 //!
 //! With `--stand` it keeps running: it answers the relays and reports the interference at its position (`--measurements`). With
-//! `--web` a page in a browser shows the chain. It survives a lost port, a full disk and a blocked log. For an upload restart it
-//! with `--version`: it has no state to lose, and the relays recognise it by its first frames.
+//! `--web` a page in a browser shows the chain, and uploads missions. It survives a lost port, a full disk and a blocked log. Without
+//! the page restart it with `--version` for an upload: it has no state to lose, and the relays recognise it by its first frames.
 //!
 //! Log lines have the format of `linux_companion`. Exit status: 0 once the chain flies the new mission, or after Ctrl-C or
 //! SIGTERM with `--stand`; 1 if the upload fails or it can not start; 2 if the options are wrong.
@@ -33,12 +33,15 @@
 //! | `heard.rs` | nearby relays that answer |
 //! | `report.rs` | log lines |
 //! | `screen.rs` | page that shows the chain in a browser |
+//! | `desk.rs` | previews and uploads of the page |
 //!
 //! It shares a library with the relay, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]
 mod change;
+#[cfg(unix)]
+mod desk;
 #[cfg(unix)]
 mod forecast;
 #[cfg(unix)]

@@ -6,7 +6,8 @@ use clap::Args;
 use uav_relay::UploadError;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
-    Band, Geodetic, Interference, Interferer, Mission, MissionConfig, Profile, Sites, Upload,
+    Band, Geodetic, Interference, Interferer, Mission, MissionConfig, Placement, Profile, Sites,
+    Upload,
 };
 use uav_relay_linux::command::number;
 use uav_relay_linux::mission::{
@@ -16,7 +17,7 @@ use uav_relay_linux::mission::{
 use uav_relay_linux::site::{site, swapped};
 
 /// Options of a new mission; values that are not given stay as they are flown.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[group(id = "new", multiple = true, requires = "version")]
 #[expect(clippy::struct_field_names, reason = "as the options are called")]
 pub(crate) struct NewOptions {
@@ -134,6 +135,50 @@ impl NewOptions {
             Some(sites) => upload.with_sites(sites).map_err(refused),
             None => Ok(upload),
         }
+    }
+
+    /// Returns the options with the receiver at x and y, m, of the line of the mission `basis`. It keeps its height.
+    ///
+    /// # Errors
+    /// One line if this position is no site, or is beside a line without sites.
+    pub(crate) fn with_receiver(
+        &self,
+        receiver_m: Option<[f32; 2]>,
+        basis: &Basis,
+    ) -> Result<Self, String> {
+        let Some([x_m, y_m]) = receiver_m else {
+            return Ok(self.clone());
+        };
+        let Some(line) = basis.line else {
+            if y_m != 0.0 {
+                return Err(format!(
+                    "receiver at y {y_m} m: must be 0 m, because the mission has no sites: the receiver can move along the line only"
+                ));
+            }
+            let distance_m = number(DISTANCE_M)(&x_m.to_string());
+            return Ok(Self {
+                new_distance: Some(
+                    distance_m.map_err(|why| format!("receiver at x {x_m} m: {why}"))?,
+                ),
+                ..self.clone()
+            });
+        };
+        let at = Placement {
+            x_m,
+            y_m,
+            altitude_m: 0.0,
+        };
+        let axis = Axis::between(line).ok();
+        let site = axis.and_then(|axis| axis.point(at)).ok_or_else(|| {
+            format!("receiver at x {x_m} m, y {y_m} m: is too far from the line from Tx to Rx")
+        })?;
+        Ok(Self {
+            new_site_rx: Some(Geodetic {
+                amsl_mm: line.rx.amsl_mm,
+                ..site
+            }),
+            ..self.clone()
+        })
     }
 
     /// Returns the new mission's Tx and Rx positions and their distance, m; `None` if neither changes.

@@ -102,10 +102,13 @@ pub(crate) struct Options {
     /// that mission first
     #[arg(long, help_heading = "Standing")]
     pub(crate) stand: bool,
-    /// Show the chain in a browser: a map of the relays by their reports, alarms and a log. Use 127.0.0.1:8080 for this computer alone;
-    /// port 0 takes any free port. Everyone who reaches another address sees the flight
+    /// Show the chain in a browser: a map of the relays by their reports, alarms and a log, and a form for uploads. Use 127.0.0.1:8080
+    /// for this computer alone; port 0 takes any free port. Another address needs --web-password
     #[arg(long, value_name = "ADDRESS:PORT", requires = "stand", value_parser = address, help_heading = "Standing")]
     pub(crate) web: Option<SocketAddr>,
+    /// File with the password of the page, 8 to 200 characters. The browser asks for it; any user name will do
+    #[arg(long, value_name = "FILE", requires = "web", help_heading = "Standing")]
+    web_password: Option<PathBuf>,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     pub(crate) status_socket: Option<PathBuf>,
@@ -131,6 +134,7 @@ pub(crate) struct Plan {
     pub(crate) sited: Option<Sites>,
     pub(crate) end: Side,
     pub(crate) key: [u8; 32],
+    pub(crate) web_password: Option<String>,
     pub(crate) overrides: Vec<Override>,
 }
 
@@ -175,6 +179,7 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.flag("--stand", own.stand);
     given.path_or_udp("--measurements", own.measurements.as_ref());
     given.value("--web", own.web.as_ref());
+    given.path("--web-password", own.web_password.as_ref());
     given.flag("--json", own.json);
     given.path("--log-file", own.log_file.as_ref());
     given.path("--status-socket", own.status_socket.as_ref());
@@ -203,7 +208,20 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
             ));
         }
     }
+    let password = options.web_password.as_deref();
+    let password = password.map(|file| key::load_password("--web-password", file));
+    let password = password.transpose()?;
+    let address = options
+        .web
+        .filter(|it| !it.ip().to_canonical().is_loopback());
+    if let (Some(address), None) = (address, &password) {
+        return Err(format!(
+            "--web {address}: other computers can reach this address, so it needs --web-password FILE; 127.0.0.1:{} is reached by this computer alone",
+            address.port()
+        ));
+    }
     Ok(Plan {
+        web_password: password,
         loaded: Loaded {
             mission: loaded,
             method: options.method.into(),

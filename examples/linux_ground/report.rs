@@ -111,7 +111,7 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("--version {version}: relay {by}, or a relay behind it, rejects the upload");
-    match FenceViolation::of(plan, upload) {
+    match FenceViolation::of(&plan.loaded.mission, upload) {
         Some(FenceViolation { what, .. }) => format!("{who}: {what}"),
         None => format!("{who}; the log of that relay gives the reason"),
     }
@@ -130,8 +130,8 @@ pub(crate) struct FenceViolation {
 impl FenceViolation {
     /// Returns the first value of `upload` that exceeds the geofence, if any. The relays are assumed to have the
     /// default geofence, that of the loaded mission.
-    pub(crate) fn of(plan: &Plan, upload: &Upload) -> Option<Self> {
-        let (loaded, new) = (plan.loaded.mission.config(), upload.config());
+    pub(crate) fn of(loaded: &Mission, upload: &Upload) -> Option<Self> {
+        let (loaded, new) = (loaded.config(), upload.config());
         let fence = |config: &MissionConfig| {
             let mission = Mission::try_new(*config).ok()?;
             Some(GuardConfig::of(&mission, config.common).geofence)
@@ -237,7 +237,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
 }
 
 /// Returns the most likely reason why no relay has answered as needed, judged by the frame counters.
-fn likely_reason(plan: &Plan, stats: &Stats) -> String {
+pub(crate) fn likely_reason(plan: &Plan, stats: &Stats) -> String {
     let faults = [
         (
             stats.mission,

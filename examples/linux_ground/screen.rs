@@ -1,15 +1,17 @@
 //! Screen of a station that stands: five snapshots a second of the relays' reports.
 
 use std::net::SocketAddr;
+use std::sync::mpsc::Receiver;
 
 use serde_json::json;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Ground, GuardConfig, Instant, Mission, Upload};
 use uav_relay_linux::log::Log;
-use uav_relay_screen::Screen;
 use uav_relay_screen::chain::Chain;
 use uav_relay_screen::station::{Frames, StationView};
+use uav_relay_screen::{Post, Screen};
 
+use crate::desk::state;
 use crate::options::Plan;
 use crate::uploading::Uploading;
 
@@ -24,12 +26,14 @@ const ASK_AGAIN: Duration = Duration::from_millis(10_000);
 pub(crate) struct Web {
     screen: Screen,
     view: StationView,
+    /// Uploaded mission that the chain flies, if known.
+    flown: Option<Upload>,
     next_at: Instant,
     ask_at: Instant,
 }
 
 impl Web {
-    /// Starts the server of the page, logs its address, and requests the relays' reports.
+    /// Starts the server of the page, logs its address, and requests the relays' reports. Also returns the page's tasks.
     ///
     /// # Errors
     /// One line that names the option, its value and the fault.
@@ -37,24 +41,30 @@ impl Web {
         address: SocketAddr,
         now: Instant,
         log: &Log,
+        plan: &Plan,
         ground: &mut Ground,
-    ) -> Result<Self, String> {
-        let screen = Screen::start(address).map_err(|error| format!("--web {address}: {error}"))?;
-        let public = if screen.is_public() {
-            "; every computer that reaches this address can see it"
-        } else {
-            ""
+    ) -> Result<(Self, Receiver<Post>), String> {
+        let (screen, posts) = Screen::start_acting(address, plan.web_password.clone())
+            .map_err(|error| format!("--web {address}: {error}"))?;
+        let who = match (plan.web_password.is_some(), screen.is_public()) {
+            (true, false) => "; it asks for the password",
+            (true, true) => {
+                "; other computers reach it, too, and it asks for the password, which they send without encryption"
+            }
+            _ => "; every user of this computer can use it",
         };
         let url = screen.url();
-        let what = format_args!("open {url} in a browser{public}");
+        let what = format_args!("open {url} in a browser{who}");
         log.event(now, "screen", json!({ "url": url }), what);
         ground.watch(now, true);
-        Ok(Self {
+        let web = Self {
             screen,
             view: StationView::default(),
+            flown: None,
             next_at: now,
             ask_at: now,
-        })
+        };
+        Ok((web, posts))
     }
 
     /// Shows a snapshot if it is due; returns the time of the next one. It does not wait for a browser.
@@ -72,11 +82,12 @@ impl Web {
         let version = self.view.version().unwrap_or(0);
         let own = uploading.and_then(Uploading::upload);
         let answered = ground.flown().and_then(|flown| flown.upload.as_ref());
-        let mut uploads = own.into_iter().chain(answered);
+        let mut uploads = own.into_iter().chain(answered).chain(self.flown.as_ref());
         let upload = uploads.find(|it| it.version() == version).copied();
+        self.flown = upload;
         let is_known = version == 0 || upload.is_some();
         // A question would end an upload.
-        if !is_known && self.ask_at <= now && uploading.is_none_or(Uploading::has_ended) {
+        if !is_known && self.ask_at <= now && uploading.is_none_or(Uploading::is_idle) {
             self.ask_at = now + ASK_AGAIN;
             ground.request_flown(now);
         }
@@ -106,7 +117,8 @@ impl Web {
             rejected: ground.refused(),
         };
         let reports: Vec<_> = ground.reports().collect();
-        let snapshot = self.view.snapshot(now, &chain, &reports, frames);
+        let mut snapshot = self.view.snapshot(now, &chain, &reports, frames);
+        snapshot.desk = Some(state(plan, &reports, uploading));
         self.screen.show(snapshot);
         self.next_at
     }

@@ -6,7 +6,7 @@ use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Auth, Ground, Instant, Key, Progress};
+use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
 use uav_relay_linux::counters::{RejectionReasons, counted};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::replug::Replug;
@@ -14,12 +14,13 @@ use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::next_epoch;
 use uav_relay_linux::{config, tap};
 
+use crate::desk::{Desk, Parts};
 use crate::heard::NearbyRelays;
 use crate::measurements::{Measurements, name};
 use crate::options::Plan;
 use crate::report;
 use crate::screen::Web;
-use crate::uploading::{Fault, Outcome, Uploading};
+use crate::uploading::{Fault, Outcome, Uploading, digest_of};
 
 const READS: usize = 64;
 
@@ -35,6 +36,7 @@ struct Station<'a> {
     rejections: RejectionReasons,
     uploading: Option<Uploading>,
     web: Option<Web>,
+    desk: Desk,
     /// True if the operator has answered a request for confirmation: standard input is readable.
     is_answered: bool,
 }
@@ -83,11 +85,12 @@ impl<'a> Station<'a> {
         let mut ground = Ground::new(loaded, plan.end, options.network, plan.wiring(), auth);
         let uploading = options
             .version
-            .map(|version| Uploading::begin(service.now(), plan, version, &mut ground));
+            .map(|it| Uploading::begin(service.now(), plan, Some(it), None, &mut ground));
         let web = options
             .web
-            .map(|address| Web::start(address, service.now(), &service.log, &mut ground))
+            .map(|address| Web::start(address, service.now(), &service.log, plan, &mut ground))
             .transpose()?;
+        let (web, posts) = web.unzip();
         Ok(Self {
             plan,
             service,
@@ -99,6 +102,7 @@ impl<'a> Station<'a> {
             rejections: RejectionReasons::default(),
             uploading,
             web,
+            desk: Desk::new(posts),
             is_answered: false,
         })
     }
@@ -117,6 +121,12 @@ impl<'a> Station<'a> {
         if outcome.is_some() {
             return outcome;
         }
+        let parts = Parts {
+            plan: self.plan,
+            ground: &mut self.ground,
+            uploading: &mut self.uploading,
+        };
+        self.desk.turn(time, &self.service.log, parts);
         let (ground, uploading) = (&mut self.ground, self.uploading.as_ref());
         let web = self.web.as_mut();
         let shown = web.map(|web| web.turn(time, self.plan, ground, uploading));
@@ -206,14 +216,17 @@ impl<'a> Station<'a> {
             measurements,
             hearing,
             uploading,
+            desk,
             ..
         } = self;
-        let uploading = uploading.as_ref();
         service.tend(time, "station", |log, command| {
-            if let Some((command, _)) = command {
-                let text =
-                    format!("{command}: a ground station accepts no commands: send an empty line to read its state");
-                return json!({ "done": false, "text": text });
+            if let Some((line, by)) = command {
+                let parts = Parts {
+                    plan,
+                    ground: &mut *ground,
+                    uploading: &mut *uploading,
+                };
+                return desk.command(time, log, parts, line, by);
             }
             json!({
                 "program": env!("CARGO_BIN_NAME"),
@@ -223,7 +236,7 @@ impl<'a> Station<'a> {
                     "end": name(plan.end),
                     "relays": plan.loaded.mission.relays(),
                     "hears": hearing.nodes(),
-                    "upload": uploading.map_or(Value::Null, upload),
+                    "upload": uploading.as_ref().map_or(Value::Null, upload),
                     "counters": counted(ground.stats()),
                 },
                 "measurements": measurements.as_ref().map(Measurements::status),
@@ -239,7 +252,7 @@ impl<'a> Station<'a> {
         let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
         let stdin = std::io::stdin();
         let uploading = self.uploading.as_ref();
-        let asks = uploading.is_some_and(Uploading::is_confirming);
+        let asks = uploading.is_some_and(Uploading::is_asking);
         if asks {
             others.push((stdin.as_fd(), PollFlags::IN));
         }
@@ -274,9 +287,6 @@ fn answered() -> String {
 }
 
 fn upload(uploading: &Uploading) -> Value {
-    let Some(upload) = uploading.upload() else {
-        return Value::Null;
-    };
     let (progress, flown_by) = match uploading.progress() {
         Progress::Stored { .. } => ("stored", 0),
         Progress::Adopted { .. } => ("adopted", 1),
@@ -285,5 +295,15 @@ fn upload(uploading: &Uploading) -> Value {
         Progress::Outdated { .. } => ("outdated", 0),
         _ => ("offering", 0),
     };
-    json!({ "version": upload.version(), "progress": progress, "flown_by": flown_by, "relays": upload.config().relays })
+    let upload = uploading.upload();
+    json!({
+        "version": upload.map(Upload::version),
+        "progress": progress,
+        "flown_by": flown_by,
+        "relays": upload.map(|it| it.config().relays),
+        "preview": uploading.number(),
+        "stage": uploading.stage(),
+        "digest": upload.map(digest_of),
+        "fault": uploading.fault(),
+    })
 }

@@ -2,26 +2,38 @@
 //!
 //! | stage | event | next stage |
 //! | --- | --- | --- |
-//! | asking | a relay has reported its mission, and the upload fits | confirming, or uploading with `--yes`; over with `--dry-run` |
-//! | asking | the upload is out of range, outside the geofence or not newer than the relays' | over |
+//! | asking | a relay has reported its mission, and the upload is in range and newer than the relays' | computing |
+//! | asking | the upload is out of range or not newer | over |
+//! | computing | the relays' new positions are computed, and the upload fits the geofence | confirming, or uploading with `--yes`; over with `--dry-run` |
+//! | computing | the upload is outside the geofence | over |
 //! | confirming | the operator answers `y` | uploading |
+//! | confirming | the operator holds the page's button | asking again; then uploading, or over if the chain flies another mission by now |
 //! | confirming | any other answer | over |
 //! | uploading | the chain flies it, refuses it, or has a newer one | over |
-//! | asking or uploading | `--timeout` expired | over |
+//! | asking or uploading | `--timeout` expired; for the page while asking 15 s | over |
+//!
+//! The positions are computed by a thread of their own, at most one at a time, so that the relays are answered meanwhile.
 
 use std::io::Write as _;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-use uav_relay::{FlownMission, Ground, Instant, Progress, Upload};
+use uav_relay::{Duration, FlownMission, Ground, Instant, Progress, Upload};
 use uav_relay_linux::log::Log;
 
 use crate::change;
-use crate::forecast::moves;
-use crate::new::Basis;
+use crate::forecast::{Move, moves};
+use crate::new::{Basis, NewOptions};
 use crate::options::Plan;
 use crate::report::{self, FenceViolation};
 
 /// Maximum time that a relay may take to send the values of the mission that it flies.
-const VALUES_TIMEOUT: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
+const VALUES_TIMEOUT: Duration = Duration::from_millis(5_000);
+
+/// Maximum time that the chain may take to answer a question of the page.
+const PAGE_TIMEOUT: Duration = Duration::from_millis(15_000);
+
+/// Time between two looks at a forecast that is being computed.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 #[derive(Debug)]
 pub(crate) struct Fault {
@@ -43,17 +55,48 @@ enum Stage {
     /// Waiting until a relay reports the mission that it flies, with its values. `Some` is the time at which a relay
     /// first reported only the mission's version.
     Querying(Option<Instant>),
+    /// A thread computes the relays' new positions. The time is that of the next look at it.
+    Computing(Instant),
     Confirming,
     Uploading,
     Ended,
 }
 
+/// Values of the new mission that the page gives.
+#[derive(Debug)]
+pub(crate) struct Form {
+    /// Number of the preview, from 1.
+    pub(crate) number: u32,
+    pub(crate) new: NewOptions,
+    /// New position of the receiver in the coordinates of the present line, x and y in m.
+    pub(crate) receiver_m: Option<[f32; 2]>,
+}
+
+/// Missions before and after an upload, and the moves of the relays.
+#[derive(Debug)]
+pub(crate) struct Preview {
+    pub(crate) before: Basis,
+    pub(crate) after: Basis,
+    /// `None` if the moves cannot be computed.
+    pub(crate) moves: Option<Vec<Move>>,
+}
+
 #[derive(Debug)]
 pub(crate) struct Uploading {
-    version: u16,
+    /// Values of the page; `None` for an upload of the command line.
+    form: Option<Form>,
+    /// Version of the new mission; `None` until the version of the flown one is known, which is one less.
+    version: Option<u16>,
     stage: Stage,
     /// Mission to upload; `None` until a relay has reported the mission that it is based on.
     upload: Option<Upload>,
+    /// Version and values of the mission that the chain flew when the preview was computed.
+    based_on: (u16, Option<Upload>),
+    forecast: Option<Receiver<Option<Vec<Move>>>>,
+    preview: Option<Preview>,
+    /// True once the operator has held the page's button.
+    is_confirmed: bool,
+    fault: Option<String>,
     progress: Progress,
     /// Deadline of the present stage of the upload; `None` while a confirmation is awaited, and at the end.
     late_at: Option<Instant>,
@@ -61,26 +104,120 @@ pub(crate) struct Uploading {
 
 impl Uploading {
     /// Starts an upload by asking the chain for the mission that it flies.
-    pub(crate) fn begin(now: Instant, plan: &Plan, version: u16, ground: &mut Ground) -> Self {
+    ///
+    /// `version` is that of the command line. The page's `form` gets the next version.
+    pub(crate) fn begin(
+        now: Instant,
+        plan: &Plan,
+        version: Option<u16>,
+        form: Option<Form>,
+        ground: &mut Ground,
+    ) -> Self {
         ground.request_flown(now);
+        let limit = form.as_ref().map_or(plan.timeout(), |_| PAGE_TIMEOUT);
         Self {
+            form,
             version,
             stage: Stage::Querying(None),
             upload: None,
+            based_on: (0, None),
+            forecast: None,
+            preview: None,
+            is_confirmed: false,
+            fault: None,
             progress: Progress::Idle,
-            late_at: Some(now + plan.timeout()),
+            late_at: Some(now + limit),
         }
     }
 
     pub(crate) fn wake(&self) -> Option<Instant> {
-        let values = match self.stage {
+        let next = match self.stage {
             Stage::Querying(since) => since.map(|since| since + VALUES_TIMEOUT),
+            Stage::Computing(at) => Some(at),
             _ => None,
         };
-        self.late_at.into_iter().chain(values).min()
+        self.late_at.into_iter().chain(next).min()
     }
 
-    pub(crate) const fn is_confirming(&self) -> bool {
+    /// Returns true while the operator's answer at the terminal is awaited.
+    pub(crate) const fn is_asking(&self) -> bool {
+        self.is_confirming() && self.form.is_none()
+    }
+
+    /// Returns true if nothing is under way, so that another upload may replace this one.
+    pub(crate) const fn is_idle(&self) -> bool {
+        self.has_ended() || self.is_confirming() && self.form.is_some()
+    }
+
+    /// Returns the number of the page's preview; `None` for an upload of the command line.
+    pub(crate) fn number(&self) -> Option<u32> {
+        self.form.as_ref().map(|form| form.number)
+    }
+
+    pub(crate) const fn preview(&self) -> Option<&Preview> {
+        self.preview.as_ref()
+    }
+
+    /// Returns the reason why the upload has failed.
+    pub(crate) fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
+    }
+
+    /// Returns the name of the stage, for the page.
+    pub(crate) const fn stage(&self) -> &'static str {
+        match self.stage {
+            Stage::Querying(_) if self.is_confirmed => "checking",
+            Stage::Querying(_) => "asking",
+            Stage::Computing(_) => "computing",
+            Stage::Confirming => "ready",
+            Stage::Uploading => "uploading",
+            Stage::Ended if self.fault.is_some() => "failed",
+            Stage::Ended => "flown",
+        }
+    }
+
+    /// Uploads what the page has previewed, if the chain still flies the mission of the preview.
+    ///
+    /// # Errors
+    /// The reason why this preview cannot be uploaded, or not again.
+    pub(crate) fn confirm(
+        &mut self,
+        now: Instant,
+        ground: &mut Ground,
+        number: u32,
+        digest: &str,
+    ) -> Result<(), String> {
+        let newest = self.number().ok_or("there is no preview")?;
+        if number != newest {
+            return Err(format!(
+                "preview {number} is not the newest one, which is preview {newest}"
+            ));
+        }
+        let upload = self
+            .upload
+            .filter(|_| matches!(self.stage, Stage::Confirming));
+        let Some(upload) = upload else {
+            let why = if self.is_confirmed {
+                "was used already: make a new preview"
+            } else {
+                "is not ready"
+            };
+            return Err(format!("preview {number} {why}"));
+        };
+        let own = digest_of(&upload);
+        if digest != own {
+            return Err(format!(
+                "preview {number} has the digest {own}, not {digest}"
+            ));
+        }
+        ground.request_flown(now);
+        self.is_confirmed = true;
+        self.stage = Stage::Querying(None);
+        self.late_at = Some(now + PAGE_TIMEOUT);
+        Ok(())
+    }
+
+    const fn is_confirming(&self) -> bool {
         matches!(self.stage, Stage::Confirming)
     }
 
@@ -112,7 +249,7 @@ impl Uploading {
             return self.start(now, plan, ground, upload);
         }
         self.stage = Stage::Ended;
-        let version = self.version;
+        let version = upload.version();
         failed(format!(
             "--version {version}: not confirmed, so nothing was uploaded"
         ))
@@ -128,12 +265,14 @@ impl Uploading {
     ) -> Outcome {
         let outcome = match (self.stage, self.upload) {
             (Stage::Querying(since), _) => self.await_mission(now, log, plan, ground, since),
+            (Stage::Computing(_), Some(upload)) => self.await_moves(now, log, plan, ground, upload),
             (Stage::Uploading, Some(upload)) => self.follow(now, log, plan, &upload, ground),
             _ => None,
         };
-        if outcome.is_some() {
+        if let Some(outcome) = &outcome {
             self.stage = Stage::Ended;
             self.late_at = None;
+            self.fault = outcome.as_ref().err().map(|fault| fault.line.clone());
         }
         outcome
     }
@@ -146,7 +285,6 @@ impl Uploading {
         ground: &mut Ground,
         since: Option<Instant>,
     ) -> Outcome {
-        let version = self.version;
         if let Some(flown) = ground.flown().copied() {
             if flown.is_known() {
                 return self.decide(now, log, plan, ground, flown);
@@ -154,10 +292,11 @@ impl Uploading {
             let since = since.unwrap_or(now);
             self.stage = Stage::Querying(Some(since));
             if since + VALUES_TIMEOUT <= now {
+                let version = self.version.unwrap_or(u16::MAX);
                 if flown.version >= version {
                     return failed(report::outdated(version, flown.version));
                 }
-                if plan.options.from_loaded {
+                if plan.options.from_loaded && self.form.is_none() {
                     return self.decide(now, log, plan, ground, flown);
                 }
                 return failed(format!(
@@ -167,11 +306,17 @@ impl Uploading {
             }
         }
         self.late_at.filter(|at| *at <= now)?;
-        failed(report::timed_out(plan, version, Progress::Idle, ground))
+        failed(match (&self.form, self.version) {
+            (None, Some(version)) => report::timed_out(plan, version, Progress::Idle, ground),
+            _ => format!(
+                "no relay has reported the mission that it flies: {}",
+                report::likely_reason(plan, ground.stats())
+            ),
+        })
     }
 
-    /// Builds the upload from the mission that the relays fly, and shows the changes. Then starts the upload, or asks
-    /// the operator for confirmation.
+    /// Builds the upload from the mission that the relays fly, shows the changes, and starts to compute the moves. Starts
+    /// the upload if the page's operator has confirmed it.
     fn decide(
         &mut self,
         now: Instant,
@@ -180,9 +325,22 @@ impl Uploading {
         ground: &mut Ground,
         flown: FlownMission,
     ) -> Outcome {
-        let (version, options) = (self.version, &plan.options);
+        let options = &plan.options;
         report::flown(log, now, &flown);
-        if flown.version > version {
+        let basis = (flown.version, flown.upload);
+        if let (true, Some(upload)) = (self.is_confirmed, self.upload) {
+            if basis != self.based_on {
+                return failed(format!(
+                    "preview {}: computed for version {} of the mission, but the chain has another mission now, version {}: make a new preview",
+                    self.number().unwrap_or(0),
+                    self.based_on.0,
+                    flown.version
+                ));
+            }
+            return self.start(now, plan, ground, upload);
+        }
+        let version = self.version.unwrap_or(flown.version.saturating_add(1));
+        if flown.version > version || self.form.is_some() && flown.version == version {
             return failed(report::outdated(version, flown.version));
         }
         let loaded = Basis::loaded(&plan.loaded.mission, plan.sited);
@@ -190,9 +348,13 @@ impl Uploading {
             Some(upload) => Basis::flown(upload, plan.sited),
             None => loaded,
         };
-        let basis = if options.from_loaded { loaded } else { before };
+        let (new, base) = match &self.form {
+            Some(form) => (form.new.with_receiver(form.receiver_m, &before), before),
+            None if options.from_loaded => (Ok(options.new.clone()), loaded),
+            None => (Ok(options.new.clone()), before),
+        };
         let loaded = &plan.loaded.mission;
-        let upload = match options.new.upload(version, loaded, plan.sited, &basis) {
+        let upload = match new.and_then(|new| new.upload(version, loaded, plan.sited, &base)) {
             Ok(upload) => upload,
             Err(line) => return Some(Err(Fault { line, status: 2 })),
         };
@@ -201,16 +363,61 @@ impl Uploading {
         }
         let after = Basis::flown(upload, plan.sited);
         change::log_changes(log, now, &before, &after);
-        let lines = [before.line, after.line];
-        let moves = moves(&plan.loaded, flown.upload.as_ref(), &upload, lines);
+        let (sender, forecast) = channel();
+        let (loaded, lines) = (plan.loaded.clone(), [before.line, after.line]);
+        // The receiver may be gone at the end of the program. Without a thread no moves are shown.
+        let compute =
+            move || _ = sender.send(moves(&loaded, flown.upload.as_ref(), &upload, lines));
+        _ = std::thread::Builder::new()
+            .name("forecast".to_owned())
+            .spawn(compute);
+        self.forecast = Some(forecast);
+        self.based_on = basis;
+        self.preview = Some(Preview {
+            before,
+            after,
+            moves: None,
+        });
+        (self.stage, self.upload, self.late_at) = (Stage::Computing(now), Some(upload), None);
+        None
+    }
+
+    /// Shows the moves once they are computed. Then starts the upload, or asks the operator for confirmation.
+    fn await_moves(
+        &mut self,
+        now: Instant,
+        log: &Log,
+        plan: &Plan,
+        ground: &mut Ground,
+        upload: Upload,
+    ) -> Outcome {
+        let moves = match self.forecast.as_ref()?.try_recv() {
+            Ok(moves) => moves,
+            Err(TryRecvError::Disconnected) => None,
+            Err(TryRecvError::Empty) => {
+                self.stage = Stage::Computing(now + LOOK_AGAIN);
+                return None;
+            }
+        };
+        self.forecast = None;
+        let (version, options) = (upload.version(), &plan.options);
         change::log_moves(log, now, moves.as_deref());
-        if let Some(outside) = FenceViolation::of(plan, &upload)
-            && !options.no_fence
-        {
-            let outside = outside.line(moves.as_deref());
-            return failed(format!(
-                "--version {version}: {outside}; --no-fence uploads it nevertheless"
-            ));
+        let fence = FenceViolation::of(&plan.loaded.mission, &upload).filter(|_| !options.no_fence);
+        let outside = fence.map(|fence| fence.line(moves.as_deref()));
+        if let Some(preview) = &mut self.preview {
+            preview.moves = moves;
+        }
+        if let Some(outside) = outside {
+            return failed(match self.form {
+                Some(_) => outside,
+                None => {
+                    format!("--version {version}: {outside}; --no-fence uploads it nevertheless")
+                }
+            });
+        }
+        (self.stage, self.upload) = (Stage::Confirming, Some(upload));
+        if self.form.is_some() {
+            return None;
         }
         if options.dry_run {
             let what = format_args!("version {version} was not uploaded");
@@ -220,8 +427,6 @@ impl Uploading {
         if options.yes {
             return self.start(now, plan, ground, upload);
         }
-        (self.stage, self.upload) = (Stage::Confirming, Some(upload));
-        self.late_at = None;
         // Earlier log lines must be printed before the question. A closed standard error is ignored.
         log.flush(std::time::Duration::from_millis(500));
         let mut out = std::io::stderr();
@@ -264,6 +469,11 @@ impl Uploading {
         };
         failed(fault)
     }
+}
+
+/// Returns the digest of an upload as the page shows it.
+pub(crate) fn digest_of(upload: &Upload) -> String {
+    format!("0x{:04x}", upload.id().digest)
 }
 
 /// Returns the result of an upload that has failed for the reason `line`.

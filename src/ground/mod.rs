@@ -296,6 +296,8 @@ impl Ground {
                         Some(Checked::Handshake { first: true }) => {
                             self.due |= self.is_under_way() || self.is_querying();
                             self.reports.schedule(distance);
+                            #[cfg(feature = "telemetry")]
+                            self.watching.answer(distance);
                         }
                         _ => {}
                     }
@@ -640,6 +642,14 @@ impl Watching {
             } else {
                 reach
             };
+            self.is_due = true;
+        }
+    }
+
+    /// Schedules the request again for the relay at `distance`, which could not verify an earlier one.
+    const fn answer(&mut self, distance: u16) {
+        if self.repeat_at.is_some() && !self.is_due {
+            self.distance = distance;
             self.is_due = true;
         }
     }

@@ -28,6 +28,10 @@ pub(crate) struct Reporting([Option<(Side, Message)>; cfg!(feature = "auth") as 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, _: Instant, _: Placement) {}
 
+    pub(crate) fn handle_frame(&mut self, _: Instant, _: u16) {}
+
+    pub(crate) fn handle_session(&mut self, _: Instant, _: &Member, _: Side, _: u16) {}
+
     pub(crate) fn handle_measured(&mut self, _: f32) {}
 
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {

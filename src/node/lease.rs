@@ -1,7 +1,7 @@
-//! Lease: how long a relay may rely on the last agreement, by its own clock.
+//! Lease: how long, by its own clock, a relay knows that no later view has positions.
 //!
-//! A partitioned relay must stop using an agreement before the rest of the chain can adopt another one. Each view therefore has a
-//! lease. After the first agreement the leader sends renewals: a `Pulse` message is forwarded to the last relay, the reply
+//! The part of a split chain that has a quorum agrees on new positions only once the leases of all other members have expired. So a
+//! relay with a lease knows that the positions of its own view are the only ones. After the first agreement the leader sends renewals: a `Pulse` message is forwarded to the last relay, the reply
 //! `Pulsed` travels back, and only then the next renewal is sent. Renewal n + 1 therefore proves that every member took part in
 //! renewal n, and extends the lease.
 //!
@@ -10,14 +10,15 @@
 //! | leader | renewal due, none outstanding | send the next renewal |
 //! | any | renewal received, but no position agreed on in this view | request a new view |
 //! | any | next renewal received | extend the lease, counted from the forwarding of the previous renewal; forward it |
-//! | any | next renewal, no lease yet, span more than doubled | grant no lease: it would expire before the next renewal |
+//! | any | next renewal, no lease yet, span more than doubled | grant no lease: the last renewal was forwarded with the short span, and its lease would expire before a renewal with the long span comes back |
 //! | any | duplicate renewal received | reply whether it has completed |
 //! | last | renewal received | reply: completed |
 //! | any | completion received | forward it; at the leader: extend the lease from the start of this renewal, schedule the next one |
 //! | any | lease expired | request a new view; the setpoint stays |
 //!
 //! # Expiry
-//! The expiry stops no motion: the relay keeps its setpoint and requests a new view.
+//! The expiry stops no motion: the relay keeps its setpoint and requests a new view. Relays of another view may fly to other
+//! positions from then on; the guard's separation fences keep them apart.
 //!
 //! | state | after the expiry | code |
 //! | --- | --- | --- |
@@ -29,8 +30,8 @@
 //! | `Settings::without_quorum` | applies if the new view has no quorum, not at the expiry | `Node::wanted_place` |
 //!
 //! # Safety
-//! No relay uses an old agreement once positions of a later view may be used. Suppose that every member took part in renewal n
-//! and that relay r forwarded it at time t: r relies on the agreement until t + span. Every other member reports the completion
+//! All leases of a view have expired before the positions of a later view are agreed on. Suppose that every member took part in
+//! renewal n and that relay r forwarded it at time t: its lease ends at t + span. Every other member reports the completion
 //! no earlier than t: members closer to the leader after r has replied, members farther away after r has forwarded. A member that
 //! votes for a view without r states when the last lease that it vouched for expires: span after its own last report, which is
 //! never before r's expiry.

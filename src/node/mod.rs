@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | `neighbour` | selection of the neighbour on each side, and detection of its loss |
 //! | `view` | view change: agreement on the members of the chain |
-//! | `lease` | how long a relay may use an agreement |
+//! | `lease` | how long a relay knows that no later view has positions |
 //! | `mission_update` | distribution of a newer mission in flight |
 //! | `round` | rounds of agreement on positions: sweeps, profile collection, tokens, sensing |
 //!
@@ -17,7 +17,7 @@
 //! | `dispatch` | [`Node`], which owns the layers, and is a relay as its facade sees it; `incoming` is a good start |
 //! | `duplicate` | detection of another node with the same number, and the choice of the one that becomes passive |
 //! | `steering` | setpoint on the way to the agreed position |
-//! | `reports` | states of the relays, on their way to a ground station that watches |
+//! | `reports` | states of the relays, on their way to a ground station that watches; without the feature `telemetry` the file `handing_on.rs`, which only hands them on |
 //!
 //! | below the layers | content |
 //! | --- | --- |

@@ -3,13 +3,14 @@
 //! | event | action |
 //! | --- | --- |
 //! | new Watch received from a side | report toward that side for 60 s; hand the Watch on to the other side |
-//! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports for 25 s |
+//! | the same Watch received again | none, but a sender nearer to the station becomes the destination of reports |
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
+//! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
-//! neighbour, too: reports then skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. The time between two reports of a relay is proportional to the first one's
+//! neighbour, too: reports then skip relays. Without a destination, or before a handshake with it, reports go to the neighbour. A relay that has sent no frame for 2.5 s is no destination. The time between two reports of a relay is proportional to the first one's
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
@@ -30,8 +31,11 @@ const WATCHED: Duration = Duration::from_millis(60_000);
 /// Time after a Watch for which its sender is the destination of reports. Four lost ones do not change it.
 const DESTINED: Duration = Duration::from_millis(25_000);
 
+/// Time without any frame of a relay after which it is the destination of reports no longer.
+const UNHEARD: Duration = Duration::from_millis(2_500);
+
 /// Time without a report from a relay after which a Watch to it is repeated.
-const UNCONFIRMED: Duration = Duration::from_millis(8_000);
+const UNCONFIRMED: Duration = Duration::from_millis(3000);
 
 /// Maximum number of doublings of the time between two such repetitions.
 const MOST_DOUBLINGS: u8 = 3;
@@ -98,6 +102,10 @@ struct Watched {
     /// Node that reports are sent to, until a time; `None` for the neighbour.
     to: Option<u16>,
     to_until: Instant,
+    /// Time of the last frame of that node, also of one to another node.
+    heard: Instant,
+    /// Number of the last Watch from the relay four numbers nearer to the station.
+    far_number: u16,
     /// Bit mask of the distances of nodes to which the Watch is to be handed on, and when.
     hand_on: u8,
     hand_on_at: Instant,
@@ -131,8 +139,30 @@ impl Reporting {
         self.power_w = power_w;
     }
 
+    /// Takes the control state; a change is reported as soon as the share of the channel allows.
     pub(crate) fn handle_control(&mut self, control: u16) {
-        self.control = control;
+        if core::mem::replace(&mut self.control, control) != control {
+            for watched in &mut self.watched {
+                (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
+            }
+        }
+    }
+
+    /// Records a frame of node `from`, to whichever node.
+    pub(crate) fn handle_frame(&mut self, now: Instant, from: u16) {
+        for watched in self.watched.iter_mut().filter(|it| it.to == Some(from)) {
+            watched.heard = now;
+        }
+    }
+
+    /// Schedules the Watch of the other side for node `from` at `side`, which could not verify an earlier one.
+    pub(crate) fn handle_session(&mut self, now: Instant, member: &Member, side: Side, from: u16) {
+        let distance = from.abs_diff(member.node);
+        let watched = self.at(side.other());
+        if watched.until > Instant::ZERO && distance == 1 {
+            watched.hand_on |= mask(1);
+            watched.hand_on_at = now;
+        }
     }
 
     /// Handles a Watch or a Report from node `from` at `side`. Returns false if an entry is of a relay that is not
@@ -164,7 +194,7 @@ impl Reporting {
     ) -> Option<(Side, u16, Message)> {
         for side in [Side::Upstream, Side::Downstream] {
             let watched = self.at(side);
-            watched.expire(now);
+            watched.expire(now, member);
             let is_ready = |at| now >= at + wait;
             while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
                 let distance = if watched.hand_on & 1 != 0 {
@@ -256,11 +286,14 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s.
-    fn expire(&mut self, now: Instant) {
+    /// Ends the watch 60 s after the last request, and forgets a destination that has sent none for 25 s, or a relay that has
+    /// sent nothing for 2.5 s.
+    fn expire(&mut self, now: Instant, member: &Member) {
+        let is_unheard =
+            now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
         if now >= self.until {
             *self = Self::default();
-        } else if now >= self.to_until {
+        } else if now >= self.to_until || is_unheard {
             self.to = None;
         }
     }
@@ -282,7 +315,7 @@ impl Reporting {
 
     fn on_watch(&mut self, now: Instant, member: &Member, (side, from): (Side, u16), number: u16) {
         let watched = self.at(side);
-        watched.expire(now);
+        watched.expire(now, member);
         let begins = watched.until == Instant::ZERO;
         let ahead = number.wrapping_sub(watched.number);
         if begins {
@@ -305,9 +338,16 @@ impl Reporting {
             return;
         }
         let distance = |node: u16| node.abs_diff(member.node);
+        if distance(from) == CANDIDATES
+            && core::mem::replace(&mut watched.far_number, number) == number
+            && !begins
+        {
+            return; // That relay repeats it, because it does not receive this relay's reports.
+        }
         if watched.to.is_none_or(|to| distance(from) >= distance(to)) {
             watched.to = Some(from);
             watched.to_until = now + DESTINED;
+            watched.heard = now;
         }
     }
 
@@ -326,7 +366,7 @@ impl Reporting {
             return false;
         }
         let watched = self.at(side.other());
-        watched.expire(now);
+        watched.expire(now, member);
         if watched.until == Instant::ZERO {
             return true;
         }
@@ -340,7 +380,8 @@ impl Reporting {
             let is_far = from.abs_diff(member.node) == CANDIDATES;
             watched.hand_on |= mask(if is_far { CANDIDATES } else { 1 });
         }
-        watched.due = now;
+        // A report that waits for an agreement waits no longer for it.
+        watched.due = watched.due.min(now);
         watched.is_fed = true;
         let mut detail = report.detail;
         for entry in &report.entries {
@@ -470,18 +511,19 @@ impl Reporting {
     /// Returns the time between two reports for each byte of the first one. Reports of all relays then take an eleventh of
     /// the data rate.
     ///
-    /// The data rate is at least a sweep in a `hop_time`. On a shared channel a relay may also take a twentieth of what its messages of an
-    /// idle chain are assumed to take at most: see [`ChannelLoad`](crate::ChannelLoad).
+    /// The data rate is at least a sweep in a `hop_time`. A shared channel has at least 2350 bytes for each relay in a `probe_after`, see
+    /// [`ChannelLoad`](crate::ChannelLoad): relays may also take a tenth of these, each in proportion to its load.
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = (settings.hop_time.as_micros() * 103 / 1_200).clamp(1, 1 << 24);
+        let hop = (settings.hop_time.as_micros() * 105 / 1_200).clamp(1, 1 << 24);
         let hop = u32::try_from(hop).unwrap_or(u32::MAX);
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),
             Wiring::Shared => {
-                let share = 16 * all_loads(member) / load(member, from_end(member, side));
-                let share = (u64::from(share) * u64::from(hop)) >> 4;
-                share.min((micros(settings.probe_after) / 196).into())
+                let (all, own) = (all_loads(member), load(member, from_end(member, side)));
+                let by_hop = (u64::from(16 * all / own) * u64::from(hop)) >> 4;
+                let of_mean = 256 * all / (own * u32::from(member.all));
+                by_hop.min((of_mean * (micros(settings.probe_after) / (256 * 235))).into())
             }
         };
         let is_both = self.watched.iter().all(|watched| now < watched.until);

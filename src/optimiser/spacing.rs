@@ -317,7 +317,9 @@ impl Hop {
         let heard = square(self.interferer_x_m - place) + self.aside_squared;
         let squared = square(place - from) + self.across_squared;
         let needed = self.sender.gain.ratio(target) * squared * (1.0 - ROUNDING);
-        (from >= 0.0 && in_noise(heard, self.nu()) >= needed).then_some(from)
+        // The relays before the sender need an x of their own, which x = 0 would not leave them.
+        let room = ROUNDING * self.end_m;
+        (from >= room && in_noise(heard, self.nu()) >= needed).then_some(from)
     }
 
     pub(super) fn outermost_in_silence(&self, target: f32, from_m: f32) -> Option<f32> {

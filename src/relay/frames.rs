@@ -26,6 +26,9 @@ pub(super) fn receive(
 ) {
     let (own, header) = (node.member().node, frame.header);
     let is_duplicate = header.sender == own;
+    if port == Port::Shared {
+        node.on_channel(now, header.sender);
+    }
     if header.destination != own && port == Port::Shared {
         bump(&mut node.stats_mut().overheard);
         if is_duplicate {
@@ -106,12 +109,12 @@ fn receive_signed(
     match checked {
         Checked::Fresh { first } => {
             node.on_key_match(side, sender);
-            node.on_authentic(side, sender, first);
+            node.on_authentic(now, side, sender, first);
             decode(node, now, side, frame);
         }
         Checked::Handshake { first } => {
             node.on_key_match(side, sender);
-            node.on_authentic(side, sender, first);
+            node.on_authentic(now, side, sender, first);
         }
         Checked::Unproven => node.on_handshake(side, sender),
         // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.

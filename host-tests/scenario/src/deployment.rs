@@ -108,6 +108,8 @@ pub struct Ground {
     pub measurements: Option<String>,
     /// Address and port at which a page shows the chain in a browser.
     pub web: Option<String>,
+    /// File with the password of the page.
+    pub web_password: Option<PathBuf>,
     /// True to write log lines as JSON.
     pub json: Option<bool>,
     /// Log file of the ground station, in place of its standard output.

@@ -1,4 +1,4 @@
-//! Reads a secret key (of the network or the autopilot) from a file. 64 hexadecimal digits, as from `openssl rand -hex 32`.
+//! Reads a secret from a file: a key (of the network or the autopilot), 64 hexadecimal digits as from `openssl rand -hex 32`, or a password.
 
 use std::path::Path;
 
@@ -8,11 +8,29 @@ use std::path::Path;
 /// A line with the option, the file and the problem, such as a file that other users can read; never the file's
 /// content.
 pub fn load(option: &str, file: &Path) -> Result<[u8; 32], String> {
+    parse(&read(option, file)?).map_err(|error| format!("{option} {}: {error}", file.display()))
+}
+
+/// Reads a password from the first line of `file`. `option` is the command-line option that named the file.
+///
+/// # Errors
+/// A line with the option, the file and the problem, as for a key; never the file's content.
+pub fn load_password(option: &str, file: &Path) -> Result<String, String> {
+    let text = read(option, file)?;
+    let password = text.lines().next().unwrap_or_default().trim();
+    if !(8..=200).contains(&password.chars().count()) {
+        return Err(format!(
+            "{option} {}: must have 8 to 200 characters in its first line",
+            file.display()
+        ));
+    }
+    Ok(password.to_owned())
+}
+
+fn read(option: &str, file: &Path) -> Result<String, String> {
     let named = |error: &str| format!("{option} {}: {error}", file.display());
     check_mode(file).map_err(|error| named(&error))?;
-    let text = std::fs::read_to_string(file)
-        .map_err(|error| named(&format!("cannot be read: {error}")))?;
-    parse(&text).map_err(named)
+    std::fs::read_to_string(file).map_err(|error| named(&format!("cannot be read: {error}")))
 }
 
 /// Rejects a key file that users other than its owner and group can read or write.
@@ -26,7 +44,7 @@ fn check_mode(file: &Path) -> Result<(), String> {
         Ok(about) if about.is_file() && about.permissions().mode() & OTHERS != 0 => {
             let mode = about.permissions().mode() & 0o777;
             Err(format!(
-                "has the mode {mode:04o}, so other users of this computer can read or write the key; type: chmod 600 {}",
+                "has the mode {mode:04o}, so other users of this computer can read or write it; type: chmod 600 {}",
                 file.display()
             ))
         }

@@ -412,6 +412,7 @@ const GROUND: Keys = &[
     optional("stand", Rule::Flag),
     optional("measurements", Text),
     optional("web", Text),
+    optional("web_password", Text),
     optional("json", Rule::Flag),
     optional("log_file", Text),
     optional("status_socket", Text),

@@ -26,6 +26,7 @@ pub enum Reason {
     NotReceived,
     Mission,
     Version,
+    Stuck,
     Restarted,
     Measurements,
     NoReport,
@@ -48,7 +49,8 @@ impl Reason {
             | Self::LeaseExpired
             | Self::NotReceived
             | Self::Mission
-            | Self::Version => Urgency::Warning,
+            | Self::Version
+            | Self::Stuck => Urgency::Warning,
             Self::Restarted | Self::Measurements | Self::NoReport | Self::Rejected => {
                 Urgency::Notice
             }
@@ -81,6 +83,11 @@ impl Reason {
             Self::NotReceived => format!("relay {subject} does not receive {by}"),
             Self::Mission => format!("relay {subject} has another mission: reported by {by}"),
             Self::Version => format!("{by} flies another version of the mission"),
+            Self::Stuck => {
+                format!(
+                    "{by} does not fly to its setpoint: its autopilot's fence or limits may forbid it"
+                )
+            }
             Self::Restarted => format!("{by}: the autopilot was restarted"),
             Self::Measurements => {
                 format!("{by}: the measured interference does not fit one interferer")

@@ -31,13 +31,16 @@
 //!
 //! # Security
 //!
-//! The page only shows: no request changes anything. The server refuses requests other than GET, requests with a body, requests for
+//! The page of [`Screen::start`] only shows: no request changes anything. The page of [`Screen::start_acting`] can give tasks to the
+//! program, by POST requests that have a token. The token is random at each start, and only pages of this server can read it.
+//! The server refuses requests with other methods, requests for
 //! another host, and requests that the browser marks as those of another site's page, by `Origin` or `Sec-Fetch-Site`. Browsers send
 //! `Sec-Fetch-Site` only to loopback addresses as long as the page comes by plain HTTP. At other addresses the server answers a foreign
-//! page's request without `Origin`, as for a picture or a script, and only the browser keeps the answer from that page:
+//! page's GET without `Origin`, as for a picture or a script, and only the browser keeps the answer from that page:
 //! by `Cross-Origin-Resource-Policy`, `nosniff`, and because no answer allows another origin. The page loads nothing
-//! from elsewhere, and its content security policy allows only its own files. There is no password: everyone who reaches the address
-//! sees the screen. [`Screen::is_public`] tells whether other computers can reach it.
+//! from elsewhere, and its content security policy allows only its own files. Without a password everyone who reaches the address
+//! can use the page. [`Screen::is_public`] tells whether other computers can reach it. The password is sent in the clear, and wrong ones
+//! are limited: five a minute from one address.
 
 pub mod alarms;
 pub mod chain;
@@ -54,8 +57,8 @@ use std::net::SocketAddr;
 
 pub use alarms::{list, named};
 pub use clean::clean;
-pub use request::FILES;
-pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, Screen};
+pub use request::{FILES, Task};
+pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, Post, Screen};
 pub use snapshot::{
     Alarm, Condition, Fence, Frame, Hop, InterfererSnapshot, LogLine, Node, Position,
     RelaySnapshot, Snapshot, Urgency,

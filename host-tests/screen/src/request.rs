@@ -1,15 +1,20 @@
 //! Requests of browsers: parsing, checks, and the files of the page.
 //!
-//! A request is refused unless it is a GET without a body for the address that it arrived at. The check of `Host` prevents DNS
-//! rebinding: a foreign name that resolves to this computer. Requests of other sites' pages are refused if the browser marks them:
+//! A request is refused unless it is for the address that it arrived at, with the password if there is one, and is a GET without a body or
+//! a POST with the page's token. The check of `Host` prevents DNS rebinding: a foreign name that resolves to this computer. Requests of other sites' pages are refused if the browser marks them:
 //! by `Origin`, or by `Sec-Fetch-Site`, which browsers send to loopback addresses but not to other addresses by plain HTTP. Only a
 //! link to `/` may be on another site. A foreign page's request without either header is answered, and the headers of the
-//! response tell the browser to keep the answer from that page.
+//! response tell the browser to keep the answer from that page. A POST must have an `Origin`, a JSON body, and the token, which only
+//! pages of this server can read; a foreign page's POST would first need a permission (CORS) that no answer gives.
 
+use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 
-/// Largest size of a request line with its headers, bytes.
+/// Largest size of a request, bytes.
 pub(crate) const MAX_REQUEST: usize = 8 * 1024;
+
+/// Largest size of the body of a POST, bytes.
+const MAX_BODY: usize = 4 * 1024;
 
 /// Largest number of headers of a request.
 const MAX_HEADERS: usize = 64;
@@ -19,7 +24,7 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
                       form-action 'none'; frame-ancestors 'none'";
 
 /// Files of the page: path, media type and content. The path of the page itself is `/`.
-pub const FILES: [(&str, &str, &str); 6] = [
+pub const FILES: [(&str, &str, &str); 7] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -41,6 +46,11 @@ pub const FILES: [(&str, &str, &str); 6] = [
         include_str!("../web/alarms.js"),
     ),
     (
+        "/desk.js",
+        "text/javascript; charset=utf-8",
+        include_str!("../web/desk.js"),
+    ),
+    (
         "/screen.js",
         "text/javascript; charset=utf-8",
         include_str!("../web/screen.js"),
@@ -55,6 +65,33 @@ pub const FILES: [(&str, &str, &str); 6] = [
 /// Path of the stream of snapshots.
 const EVENTS: &str = "/events";
 
+/// Path of a POST, by its task.
+const TASKS: [(&str, Task); 2] = [("/preview", Task::Preview), ("/upload", Task::Upload)];
+
+/// Task that a page gives to the program.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Task {
+    /// Compute where the relays would fly with the values in the body.
+    Preview,
+    /// Upload the mission of the preview whose number and digest are in the body.
+    Upload,
+}
+
+/// Secrets that requests have to carry.
+#[derive(Default)]
+pub(crate) struct Access {
+    /// Password of all requests, by HTTP basic authentication with any user name; `None` for a page without password.
+    pub(crate) password: Option<String>,
+    /// Token of every POST; `None` if no POST is accepted.
+    pub(crate) token: Option<String>,
+}
+
+impl fmt::Debug for Access {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Access").finish_non_exhaustive()
+    }
+}
+
 /// Answer to a request.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Answer {
@@ -62,6 +99,8 @@ pub(crate) enum Answer {
     File(&'static str, &'static str),
     /// Stream of snapshots, which lasts until the browser leaves.
     Events,
+    /// Task with a body of this many bytes, which the program answers.
+    Post(Task, usize),
     /// Refusal: status and reason phrase.
     Refused(u16, &'static str),
 }
@@ -70,41 +109,69 @@ pub(crate) enum Answer {
 pub(crate) const TOO_LARGE: Answer = Answer::Refused(431, "Request Header Fields Too Large");
 /// Refusal of a request that did not arrive in time.
 pub(crate) const TOO_SLOW: Answer = Answer::Refused(408, "Request Timeout");
-/// Refusal of a connection beyond the limit of connections.
+/// Refusal of a connection beyond the limit of connections, and of a POST while the program does not answer.
 pub(crate) const FULL: Answer = Answer::Refused(503, "Service Unavailable");
+/// Refusal of a request without a password.
+const NO_PASSWORD: Answer = Answer::Refused(401, "Unauthorized");
+/// Refusal of a request with a wrong password.
+pub(crate) const WRONG_PASSWORD: Answer = Answer::Refused(401, "Wrong Password");
+/// Refusal of requests after too many wrong passwords.
+pub(crate) const TOO_MANY: Answer = Answer::Refused(429, "Too Many Wrong Passwords");
+
+const NO_TOKEN: Answer = Answer::Refused(403, "Forbidden: Without The Token Of This Start");
+const BODY_TOO_LARGE: Answer = Answer::Refused(413, "Content Too Large");
 
 const MALFORMED: Answer = Answer::Refused(400, "Bad Request");
 const FOREIGN: Answer = Answer::Refused(403, "Forbidden");
 
-/// Returns the answer to the received bytes of a request; `None` while it is incomplete.
+/// Returns the answer to the received bytes of a request, and its body; `None` while it is incomplete.
 ///
 /// `own` is the address at which the request arrived.
-pub(crate) fn answer(bytes: &[u8], own: SocketAddr) -> Option<Answer> {
+pub(crate) fn answer<'a>(
+    bytes: &'a [u8],
+    own: SocketAddr,
+    access: &Access,
+) -> Option<(Answer, &'a [u8])> {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
-    match request.parse(bytes) {
-        Ok(httparse::Status::Complete(_)) => {}
+    let refused = |answer| Some((answer, &[][..]));
+    let head = match request.parse(bytes) {
+        Ok(httparse::Status::Complete(len)) => len,
         Ok(httparse::Status::Partial) => return None,
-        Err(httparse::Error::TooManyHeaders) => return Some(TOO_LARGE),
-        Err(_) => return Some(MALFORMED),
+        Err(httparse::Error::TooManyHeaders) => return refused(TOO_LARGE),
+        Err(_) => return refused(MALFORMED),
+    };
+    let answer = checked(&request, own, access);
+    let Answer::Post(_, len) = answer else {
+        return refused(answer);
+    };
+    let body = bytes.get(head..).unwrap_or_default();
+    match body.len() {
+        _ if head + len > MAX_REQUEST => refused(BODY_TOO_LARGE),
+        received if received < len => None,
+        received if received > len => refused(MALFORMED),
+        _ => Some((answer, body)),
     }
-    Some(checked(&request, own))
 }
 
-fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr) -> Answer {
+fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access) -> Answer {
     let values = |name: &'static str| {
         let headers = request.headers.iter();
         let same = headers.filter(move |header| header.name.eq_ignore_ascii_case(name));
         same.map(|header| std::str::from_utf8(header.value).unwrap_or_default())
     };
-    let (mut hosts, mut origins) = (values("host"), values("origin"));
-    let (Some(host), None) = (hosts.next(), hosts.next()) else {
+    let only = |name| {
+        let mut all = values(name);
+        all.next().filter(|_| all.next().is_none())
+    };
+    let Some(host) = only("host") else {
         return MALFORMED;
     };
     if !is_own(host, own) {
         return FOREIGN;
     }
-    if origins.any(|origin| origin.strip_prefix("http://") != Some(host)) {
+    let is_own_page = |origin: &str| origin.strip_prefix("http://") == Some(host);
+    if !values("origin").all(is_own_page) {
         return FOREIGN;
     }
     let target = request.path.unwrap_or_default();
@@ -114,12 +181,38 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr) -> Answer {
     if is_foreign && !is_link {
         return FOREIGN;
     }
+    if let Some(password) = &access.password {
+        match only("authorization") {
+            None => return NO_PASSWORD,
+            Some(given) if !has_password(given, password) => return WRONG_PASSWORD,
+            Some(_) => {}
+        }
+    }
+    let length = only("content-length").and_then(|length| length.parse().ok());
+    let is_chunked = values("transfer-encoding").next().is_some();
+    if let (Some("POST"), Some(token)) = (request.method, &access.token) {
+        let task = TASKS.into_iter().find(|(of, _)| *of == path);
+        let Some((_, task)) = task else {
+            return Answer::Refused(404, "Not Found");
+        };
+        if only("origin").is_none() {
+            return FOREIGN;
+        }
+        let given = only("x-relay-token").unwrap_or_default();
+        if !is_same(given.as_bytes(), token.as_bytes()) {
+            return NO_TOKEN;
+        }
+        return match length {
+            _ if is_chunked || only("content-type") != Some("application/json") => MALFORMED,
+            None => MALFORMED,
+            Some(length) if length > MAX_BODY => BODY_TOO_LARGE,
+            Some(length) => Answer::Post(task, length),
+        };
+    }
     if request.method != Some("GET") {
         return Answer::Refused(405, "Method Not Allowed");
     }
-    let has_body = values("content-length").any(|length| length != "0")
-        || values("transfer-encoding").next().is_some();
-    if has_body {
+    if is_chunked || values("content-length").any(|length| length != "0") {
         return MALFORMED;
     }
     if path == EVENTS {
@@ -129,6 +222,41 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr) -> Answer {
     file.map_or(Answer::Refused(404, "Not Found"), |(_, media, content)| {
         Answer::File(media, content)
     })
+}
+
+/// Returns true if an `Authorization` header has the password, with any user name.
+fn has_password(header: &str, password: &str) -> bool {
+    let given = header.split_once(' ');
+    let given = given.filter(|(scheme, _)| scheme.eq_ignore_ascii_case("basic"));
+    let given = given
+        .and_then(|(_, text)| decoded(text.trim()))
+        .unwrap_or_default();
+    let mut parts = given.splitn(2, |byte| *byte == b':').skip(1);
+    is_same(parts.next().unwrap_or_default(), password.as_bytes())
+}
+
+/// Decodes a base64 text; `None` if it has another character.
+fn decoded(text: &str) -> Option<Vec<u8>> {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let (mut bits, mut count, mut bytes) = (0, 0, Vec::new());
+    for digit in text.trim_end_matches('=').bytes() {
+        let value = DIGITS.iter().position(|it| *it == digit)?;
+        (bits, count) = ((bits << 6 | value) & 0xFFF, count + 6);
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count).to_le_bytes()[0]);
+        }
+    }
+    Some(bytes)
+}
+
+/// Returns true if a text is the secret. The time does not depend on how many of its bytes are right.
+fn is_same(given: &[u8], secret: &[u8]) -> bool {
+    let pairs = given.iter().zip(secret);
+    let wrong = pairs.fold(given.len() ^ secret.len(), |wrong, (one, other)| {
+        wrong | usize::from(one ^ other)
+    });
+    std::hint::black_box(wrong) == 0
 }
 
 /// Returns true if `host` is the address `own`, or `localhost` for a loopback address.
@@ -152,22 +280,35 @@ fn is_own(host: &str, own: SocketAddr) -> bool {
 
 /// Returns the head of the response to a request, without a body for the stream of snapshots.
 pub(crate) fn head(answer: Answer) -> String {
-    let (status, reason, media, length) = match answer {
-        Answer::File(media, content) => (200, "OK", media, Some(content.len())),
-        Answer::Events => (200, "OK", "text/event-stream", None),
-        Answer::Refused(status, reason) => (
-            status,
-            reason,
-            "text/plain; charset=utf-8",
-            Some(reason.len() + 1),
-        ),
+    match answer {
+        Answer::File(media, content) => written(200, "OK", media, Some(content.len())),
+        Answer::Events | Answer::Post(..) => written(200, "OK", "text/event-stream", None),
+        Answer::Refused(status, reason) => written(status, reason, PLAIN, Some(reason.len() + 1)),
+    }
+}
+
+/// Returns the response with the program's answer to a task: an error if it does not do it.
+pub(crate) fn replied(reply: &Result<String, String>) -> String {
+    let (status, reason, media, text) = match reply {
+        Ok(json) => (200, "OK", "application/json", json),
+        Err(why) => (409, "Conflict", PLAIN, why),
     };
+    format!("{}{text}", written(status, reason, media, Some(text.len())))
+}
+
+const PLAIN: &str = "text/plain; charset=utf-8";
+
+fn written(status: u16, reason: &str, media: &str, length: Option<usize>) -> String {
     let length = length.map_or_else(String::new, |length| {
         format!("Content-Length: {length}\r\n")
     });
-    let allow = if status == 405 { "Allow: GET\r\n" } else { "" };
+    let more = match status {
+        401 => "WWW-Authenticate: Basic realm=\"relay chain\", charset=\"UTF-8\"\r\n",
+        405 => "Allow: GET\r\n",
+        _ => "",
+    };
     format!(
-        "HTTP/1.1 {status} {reason}\r\nContent-Type: {media}\r\n{length}{allow}Connection: close\r\nCache-Control: no-store\r\n\
+        "HTTP/1.1 {status} {reason}\r\nContent-Type: {media}\r\n{length}{more}Connection: close\r\nCache-Control: no-store\r\n\
          Content-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
          Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n"
     )
@@ -177,29 +318,108 @@ pub(crate) fn head(answer: Answer) -> String {
 pub(crate) fn body(answer: Answer) -> String {
     match answer {
         Answer::File(_, content) => content.to_owned(),
-        Answer::Events => String::new(),
+        Answer::Events | Answer::Post(..) => String::new(),
         Answer::Refused(_, reason) => format!("{reason}\n"),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Answer, FOREIGN, MALFORMED, TOO_LARGE, answer};
+    use super::{Access, Answer, FOREIGN, MALFORMED, TOO_LARGE, Task, answer, decoded};
 
     fn asked(request: &str, own: &str) -> Option<Answer> {
         let own = own.parse().ok()?;
-        answer(request.as_bytes(), own)
+        answer(request.as_bytes(), own, &Access::default()).map(|(answer, _)| answer)
     }
 
     fn status(lines: &str) -> u16 {
-        let request = format!("{lines}\r\n\r\n")
-            .replace('\n', "\r\n")
-            .replace("\r\r", "\r");
-        match asked(&request, "127.0.0.1:8080") {
-            Some(Answer::Refused(status, _)) => status,
+        status_of(&format!("{lines}\n\n"), &Access::default())
+    }
+
+    /// Returns the status of the answer, 200 for a task, and 0 for an incomplete request.
+    fn status_of(request: &str, access: &Access) -> u16 {
+        let request = request.replace('\n', "\r\n");
+        let own = ([127, 0, 0, 1], 8080).into();
+        match answer(request.as_bytes(), own, access) {
+            Some((Answer::Refused(status, _), _)) => status,
             Some(_) => 200,
             None => 0,
         }
+    }
+
+    #[test]
+    fn a_task_needs_the_token_the_origin_and_a_small_json_body() {
+        let access = Access {
+            password: None,
+            token: Some("secret".to_owned()),
+        };
+        let good = "POST /preview HTTP/1.1\nHost: 127.0.0.1:8080\nOrigin: http://127.0.0.1:8080\nX-Relay-Token: secret\n\
+                    Content-Type: application/json\nContent-Length: 2\n\n{}";
+        let own = ([127, 0, 0, 1], 8080).into();
+        let bytes = good.replace('\n', "\r\n");
+        let parsed = answer(bytes.as_bytes(), own, &access);
+        assert_eq!(parsed, Some((Answer::Post(Task::Preview, 2), &b"{}"[..])));
+        assert_eq!(
+            status_of(good, &Access::default()),
+            405,
+            "a page that only shows"
+        );
+        for (part, with, expected) in [
+            ("/preview", "/upload", 200),
+            ("/preview", "/events", 404),
+            ("POST", "PUT", 405),
+            ("Host: 127.0.0.1:8080", "Host: evil.example:8080", 403),
+            ("Origin: http://127.0.0.1:8080\n", "", 403),
+            ("Origin: http://127", "Origin: http://evil.example", 403),
+            ("Origin: http", "Origin: https", 403),
+            ("Token: secret", "Token: secreT", 403),
+            ("Token: secret", "Token: secret1", 403),
+            ("X-Relay-Token: secret\n", "", 403),
+            (
+                "X-Relay-Token: secret\n",
+                "X-Relay-Token: secret\nX-Relay-Token: secret\n",
+                403,
+            ),
+            ("application/json", "text/plain", 400),
+            ("Content-Length: 2", "Content-Length: 1", 400),
+            ("Content-Length: 2", "Content-Length: 3", 0),
+            ("Content-Length: 2", "Content-Length: 4097", 413),
+            ("Content-Length: 2", "Content-Length: -2", 400),
+            ("Content-Length: 2", "Transfer-Encoding: chunked", 400),
+            ("Origin", "Sec-Fetch-Site: cross-site\nOrigin", 403),
+        ] {
+            let request = good.replacen(part, with, 1);
+            assert_eq!(status_of(&request, &access), expected, "{request}");
+        }
+    }
+
+    #[test]
+    fn with_a_password_every_request_needs_it() {
+        let access = Access {
+            password: Some("correct horse: 7".to_owned()),
+            token: Some("secret".to_owned()),
+        };
+        // The user name is any: `operator` and none.
+        for (header, expected) in [
+            ("", 401),
+            (
+                "Authorization: Basic b3BlcmF0b3I6Y29ycmVjdCBob3JzZTogNw==\n",
+                200,
+            ),
+            ("Authorization: basic OmNvcnJlY3QgaG9yc2U6IDc=\n", 200),
+            ("Authorization: Basic OmNvcnJlY3QgaG9yc2U6IDg=\n", 401),
+            ("Authorization: Basic Og==\n", 401),
+            ("Authorization: Basic\n", 401),
+            ("Authorization: Bearer OmNvcnJlY3QgaG9yc2U6IDc=\n", 401),
+            ("Authorization: Basic ?mNvcnJlY3QgaG9yc2U6IDc=\n", 401),
+        ] {
+            for path in ["/", "/events", "/icon.svg"] {
+                let request = format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:8080\n{header}\n");
+                assert_eq!(status_of(&request, &access), expected, "{request}");
+            }
+        }
+        assert_eq!(decoded("YQ==").as_deref(), Some(&b"a"[..]));
+        assert_eq!(decoded("YWI/").as_deref(), Some(&b"ab?"[..]));
     }
 
     #[test]

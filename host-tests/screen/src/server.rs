@@ -9,6 +9,7 @@ use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle, sleep};
 use std::time::{Duration, Instant};
@@ -17,7 +18,10 @@ use serde::Serialize;
 
 use crate::ScreenError;
 use crate::clean::{clean, clean_line};
-use crate::request::{Answer, FULL, MAX_REQUEST, TOO_LARGE, TOO_SLOW, answer, body, head};
+use crate::request::{
+    Access, Answer, FULL, MAX_REQUEST, TOO_LARGE, TOO_MANY, TOO_SLOW, Task, WRONG_PASSWORD, answer,
+    body, head, replied,
+};
 use crate::snapshot::{LogLine, Snapshot};
 
 /// Largest number of open connections. Further ones get the status 503.
@@ -44,6 +48,21 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Time without a new snapshot after which a comment is sent, to detect a browser that has left.
 const SILENCE: Duration = Duration::from_secs(1);
 
+/// Number of tasks that wait for the program. Further ones get the status 503.
+const TASKS: usize = 4;
+
+/// Time in which the program has to answer a task.
+const REPLY_TIME: Duration = Duration::from_secs(5);
+
+/// Time for which a wrong password counts.
+const TRIES_TIME: Duration = Duration::from_secs(60);
+
+/// Largest number of wrong passwords in [`TRIES_TIME`] from one address.
+const MAX_TRIES: usize = 5;
+
+/// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses, for addresses of other computers.
+const MAX_ALL_TRIES: usize = 100;
+
 /// Stack size of a connection's thread, bytes.
 const STACK: usize = 256 * 1024;
 
@@ -63,6 +82,11 @@ struct Shared {
     is_new: Condvar,
     outbox: Mutex<Outbox>,
     is_written: Condvar,
+    access: Access,
+    /// Program that does tasks of the page; `None` if the page only shows.
+    tasks: Option<SyncSender<Post>>,
+    /// Addresses and times of wrong passwords in the last [`TRIES_TIME`].
+    tries: Mutex<VecDeque<(IpAddr, Instant)>>,
     /// Remote address of each open connection.
     peers: Mutex<Vec<IpAddr>>,
     has_ended: AtomicBool,
@@ -93,8 +117,30 @@ struct Outbox {
 #[derive(Serialize)]
 struct Sent<'a> {
     run: &'a str,
+    /// Token of the page's tasks; `None` if the page only shows.
+    token: Option<&'a str>,
     #[serde(flatten)]
     snapshot: &'a Snapshot,
+}
+
+/// Task of a page, which the program has to [answer](Self::reply).
+#[derive(Debug)]
+pub struct Post {
+    /// Task.
+    pub task: Task,
+    /// Body of the request, which should be JSON.
+    pub body: String,
+    /// Address of the browser.
+    pub peer: IpAddr,
+    reply: SyncSender<Result<String, String>>,
+}
+
+impl Post {
+    /// Answers the task: with JSON, or with the reason why the program does not do it. It never waits.
+    pub fn reply(self, reply: Result<String, String>) {
+        // A browser may have left.
+        _ = self.reply.try_send(reply);
+    }
 }
 
 impl Screen {
@@ -103,11 +149,40 @@ impl Screen {
     /// # Errors
     /// [`ScreenError`] if the address cannot be bound.
     pub fn start(address: SocketAddr) -> Result<Self, ScreenError> {
+        Self::serve(address, Access::default(), None)
+    }
+
+    /// Starts a screen whose page can also give [tasks](Post) to the program. With a password, every request needs it.
+    ///
+    /// # Errors
+    /// [`ScreenError`] if the address cannot be bound.
+    pub fn start_acting(
+        address: SocketAddr,
+        password: Option<String>,
+    ) -> Result<(Self, Receiver<Post>), ScreenError> {
+        // The keys of a `RandomState` come from the system's random numbers.
+        let random = RandomState::new();
+        let token = format!("{:016x}{:016x}", random.hash_one(1), random.hash_one(2));
+        let access = Access {
+            password,
+            token: Some(token),
+        };
+        let (tasks, posts) = sync_channel(TASKS);
+        Ok((Self::serve(address, access, Some(tasks))?, posts))
+    }
+
+    fn serve(
+        address: SocketAddr,
+        access: Access,
+        tasks: Option<SyncSender<Post>>,
+    ) -> Result<Self, ScreenError> {
         let failed = |error| ScreenError::Bind(address, error);
         let listener = TcpListener::bind(address).map_err(failed)?;
         let mut screen = Self {
             shared: Arc::new(Shared {
                 run: format!("{:016x}", RandomState::new().hash_one(0)),
+                access,
+                tasks,
                 ..Shared::default()
             }),
             address: listener.local_addr().map_err(failed)?,
@@ -208,6 +283,7 @@ impl Shared {
             lines.iter_mut().for_each(clean_line);
             let sent = Sent {
                 run: &self.run,
+                token: self.access.token.as_deref(),
                 snapshot: &snapshot,
             };
             let text = serde_json::to_string(&sent).unwrap_or_default();
@@ -243,6 +319,47 @@ impl Shared {
             }
             let woken = self.is_new.wait(inbox);
             inbox = woken.unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Replaces the answer to a request from `peer` by a refusal after too many wrong passwords, and counts a wrong one.
+    ///
+    /// While an address is refused, the right password is refused, too. Many addresses can make all other computers wait, but not
+    /// this one, from which a tunnel comes.
+    fn limited(&self, answer: Answer, peer: IpAddr) -> Answer {
+        if self.access.password.is_none() {
+            return answer;
+        }
+        let (peer, now) = (peer.to_canonical(), Instant::now());
+        let mut tries = lock(&self.tries);
+        tries.retain(|(_, at)| now.duration_since(*at) < TRIES_TIME);
+        let own = tries.iter().filter(|(by, _)| *by == peer).count();
+        if own >= MAX_TRIES || tries.len() >= MAX_ALL_TRIES && !peer.is_loopback() {
+            return TOO_MANY;
+        }
+        if answer == WRONG_PASSWORD {
+            tries.push_back((peer, now));
+        }
+        answer
+    }
+
+    /// Passes a task to the program, and returns the response with its answer.
+    fn perform(&self, task: Task, content: &[u8], peer: IpAddr) -> String {
+        let (reply, answer) = sync_channel(1);
+        let post = Post {
+            task,
+            body: String::from_utf8_lossy(content).into_owned(),
+            peer,
+            reply,
+        };
+        let is_sent = self
+            .tasks
+            .as_ref()
+            .is_some_and(|it| it.try_send(post).is_ok());
+        let answer = is_sent.then(|| answer.recv_timeout(REPLY_TIME).ok());
+        match answer.flatten() {
+            Some(answer) => replied(&answer),
+            None => format!("{}{}", head(FULL), body(FULL)),
         }
     }
 
@@ -342,12 +459,15 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
 
 /// Answers the request of one connection.
 fn serve(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
-    let own = stream.local_addr()?;
-    let answer = read(&mut stream, own)?;
-    write_all(
-        &mut stream,
-        format!("{}{}", head(answer), body(answer)).as_bytes(),
-    )?;
+    let (own, peer) = (stream.local_addr()?, stream.peer_addr()?.ip());
+    let mut buffer = [0; MAX_REQUEST];
+    let (answer, content) = read(&mut stream, &mut buffer, own, &shared.access)?;
+    let answer = shared.limited(answer, peer);
+    let response = match answer {
+        Answer::Post(task, _) => shared.perform(task, content, peer),
+        _ => format!("{}{}", head(answer), body(answer)),
+    };
+    write_all(&mut stream, response.as_bytes())?;
     if answer == Answer::Events {
         _ = stream.set_nodelay(true);
         return shared.stream(&mut stream);
@@ -360,26 +480,32 @@ fn serve(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
     Ok(())
 }
 
-/// Reads a request, and returns the answer to it.
-fn read(stream: &mut TcpStream, own: SocketAddr) -> io::Result<Answer> {
+/// Reads a request, and returns the answer to it, with its body.
+fn read<'a>(
+    stream: &mut TcpStream,
+    buffer: &'a mut [u8],
+    own: SocketAddr,
+    access: &Access,
+) -> io::Result<(Answer, &'a [u8])> {
     let until = Instant::now() + REQUEST_TIME;
-    let mut buffer = [0; MAX_REQUEST];
     let mut len = 0;
     loop {
         let room = buffer.get_mut(len..).unwrap_or_default();
         if room.is_empty() {
-            return Ok(TOO_LARGE);
+            return Ok((TOO_LARGE, &[]));
         }
         match read_some(stream, room, until) {
             Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(count) => len += count,
-            Err(error) if is_timeout(&error) => return Ok(TOO_SLOW),
+            Err(error) if is_timeout(&error) => return Ok((TOO_SLOW, &[])),
             Err(error) => return Err(error),
         }
-        if let Some(answer) = answer(buffer.get(..len).unwrap_or_default(), own) {
-            return Ok(answer);
+        if answer(buffer.get(..len).unwrap_or_default(), own, access).is_some() {
+            break;
         }
     }
+    let answer = answer(buffer.get(..len).unwrap_or_default(), own, access);
+    Ok(answer.unwrap_or((TOO_SLOW, &[])))
 }
 
 fn is_timeout(error: &io::Error) -> bool {

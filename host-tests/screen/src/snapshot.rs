@@ -35,6 +35,9 @@ pub struct Snapshot {
     pub no_fly: Vec<Vec<[f64; 2]>>,
     /// Alarms that last, and those that have ended, each with a number of its own.
     pub alarms: Vec<Alarm>,
+    /// State of the program's tasks, for a page that can act: `desk.js` and the program define it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub desk: Option<serde_json::Value>,
     /// Log lines that no earlier snapshot had. The server keeps the last 1000 lines.
     #[serde(skip)]
     pub log: Vec<LogLine>,

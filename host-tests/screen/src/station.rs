@@ -3,13 +3,14 @@
 //! | state | alarm |
 //! | --- | --- |
 //! | a relay has not reported yet | notice |
-//! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`] | critical, one for the relay |
+//! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`], or for one and a half times as long as it recently was, up to 10 s | critical, one for the relay |
 //! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
 //! | no quorum, no feasible positions | critical |
 //! | autopilot without a position, or its link lost after it was there | critical |
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
+//! | engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
 //! An alarm of a relay that does not report any more stays as it was.
@@ -28,6 +29,14 @@ const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 
 /// Time for which the rejection of a frame is shown.
 const REJECTED_FOR: Duration = Duration::from_millis(30_000);
+
+/// Time after which a drone that does not come nearer to its setpoint is reported.
+///
+/// Reports have the setpoint every eighth time only: a drone on its way to a new one may fly away from the one before for 10 s.
+const STUCK_AFTER: Duration = Duration::from_millis(15_000);
+
+/// Distance from a setpoint below which a drone has reached it, m.
+const NEAR_M: f32 = 5.0;
 
 /// Frame counters of a station.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -48,6 +57,10 @@ struct Known {
     is_link_lost: bool,
     /// Time of the first report of an agreed position without a lease; `None` while that is not so.
     unleased_at: Option<Instant>,
+    /// Slowly decaying maximum of the ages of its reports at the arrival of the next one.
+    longest_age: Duration,
+    /// Least distance from the setpoint, m, and its time; `None` while the drone need not fly there.
+    nearest: Option<(Instant, f32)>,
 }
 
 impl Known {
@@ -58,12 +71,16 @@ impl Known {
             is_released: false,
             is_link_lost: false,
             unleased_at: None,
+            longest_age: Duration::from_micros(0),
+            nearest: None,
         }
     }
 
     /// Replaces the report by a newer one. The first report is taken, too.
-    fn take(&mut self, report: Report) {
+    fn take(&mut self, now: Instant, report: Report) {
         let before = std::mem::replace(&mut self.report, report);
+        let decayed = Duration::from_micros(self.longest_age.as_micros() * 7 / 8);
+        self.longest_age = decayed.max(now.since(before.at));
         match report.control {
             Some(State::Engaged | State::Blind) => {
                 (self.was_engaged, self.is_released) = (true, false);
@@ -78,6 +95,31 @@ impl Known {
             report.control == Some(State::Silent) && (self.is_link_lost || was_linked);
         let is_unleased = report.agreed.is_some() && !report.holds_lease;
         self.unleased_at = is_unleased.then(|| self.unleased_at.unwrap_or(report.at));
+        let known = self.nearest.filter(|_| before.setpoint == report.setpoint);
+        let way_m = distance_to_fly_m(&report).filter(|it| *it > NEAR_M);
+        self.nearest = way_m.map(|it| match known {
+            // A drone in the wind moves, too.
+            Some((at, least_m)) if it > least_m - 1.0 => (at, least_m),
+            _ => (report.at, it),
+        });
+    }
+
+    /// Returns the age of its report from which the relay counts as silent. Where reports often take long, it is longer.
+    ///
+    /// Before a relay's first agreement its reports may wait 6 s for it.
+    fn silent_after(&self) -> Duration {
+        let Report { phase, agreed, .. } = self.report;
+        let is_idle = matches!(phase, Phase::Holding | Phase::Infeasible | Phase::NoQuorum);
+        if agreed.is_none() && !is_idle {
+            return SILENT_AFTER.times(2);
+        }
+        let usual = Duration::from_micros(self.longest_age.as_micros() * 3 / 2);
+        usual.clamp(SILENT_AFTER, SILENT_AFTER.times(2))
+    }
+
+    fn is_stuck(&self) -> bool {
+        let is_long = |(at, _)| self.report.at.since(at) >= STUCK_AFTER;
+        self.nearest.is_some_and(is_long)
     }
 
     /// Returns true if the lease has expired. A new view has no lease before its agreement.
@@ -133,7 +175,7 @@ impl StationView {
         let mut is_new = false;
         for report in reports {
             let is_listed = (1..=chain.relays).contains(&report.relay);
-            is_new |= is_listed && self.take(*report, &mut log);
+            is_new |= is_listed && self.take(now, *report, &mut log);
         }
         log.sort_by(|one: &LogLine, other| one.time_s.total_cmp(&other.time_s));
         self.count(now, frames, is_new);
@@ -150,7 +192,7 @@ impl StationView {
     }
 
     /// Takes a report and logs what has changed; returns false if it is not newer than the known one.
-    fn take(&mut self, report: Report, log: &mut Vec<LogLine>) -> bool {
+    fn take(&mut self, now: Instant, report: Report, log: &mut Vec<LogLine>) -> bool {
         let number = report.relay;
         let before = self.known.get(&number).map(|it| it.report);
         if before.is_some_and(|before| before.at >= report.at) {
@@ -162,7 +204,9 @@ impl StationView {
         };
         log.extend(changes(before.as_ref(), &report).into_iter().map(line));
         let known = self.known.entry(number);
-        known.or_insert_with(|| Known::new(report)).take(report);
+        known
+            .or_insert_with(|| Known::new(report))
+            .take(now, report);
         for lost in silent(&report) {
             // A neighbour that has never been received is not lost.
             let was_received = before.is_some_and(|before| {
@@ -257,9 +301,10 @@ impl StationView {
             let number = known.report.relay;
             let by = self.claims(number);
             let heard_at = known.report.at.max(self.resumed_at);
-            let is_late = now.since(known.report.at) >= SILENT_AFTER;
+            let after = known.silent_after();
+            let is_late = now.since(known.report.at) >= after;
             // While nothing at all is received, an alarm that has begun stays, and none begins.
-            let begins = quiet < QUIET_AFTER && now.since(heard_at) >= SILENT_AFTER;
+            let begins = quiet < QUIET_AFTER && now.since(heard_at) >= after;
             let is_silent = is_late && (begins || self.alarms.lasts(Reason::Lost, number));
             if is_silent || !by.is_empty() {
                 let note = match (is_late, by.is_empty()) {
@@ -273,6 +318,7 @@ impl StationView {
                 (Reason::Blind, known.is_blind()),
                 (Reason::LinkLost, known.is_link_lost),
                 (Reason::Released, known.is_released),
+                (Reason::Stuck, known.is_stuck()),
             ];
             for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
                 add(reason, number, vec![number], String::new());
@@ -310,6 +356,14 @@ impl StationView {
         let gaps = gaps.map(|(by, it)| format!("; relay {by} does not receive relay {it}"));
         gaps.collect::<Vec<_>>().concat()
     }
+}
+
+/// Returns the distance of a drone from the setpoint that it has to fly to, m; `None` if it is not engaged or has to wait.
+fn distance_to_fly_m(report: &Report) -> Option<f32> {
+    let flies = report.control == Some(State::Engaged) && report.hold_reasons == [None; 2];
+    let (at, to) = (report.position?, report.setpoint?);
+    let way_m = (at.x_m - to.x_m).hypot(at.y_m - to.y_m);
+    flies.then(|| way_m.hypot(at.altitude_m - to.altitude_m))
 }
 
 /// Returns true if a report has more than position and control: relays report the rest less often.

@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 
 use uav_relay_screen::{
     Hop, LogLine, MAX_CONNECTIONS, Node, Position, RelaySnapshot, Screen, ScreenError, Snapshot,
+    Task,
 };
 
 /// Time in which `Screen::show` has to return. A busy machine may take the processor away at any time, so 1 % of the calls may be late.
@@ -440,4 +441,136 @@ fn an_address_that_cannot_be_bound_is_named() {
     let address = screen.address();
     drop(screen);
     assert_eq!(Screen::start(address).unwrap().address(), address);
+}
+
+/// Returns a task as the page sends it.
+fn post(screen: &Screen, path: &str, token: &str, body: &str) -> Vec<u8> {
+    let (own, length) = (screen.address(), body.len());
+    format!("POST {path} HTTP/1.1\r\nHost: {own}\r\nOrigin: http://{own}\r\nX-Relay-Token: {token}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}").into_bytes()
+}
+
+#[test]
+fn wrong_passwords_are_limited_and_a_page_without_one_is_refused() {
+    let own = "127.0.0.1:0".parse().unwrap();
+    let (screen, posts) = Screen::start_acting(own, Some("correct horse".to_owned())).unwrap();
+    let with = |header: &str| {
+        let own = screen.address();
+        asked(
+            &screen,
+            format!("GET / HTTP/1.1\r\nHost: {own}\r\n{header}\r\n").as_bytes(),
+        )
+    };
+    // A browser asks without a password first, which is no try.
+    for _ in 0..20 {
+        let response = with("");
+        assert!(response.starts_with("HTTP/1.1 401 "), "{response}");
+        assert!(response.contains("WWW-Authenticate: Basic "), "{response}");
+    }
+    let right = "Authorization: Basic OmNvcnJlY3QgaG9yc2U=\r\n";
+    let wrong = "Authorization: Basic OmNvcnJlY3QgaG9yc2Y=\r\n";
+    assert!(with(right).starts_with("HTTP/1.1 200 "));
+    let mut statuses: Vec<String> = Vec::new();
+    thread::scope(|scope| {
+        let tries: Vec<_> = (0..30).map(|_| scope.spawn(|| with(wrong))).collect();
+        statuses.extend(
+            tries
+                .into_iter()
+                .map(|it| it.join().unwrap()[9..12].to_owned()),
+        );
+    });
+    statuses.sort();
+    assert_eq!(
+        statuses.iter().filter(|it| *it == "401").count(),
+        5,
+        "{statuses:?}"
+    );
+    assert_eq!(
+        statuses.iter().filter(|it| *it == "429").count(),
+        25,
+        "{statuses:?}"
+    );
+    assert!(
+        with(right).starts_with("HTTP/1.1 429 "),
+        "no guess can be told from others"
+    );
+    let response = asked(&screen, &post(&screen, "/upload", "", "{}"));
+    assert!(response.starts_with("HTTP/1.1 4"), "{response}");
+    assert!(posts.try_recv().is_err());
+}
+
+#[test]
+fn only_tasks_with_the_token_reach_the_program_and_nobody_waits_for_it() {
+    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None).unwrap();
+    let screen = Arc::new(screen);
+    screen.show(snapshot(1, 0.0));
+    let token = until(&mut events(&screen), 0.0)["token"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    assert_eq!(token.len(), 32);
+    let flight = Flight::begin(&screen, Duration::from_millis(2));
+    let good = post(&screen, "/upload", &token, "{\"preview\":1}");
+    let secret = good
+        .windows(32)
+        .position(|it| it == token.as_bytes())
+        .unwrap();
+    let mut seed = 7;
+    for number in 0..10_000 {
+        let mut request = good.clone();
+        if number % 2 == 0 {
+            // A token with a wrong character.
+            request[secret + random(&mut seed) % 32] = b"ghijk"[random(&mut seed) % 5];
+        } else {
+            request.truncate(random(&mut seed) % good.len());
+        }
+        let response = asked(&screen, &request);
+        assert!(
+            response.is_empty() || response.starts_with("HTTP/1.1 4"),
+            "{response}"
+        );
+    }
+    assert!(
+        posts.try_recv().is_err(),
+        "a request without the token came through"
+    );
+    // The program takes a task, and answers or refuses it.
+    for reply in [
+        Ok("{\"preview\":1}".to_owned()),
+        Err("was uploaded already".to_owned()),
+    ] {
+        let response = thread::scope(|scope| {
+            let response = scope.spawn(|| asked(&screen, &good));
+            let task = posts.recv_timeout(Duration::from_secs(20)).unwrap();
+            assert_eq!(
+                (task.task, &task.body[..]),
+                (Task::Upload, "{\"preview\":1}")
+            );
+            task.reply(reply.clone());
+            response.join().unwrap()
+        });
+        let (status, text) = match &reply {
+            Ok(text) => ("HTTP/1.1 200 ", text),
+            Err(text) => ("HTTP/1.1 409 ", text),
+        };
+        assert!(
+            response.starts_with(status) && response.ends_with(&**text),
+            "{response}"
+        );
+    }
+    // A program that does not answer: 50 browsers get a refusal in time, and at most four tasks wait.
+    let begun = Instant::now();
+    thread::scope(|scope| {
+        let all: Vec<_> = (0..50)
+            .map(|_| scope.spawn(|| asked(&screen, &good)))
+            .collect();
+        for response in all {
+            assert!(response.join().unwrap().starts_with("HTTP/1.1 503 "));
+        }
+    });
+    println!(
+        "50 unanswered tasks are refused after {:?}",
+        begun.elapsed()
+    );
+    assert!(posts.try_iter().count() <= 4);
+    flight.end("tasks");
 }

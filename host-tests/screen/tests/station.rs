@@ -121,6 +121,7 @@ impl Watched {
             "grounded" => report.control = Some(State::Grounded),
             "nolink" => report.control = Some(State::Silent),
             "bench" => (report.control, report.position) = (None, None),
+            "away" => report.setpoint = Some(Placement::on_line(20.0, 20.0)),
             "unlocated" => report.position = None,
             "expired" => report.holds_lease = false,
             "restarted" => (report.agreed, report.setpoint) = (None, None),

@@ -36,6 +36,9 @@ const CROWDED = 24;
 /** Largest number of relays whose numbers may be stacked above each other. */
 const FEW = 20;
 
+/** Distance from Rx at which it can be dragged, px. */
+const GRIP = 22;
+
 /** Age from which the map shows it beside a relay, s. */
 const SHOWN_AGE = 2;
 
@@ -64,6 +67,12 @@ class ChainMap {
     this.pending = 0;
     this.frames = 0;
     this.fingers = new Map();
+    /** Positions to which a preview would move the relays, x and y in m. */
+    this.targets = [];
+    /** Position to which Rx is being dragged; null otherwise. `canDrag` and `dragged` are those of the form. */
+    this.receiver = null;
+    this.canDrag = () => false;
+    this.dragged = () => {};
     this.colours = {};
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
     new ResizeObserver(() => this.request()).observe(canvas);
@@ -152,9 +161,21 @@ class ChainMap {
     const { canvas, fingers } = this;
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
+      const rx = this.snapshot?.rx;
+      const [x, y] = rx ? this.pixels(rx.x_m, rx.y_m) : [];
+      if (rx && this.canDrag() && Math.hypot(event.offsetX - x, event.offsetY - y) < GRIP) {
+        this.receiver = [rx.x_m, rx.y_m];
+        return;
+      }
       fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
     });
     canvas.addEventListener("pointermove", (event) => {
+      if (this.receiver) {
+        this.receiver = this.metres([event.offsetX, event.offsetY]);
+        this.dragged(this.receiver, false);
+        this.request();
+        return;
+      }
       const before = fingers.get(event.pointerId);
       if (!before) return;
       const now = [event.offsetX, event.offsetY];
@@ -167,7 +188,13 @@ class ChainMap {
         this.move((before[0] - now[0]) / this.view.scale, (before[1] - now[1]) / this.view.scale);
       }
     });
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => {
+      fingers.delete(event.pointerId);
+      const to = this.receiver;
+      this.receiver = null;
+      if (to && end === "pointerup") this.dragged(to, true);
+      this.request();
+    });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.zoom(Math.exp(-event.deltaY * 0.0015), [event.offsetX, event.offsetY]);
@@ -398,6 +425,8 @@ class ChainMap {
     }
     for (const { position, agreed } of snapshot.relays) this.planned(position, agreed);
     for (const name of ["Tx", "Rx"]) if (at.has(name)) this.site(name, at.get(name));
+    for (const [x, y] of this.targets) this.trace([[x, y - 8 / this.view.scale], [x + 7 / this.view.scale, y + 6 / this.view.scale], [x - 7 / this.view.scale, y + 6 / this.view.scale]], "fair", 2, [], true);
+    if (this.receiver) this.site("new Rx", this.pixels(...this.receiver));
     const line = [...at.values()].sort((one, other) => one[0] - other[0]);
     const gaps = line.slice(1).map(([x, y], index) => Math.hypot(x - line[index][0], y - line[index][1])).sort((one, other) => one - other);
     const crowded = gaps.length > 0 && gaps[Math.floor(gaps.length / 10)] < CROWDED;

@@ -106,6 +106,7 @@ function show(snapshot) {
   map.take(snapshot);
   table(snapshot);
   alarms.take(snapshot.alarms);
+  takeDesk(snapshot);
   received.first ||= performance.now();
   connection();
 }
@@ -133,7 +134,7 @@ function connection() {
   say("state", `${state}${closed && state.startsWith("no data") ? ", not connected to the server" : ""}`);
   say("seconds", broken ? ` for ${Math.floor(silent / 1000)} s` : "");
   byId("connection").className = broken ? "broken" : "";
-  document.body.classList.toggle("stale", broken);
+  if (document.body.classList.toggle("stale", broken)) describe();
   const silence = broken ? silent / 1000 : 0;
   if (silence !== map.silence) {
     map.silence = silence;
@@ -166,5 +167,6 @@ byId("farther").addEventListener("click", () => map.zoom(1 / 1.4));
 byId("fit").addEventListener("click", () => map.fit());
 if (!isRecorded) {
   setInterval(connection, 500);
-  connect();
+  // All scripts have run then.
+  document.addEventListener("DOMContentLoaded", connect);
 }

@@ -201,3 +201,31 @@ fn a_relay_that_stays_short_of_the_previous_ones_reach() {
     tally.report("a relay that stays short");
     assert_eq!(tally.tight, 1);
 }
+
+/// Checks four relays, of which three stay next to Tx and the fourth is beyond the interferer.
+///
+/// The fourth goes farthest if the third is at x = 0, where the first two have no x of their own.
+#[test]
+fn three_relays_next_to_tx_before_an_interferer() {
+    let chain = Chain {
+        distance_m: 1000.0,
+        powers_w: [1.0, 1.073_886_6, 0.367_677, 2.652_034_3, 1.974_601, 1.0]
+            .map(narrow)
+            .to_vec(),
+        altitude_m: 20.0,
+        altitudes_m: [28.249_823, 49.061_985, 67.370_1, 61.530_51]
+            .map(narrow)
+            .to_vec(),
+        apart_m: 0.0,
+        interferer: [76.852_56, 201.278_84, 6.260_536].map(narrow),
+        others: Vec::new(),
+        field: Vec::new(),
+        loss: [7020.0, 863_460.0],
+        noise_w: 0.0,
+        reverse: narrow(0.381_476_58),
+    };
+    let mut tally = Tally::default();
+    tally.add(&chain, false);
+    tally.report("three relays next to Tx");
+    assert_eq!(tally.tight, 1);
+}

@@ -13,6 +13,7 @@ use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 use uav_relay_tools::plan::solved;
 
+use super::judge::Chain;
 use super::scenes::{ENDS, in_noise, log_uniform, mission, narrow, usual};
 use super::space_judge::{Place, Space};
 
@@ -136,9 +137,12 @@ fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
         let ours = wide(&joint(&mission_of(&space, 0.0)));
         let value = space.value(&ours);
         let (refined, _) = space.refined(&ours, 3.0, &mut rng);
-        let share = value / space.best(&mut rng).max(refined);
+        let (best, found) = space.best(&mut rng);
+        let share = value / best.max(refined);
         if share < 0.999 {
-            println!("{number} ({kind}): {share:.5} at {ours:.1?} in {space:?}");
+            println!(
+                "{number} ({kind}): {share:.5} at {ours:.1?}, {best:.5} at {found:.1?} in {space:?}"
+            );
         }
         shares.entry(kind).or_default().push(share);
     }
@@ -146,23 +150,98 @@ fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     shares.remove("all").unwrap()
 }
 
-/// Checks that the joint method reaches 0.999 of the judge's SIR in 99.5 % of scenes, and 0.98 in all. The judge is
-/// an independent search.
-#[test]
-fn the_joint_method_is_near_the_best_places() {
-    let shares = compared(3310, 24, false);
+/// Checks that the joint method reaches 0.999 of the judge's SIR in 99.5 % of scenes, and 0.98 in all. The judge is an
+/// independent search. The interferer is near the line Tx-Rx if `wild`.
+fn near_the_best_places(seed: u64, scenes: usize, wild: bool) {
+    let shares = compared(seed, scenes, wild);
     let short = shares.iter().filter(|share| **share < 0.999).count();
     assert!(short * 200 <= shares.len(), "{short}");
     assert!(shares[0] >= 0.98, "{}", shares[0]);
 }
 
-/// Checks that with an interferer near the line 98 % of the scenes reach 0.999 of the judge's SIR. The judge is an
-/// independent search.
+#[test]
+fn the_joint_method_is_near_the_best_places() {
+    near_the_best_places(3310, 24, false);
+}
+
 #[test]
 fn the_joint_method_is_near_the_best_places_next_to_an_interferer() {
-    let shares = compared(3311, 12, true);
-    let short = shares.iter().filter(|share| **share < 0.999).count();
-    assert!(short * 50 <= shares.len(), "{short}");
+    near_the_best_places(3311, 12, true);
+}
+
+/// Checks scenes in which relay 1 has one local optimum above the interferer, and one beyond it. The judge found the
+/// SIR of each; without an initial chain that keeps relay 1 above the interferer the method misses it by up to 10 %.
+#[test]
+fn the_joint_method_finds_the_chain_above_the_interferer() {
+    type Scene = (u16, f64, f64, f64, [f64; 3], f64);
+    // Number of relays, power of Tx, r, lateral room, interferer, SIR of the judge.
+    let scenes: [Scene; 5] = [
+        (
+            6,
+            80.0,
+            1.0,
+            0.0,
+            [6.792_522, 758.374_4, 7.948_764],
+            1.775_10,
+        ),
+        (
+            6,
+            80.0,
+            0.246_672_56,
+            300.0,
+            [1.592_902, 513.478_7, 29.489_616],
+            18.726_21,
+        ),
+        (
+            7,
+            80.0,
+            1.0,
+            300.0,
+            [0.590_401_2, 604.084_8, 3.732_484_3],
+            40.577_40,
+        ),
+        (
+            3,
+            80.0,
+            0.013_324_144,
+            0.0,
+            [28.148_897, 590.573_8, -1.495_858_4],
+            0.935_598,
+        ),
+        (
+            6,
+            1.0,
+            0.020_835_789,
+            300.0,
+            [82.333_46, 469.309_33, -31.460_947],
+            0.224_89,
+        ),
+    ];
+    for (relays, tx_w, reverse, side_m, interferer, best) in scenes {
+        let mut powers_w = vec![1.0; usize::from(relays) + 2];
+        powers_w[0] = tx_w;
+        let chain = Chain {
+            distance_m: 1000.0,
+            powers_w,
+            altitude_m: 20.0,
+            altitudes_m: Vec::new(),
+            apart_m: 0.0,
+            interferer: interferer.map(narrow),
+            others: Vec::new(),
+            field: Vec::new(),
+            loss: [7020.0, 863_460.0],
+            noise_w: 0.0,
+            reverse: narrow(reverse),
+        };
+        let space = Space {
+            chain,
+            lateral_m: [-side_m, side_m],
+            band_m: BAND_M,
+        };
+        let value = space.value(&wide(&joint(&mission_of(&space, 0.0))));
+        println!("{value} of {best}");
+        assert!(value >= 0.999 * best, "{value} of {best} in {space:?}");
+    }
 }
 
 /// Checks that the joint method's SIR is at least that of Algorithm 1 at the common altitude. In a tenth of the

@@ -177,12 +177,12 @@ impl Space {
         (value, places)
     }
 
-    /// Returns the best two-way SIR of the worst hop that the whole search finds. The two-way SIR of a hop is the
-    /// smaller of its forward SIR and its backward SIR / r.
-    pub(crate) fn best(&self, rng: &mut impl Rng) -> f64 {
+    /// Returns the best two-way SIR of the worst hop that the whole search finds, and its positions. The two-way SIR
+    /// of a hop is the smaller of its forward SIR and its backward SIR / r.
+    pub(crate) fn best(&self, rng: &mut impl Rng) -> (f64, Vec<Place>) {
         let (relays, d) = (self.relays(), self.chain.distance_m);
         let start = self.best_on(&vec![self.grid(); relays]);
-        let mut best = self.refined(&start, 0.03 * d, rng).0;
+        let mut best = self.refined(&start, 0.03 * d, rng);
         let middle = 0.5 * (self.band_m[0] + self.band_m[1]);
         let away = if self.chain.interferer[2] > 0.0 {
             0.6 * self.lateral_m[0]
@@ -192,7 +192,10 @@ impl Space {
         for (y, h) in [(0.0, middle), (away, middle), (0.0, self.band_m[0])] {
             let even = |k: usize| [d * k as f64 / (relays + 1) as f64, y, h];
             let start: Vec<Place> = (1..=relays).map(even).collect();
-            best = best.max(self.refined(&start, 0.06 * d, rng).0);
+            let other = self.refined(&start, 0.06 * d, rng);
+            if other.0 > best.0 {
+                best = other;
+            }
         }
         best
     }
@@ -223,7 +226,7 @@ mod tests {
             lateral_m: [-100.0, 100.0],
             band_m: [1e-3, 100.0],
         };
-        let best = space.best(&mut generator(1));
+        let (best, _) = space.best(&mut generator(1));
         assert!((best * 62.5 - 1.0).abs() < 1e-4, "{best}");
     }
 }

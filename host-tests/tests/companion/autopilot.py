@@ -11,6 +11,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     mode pilot|hold|rtl|companion
     sticks NORTH EAST            m/s, in the mode `pilot`
     refuse, accept               targets, as outside a fence: in silence
+    lose, find                   its position, as without satellites
     reboot, mute, speak          begins anew on the ground; says nothing; says something
     stranger, vehicle            heartbeats of no known autopilot; of its own kind again
     noise 150                    a SiK radio hears so much between frames
@@ -130,7 +131,7 @@ class Drone:
     def __init__(self, kind, link, at, key):
         self.kind, self.home, self.key = kind, at, key
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
-        self.is_stranger = self.is_tracked = False
+        self.is_stranger = self.is_tracked = self.is_lost = False
         self.port = port_of(link)
         self.start()
         self.plug()
@@ -175,6 +176,8 @@ class Drone:
                 self.sticks = float(north), float(east)
             case ["refuse" | "accept" as word]:
                 self.refuses = word == "refuse"
+            case ["lose" | "find" as word]:
+                self.is_lost = word == "lose"
             case ["reboot"]:
                 self.start()
             case ["mute" | "speak" as word]:
@@ -303,7 +306,7 @@ class Drone:
             base = 1 | (128 if self.armed else 0)
             autopilot = 0 if self.is_stranger else 12 if self.kind == "px4" else 3
             return common.MAVLink_heartbeat_message(2, autopilot, base, MODES[self.kind][self.mode], 5 if self.by_itself else 4, 3)
-        if number == 33:
+        if number == 33 and not self.is_lost:
             self.said.append(list(self.at))
             above = self.at[2] - self.home[2]
             return common.MAVLink_global_position_int_message(

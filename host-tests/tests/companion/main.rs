@@ -1,6 +1,7 @@
 //! Linux companion and ground station as processes on pseudo-terminals. Their chain is compared with the simulated one.
 #![cfg(target_os = "linux")]
 
+mod acting;
 mod astray;
 mod bench;
 mod binary;
@@ -9,6 +10,7 @@ mod chain;
 mod change;
 mod cleared;
 mod datagrams;
+mod faults;
 mod file;
 mod files;
 mod flying;

@@ -4,7 +4,7 @@
 
 use std::os::unix::fs::symlink;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -60,6 +60,8 @@ pub(crate) struct Medium {
     paths: Vec<PathBuf>,
     ptys: Arc<Ttys>,
     counts: Arc<Counts>,
+    /// Bit mask of the ttys whose bytes are lost.
+    cut: Arc<AtomicU16>,
     stop: Arc<AtomicBool>,
     pump: Option<JoinHandle<()>>,
     /// Folder with the names of the ttys; `None` unless the ttys of this medium can be unplugged.
@@ -118,12 +120,18 @@ impl Medium {
     ) -> Self {
         let (ptys, counts) = (Arc::new(Mutex::new(ptys)), Arc::new(Counts::default()));
         let stop = Arc::new(AtomicBool::new(false));
+        let cut = Arc::new(AtomicU16::new(0));
+        let (lost, mut passes) = (Arc::clone(&cut), gate);
+        let gate: Gate = Box::new(move |from, sent| {
+            passes(from, sent) && lost.load(Ordering::Relaxed) >> from & 1 == 0
+        });
         let shared = (Arc::clone(&ptys), Arc::clone(&counts), Arc::clone(&stop));
         let pump = std::thread::spawn(move || carry(&shared.0, noise, gate, &shared.1, &shared.2));
         Self {
             paths,
             ptys,
             counts,
+            cut,
             stop,
             pump: Some(pump),
             _folder: folder,
@@ -146,6 +154,11 @@ impl Medium {
         make_raw(pty.path().to_str().unwrap());
         symlink(pty.path(), &self.paths[index]).unwrap();
         self.ptys.lock().unwrap()[index] = Some(Arc::new(pty));
+    }
+
+    /// Loses all bytes that the ttys of the bit mask `ttys` send from now on; 0 ends it.
+    pub(crate) fn cut(&self, ttys: u16) {
+        self.cut.store(ttys, Ordering::Relaxed);
     }
 
     /// Adds the numbers of lost and corrupted bytes to `sums`.

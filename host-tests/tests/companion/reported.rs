@@ -4,8 +4,10 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde_json::Value;
+use uav_relay_scenario::Scenario;
 
-use crate::chain::Chain;
+use crate::chain::{Chain, simulated};
+use crate::faults::{SECOND, Stage};
 use crate::files::write;
 use crate::medium::{Medium, QUIET};
 use crate::peer::{Peer, ReceivedMessage, Site, TX, apart_m, distance_to_m, on_earth, options};
@@ -20,18 +22,15 @@ const LOST: Duration = Duration::from_secs(17);
 /// state states if the relay or the pilot controls the drone.
 const SOON: Duration = Duration::from_secs(2);
 
-/// Time after which a companion counts its autopilot as silent.
-const MUTE: Duration = Duration::from_secs(3);
-
 /// Maximum distance of a drone on the page from its place at the time of the report, m.
 ///
 /// A drone flies up to 8 m/s, an age is rounded to 0.1 s by each of up to two relays, and a position to 0.25 m.
 const MOST_ERROR_M: f64 = 2.0 * 0.1 * 8.0 + 0.25;
 
 /// Page of a station, as a browser keeps it open.
-struct Page {
+pub(crate) struct Page {
     arriving: Receiver<(f64, Value)>,
-    last: Value,
+    pub(crate) last: Value,
 }
 
 fn now_s() -> f64 {
@@ -41,16 +40,16 @@ fn now_s() -> f64 {
         .as_secs_f64()
 }
 
-fn relays(snapshot: &Value) -> &[Value] {
+pub(crate) fn relays(snapshot: &Value) -> &[Value] {
     snapshot["relays"].as_array().unwrap()
 }
 
-fn has_all(snapshot: &Value) -> bool {
+pub(crate) fn has_all(snapshot: &Value) -> bool {
     relays(snapshot).iter().all(|it| it["age_s"].is_number())
 }
 
 /// Returns the texts of the alarms that last, with their urgency.
-fn alarms(snapshot: &Value) -> Vec<String> {
+pub(crate) fn alarms(snapshot: &Value) -> Vec<String> {
     let all = snapshot["alarms"].as_array().unwrap().iter();
     let lasting = all.filter(|it| it["cleared_s"].is_null());
     lasting
@@ -81,14 +80,19 @@ impl Page {
     }
 
     /// Returns the next snapshot and the time of its arrival, s.
-    fn next(&mut self) -> (f64, Value) {
+    pub(crate) fn next(&mut self) -> (f64, Value) {
         let next = self.arriving.recv_timeout(LIMIT).unwrap();
         self.last = next.1.clone();
         next
     }
 
     /// Waits for a snapshot for which `is_so` is true. Returns the time until then.
-    fn until(&mut self, limit: Duration, what: &str, is_so: impl Fn(&Value) -> bool) -> Duration {
+    pub(crate) fn until(
+        &mut self,
+        limit: Duration,
+        what: &str,
+        is_so: impl Fn(&Value) -> bool,
+    ) -> Duration {
         // Snapshots from before the call are not counted.
         self.arriving.try_iter().for_each(drop);
         let begun = Instant::now();
@@ -114,20 +118,12 @@ impl Page {
             alarms(it).iter().any(|alarm| alarm.contains(part))
         });
     }
-
-    /// Waits until no alarm that contains `part` lasts.
-    fn is_clear(&mut self, part: &str) {
-        let what = format!("no `{part}`");
-        self.until(LIMIT, &what, |it| {
-            !alarms(it).iter().any(|alarm| alarm.contains(part))
-        });
-    }
 }
 
 /// Drone with its relay, and the places where it has been.
-struct Flown {
-    drone: Peer,
-    relay: Relay,
+pub(crate) struct Flown {
+    pub(crate) drone: Peer,
+    pub(crate) relay: Relay,
     places: Vec<(f64, Site)>,
 }
 
@@ -162,25 +158,24 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
     values[((values.len() - 1) as f64 * share) as usize]
 }
 
-/// Starts relay `index` of `chain`, with a drone on the ground.
-fn fly(chain: &Chain, index: usize) -> Flown {
+/// Starts relay `index` of `chain`, with a drone on the ground at `x_m`.
+pub(crate) fn fly(chain: &Chain, index: usize, x_m: f64) -> Flown {
     let link = chain.files.text(&format!("autopilot{index}"));
-    let x_m = 250.0 * index as f64;
     let drone = Peer::autopilot(["px4", "arducopter"][index % 2], &link, x_m, None);
     Flown {
         drone,
-        relay: restart(chain, index),
+        relay: restart(chain, index, ""),
         places: Vec::new(),
     }
 }
 
-fn restart(chain: &Chain, index: usize) -> Relay {
+pub(crate) fn restart(chain: &Chain, index: usize, more: &str) -> Relay {
     let options = options(&chain.files.text(&format!("autopilot{index}")));
     let signed = chain.files.signed("key", &format!("epoch{index}"));
-    chain.relay(index, &format!("{options} {signed}"))
+    chain.relay(index, &format!("{options} {signed} {more}"))
 }
 
-fn station(chain: &Chain, tty: &str) -> Relay {
+pub(crate) fn station(chain: &Chain, tty: &str) -> Relay {
     let (of, distance, signed) = (
         chain.of,
         distance_to_m(RX),
@@ -193,24 +188,39 @@ fn station(chain: &Chain, tty: &str) -> Relay {
 }
 
 #[test]
-fn the_page_shows_four_flying_relays_and_their_faults() {
-    let chain = Chain::on_channel(4, Medium::paced(5, 57_600));
-    let mut station = station(&chain, &format!("{} --shared", chain.media[0].tty(4)));
+fn the_page_shows_eight_flying_relays_and_their_faults() {
+    let chain = Chain::on_channel(8, Medium::paced(SECOND + 1, 57_600));
+    let mut station = station(&chain, &format!("{} --shared", chain.media[0].tty(8)));
     let mut page = Page::open(&mut station);
-    let mut flown: Vec<Flown> = (1..=4).map(|index| fly(&chain, index)).collect();
+    let distance_m = distance_to_m(RX);
+    let scenario = Scenario {
+        distance_m,
+        ..Scenario::default()
+    };
+    let agreed = simulated(&scenario, 8).into_iter().zip(1..);
+    let agreed = agreed.map(|(at, index)| (index, f64::from(f32::from_bits(at[0]))));
+    println!(
+        "agreed: {:.0?}",
+        agreed.clone().map(|it| it.1).collect::<Vec<_>>()
+    );
+    // Each drone flies 20 m to its position, and its home keeps the order of the chain.
+    let mut flown: Vec<Flown> = agreed
+        .map(|(index, x_m)| fly(&chain, index, x_m - 20.0))
+        .collect();
     page.until(LIMIT, "all relays", has_all);
     for it in &mut flown {
         it.drone.takes_off();
         it.drone.order("track");
     }
     flown.iter_mut().for_each(Flown::is_engaged);
-    page.until(SOON, "all engaged", |it| {
-        relays(it).iter().all(|it| it["control"] == "engaged")
+    page.until(LIMIT, "all engaged", |it| {
+        relays(it).iter().all(|it| it["control"] == "engaged") && alarms(it).is_empty()
     });
 
     // A flight without faults.
+    let flight_s = 20.0;
     let (begun, mut shown) = (now_s(), Vec::new());
-    while now_s() < begun + 60.0 {
+    while now_s() < begun + flight_s {
         let (at, snapshot) = page.next();
         flown.iter_mut().for_each(Flown::follow);
         if at > begun {
@@ -242,37 +252,17 @@ fn the_page_shows_four_flying_relays_and_their_faults() {
     let age_s = [0.5, 0.95, 1.0].map(|share| quantile(&mut ages, share));
     let error_m = [0.5, 0.95, 1.0].map(|share| quantile(&mut errors, share));
     println!("median, 95 % and maximum: ages {age_s:.2?} s, errors {error_m:.2?} m");
-    assert!(shown.len() > 250 && age_s[1] <= 2.0, "{age_s:?}");
+    assert!(
+        shown.len() as f64 > 4.0 * flight_s && age_s[1] <= 2.0,
+        "{age_s:?}"
+    );
     assert!(
         error_m[1] <= 1.0 && error_m[2] <= MOST_ERROR_M,
         "{error_m:?}"
     );
 
-    // The pilot takes over drone 3, and gives it back.
-    flown[2].drone.order("mode pilot");
-    page.alarms(
-        SOON,
-        "relay 3 released: under the pilot's or the autopilot's control",
-    );
-    flown[2].is_engaged();
-    page.is_clear("released");
-
-    // The autopilot of drone 4 falls silent.
-    flown[3].drone.order("mute");
-    page.alarms(MUTE + SOON, "relay 4: the link to the autopilot is lost");
-    flown[3].drone.order("speak");
-    page.is_clear("the link to the autopilot is lost");
-
-    // The companion of drone 2 ends, and starts again.
-    flown[1].relay.signal(rustix::process::Signal::KILL);
-    let killed = Instant::now();
-    page.alarms(LOST, "critical relay 2");
-    page.alarms(
-        LOST.saturating_sub(killed.elapsed()),
-        "relay 2 lost: reported by relay",
-    );
-    flown[1].relay = restart(&chain, 2);
-    page.is_clear("critical relay 2");
+    let mut stage = Stage::new(chain, flown, page);
+    stage.run();
     station.stopped();
 }
 
@@ -281,7 +271,7 @@ fn the_page_shows_two_relays_on_wires() {
     let chain = Chain::with_ground(2, QUIET);
     let mut station = station(&chain, chain.tx.as_ref().unwrap().tty(0));
     let mut page = Page::open(&mut station);
-    let mut flown = fly(&chain, 1);
+    let mut flown = fly(&chain, 1, 250.0);
     let fifo = chain.files.fifo("positions");
     let signed = chain.files.signed("key", "epoch2");
     let distance = distance_to_m(RX);

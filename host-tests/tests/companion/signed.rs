@@ -160,7 +160,7 @@ fn a_key_file_readable_by_others_is_refused() {
     let signed = format!("--key-file {key} --epoch-file {epoch}");
     let station = "--of 1 --end tx --tty /nowhere/tty --version 1 --new-altitude 30 --yes";
     let line = format!(
-        "--key-file {key}: has the mode 0644, so other users of this computer can read or write the key; type: chmod 600 {key}"
+        "--key-file {key}: has the mode 0644, so other users of this computer can read or write it; type: chmod 600 {key}"
     );
     for program in [
         Relay::start(&format!("--index 1 --of 1 {signed}")),

@@ -182,7 +182,28 @@ fn wrong_options_of_a_station_are_named() {
         ),
     ] {
         let option = format!("--web {address}");
-        cases.push((format!("--stand {option}"), 1, format!("{option}: {why}")));
+        let secret = format!("--web-password {}", files.text("key"));
+        cases.push((
+            format!("--stand {option} {secret}"),
+            1,
+            format!("{option}: {why}"),
+        ));
+    }
+    let short = files.write_key("short", "1234567\n");
+    for (option, status, why) in [
+        (
+            "--web 0.0.0.0:80".to_owned(),
+            2,
+            "other computers can reach this address, so it needs --web-password FILE",
+        ),
+        (format!("--web-password {short}"), 2, "--web <ADDRESS:PORT>"),
+        (
+            format!("--web 127.0.0.1:0 --web-password {short}"),
+            2,
+            "must have 8 to 200 characters in its first line",
+        ),
+    ] {
+        cases.push((format!("--stand {option}"), status, why.to_owned()));
     }
     let from = ["udp:", "udp:0", "udp:65536", "udp::9000", "udp:localhost:x"];
     let from = from.map(|from| (from, udp));
@@ -198,7 +219,8 @@ fn wrong_options_of_a_station_are_named() {
         let good = format!("--end rx --of 3 {signed} --tty {}", tty.path().display());
         let line = Relay::ground(&format!("{good} {more}")).refused(status);
         assert!(line.contains(&part), "{part} not in {line}");
-        assert_eq!(line.contains("not provided"), status == 2, "{line}");
+        let is_missing = status == 2 && part.starts_with("--");
+        assert_eq!(line.contains("not provided"), is_missing, "{line}");
     }
     for version in ["--version", "-V"] {
         let expected = format!("linux_ground {}", env!("CARGO_PKG_VERSION"));

@@ -23,7 +23,7 @@ pub(crate) fn address(station: &mut Relay) -> String {
     url.split('/').next().unwrap().to_owned()
 }
 
-fn connect(address: &str, request: &[u8]) -> TcpStream {
+pub(crate) fn connect(address: &str, request: &[u8]) -> TcpStream {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(LIMIT)).unwrap();
     let _ = stream.write_all(request);

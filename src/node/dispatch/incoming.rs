@@ -226,9 +226,12 @@ impl Node {
 impl Node {
     /// Handles a valid signed frame of node `from` at `side`. If it is the `first` one of a session, messages that
     /// the node could not verify before are sent again.
-    pub(crate) fn on_authentic(&mut self, side: Side, from: u16, first: bool) {
+    pub(crate) fn on_authentic(&mut self, now: Instant, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
+        }
+        if first {
+            self.reporting.handle_session(now, &self.member, side, from);
         }
         if self.layers.neighbours.at(side).node() != from {
             if first {

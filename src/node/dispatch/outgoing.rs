@@ -42,15 +42,8 @@ impl Node {
         let Some((side, to, fence)) = self.steering.poll_transmit() else {
             return self.next_telemetry(now);
         };
-        let mission = self.layers.update.line_digest(&self.member);
-        Some((
-            side,
-            to,
-            Message::Fence {
-                line_digest: mission,
-                fence,
-            },
-        ))
+        let line_digest = self.layers.update.line_digest(&self.member);
+        Some((side, to, Message::Fence { line_digest, fence }))
     }
 
     /// Returns the next message of a view change, a lease renewal or an agreement on positions. It comes with its

@@ -21,6 +21,11 @@ impl Node {
         }
     }
 
+    /// Records a frame of node `from` on the shared channel, to whichever node.
+    pub(crate) fn on_channel(&mut self, now: Instant, from: u16) {
+        self.reporting.handle_frame(now, from);
+    }
+
     /// Returns the next node to which a handshake is due because it has not reported.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         self.reporting.poll_greeting()

@@ -10,6 +10,10 @@
 //! | silence of `Settings::dead_after`, or of the lease's span if that is longer | - |
 //! | sixteen unanswered questions, and three times as many as before a recent answer | a run of lost frames is not a lost neighbour |
 //!
+//! The longest run before a recent answer counts as sixteen at first, and each answer lowers it by an eighth. So a neighbour that is
+//! silent after its first frames is lost after 48 questions, one that has answered some ten times after sixteen, and one that was
+//! never received after sixteen.
+//!
 //! It is also lost after eight times `dead_after`. From then on, a question is sent every `probe_after`. Relays of one view that
 //! choose their positions jointly compute at the same time and send nothing meanwhile. The silence of a neighbour in the same
 //! view therefore counts from the end of this relay's own computation.
@@ -92,8 +96,8 @@ pub(crate) struct Liveness {
     /// Number of heartbeat requests since the neighbour's last sign of life.
     unanswered: u16,
     /// Longest recent run of unanswered heartbeat requests that ended with an answer. It shows how many frames the
-    /// channel loses. It starts at [`MIN_REQUESTS`], so that an unknown channel counts as a bad one, and decays with
-    /// each answer.
+    /// channel loses. It starts at [`MIN_REQUESTS`], the most with which the channel counts as a good one, and decays
+    /// with each answer.
     longest: u16,
 }
 

@@ -12,10 +12,11 @@
 //! then it is `Linked`. A hello of the linked node that names this relay but does not report hearing it changes nothing, because
 //! a run of lost frames is measured by silence. A node that has selected another one is not selected.
 //!
-//! *Better* is a nearer node that is heard by the node beyond it. A farther node is better if it leads to more relays than the
-//! neighbour, or to all relays that the last view had beyond the neighbour: then the link on the neighbour's other side is
-//! missing, and the neighbour is left out. A neighbour that is ordered to leave is replaced at once by the node beyond it. One that the neighbour has replaced is selected again at once: it needs no further
-//! proof. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
+//! *Better* is a nearer node that is heard by the node beyond it. A farther node is better in two cases: more relays follow it than
+//! follow the neighbour; or as many follow it as followed the neighbour in the last view. In the second case the neighbour has no
+//! link on its other side, and the chain goes on without it. A neighbour that is ordered to leave is replaced at once by the node
+//! beyond it. A node that was the neighbour before the present one is selected again without a waiting time. If two links cross, as
+//! 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
 //! neither part of the chain could go on. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
 //!
 //! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, the selected one among

@@ -242,12 +242,12 @@ impl Computation {
         if self.state.phase() != Phase::Waiting {
             return None;
         }
-        let (number, mission) = (self.state.number(), context.digest());
+        let (number, view_digest) = (self.state.number(), context.digest());
         match &self.pass {
             PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => None,
             PassKind::Sweep(sweep_pass) => Some(Message::Sweep(Sweep {
                 number,
-                view_digest: mission,
+                view_digest,
                 ladder: sweep_pass.ladder,
                 relay: self.station_for(sweep_pass.chosen),
                 chosen: sweep_pass.chosen,
@@ -260,7 +260,7 @@ impl Computation {
             PassKind::Turn(turn_pass) if ADJUST => self.agreed_place.map(|place| {
                 Message::Token(Token {
                     number,
-                    view_digest: mission,
+                    view_digest,
                     place,
                     power_w: self.profile.power_w,
                     turn: turn_pass.turn,
@@ -285,11 +285,11 @@ impl Computation {
         if !self.state.is_answered() {
             return None;
         }
-        let (number, mission) = (self.state.number(), context.digest());
+        let (number, view_digest) = (self.state.number(), context.digest());
         match &self.pass {
             PassKind::Sweep(sweep_pass) => Some(Message::Verdict(SweepVerdict {
                 number,
-                view_digest: mission,
+                view_digest,
                 verdict: sweep_pass.verdict.clone(),
                 required_x_m: sweep_pass.required_x_m(),
                 own: sweep_pass.own || self.has_own_profile(context),
@@ -299,7 +299,7 @@ impl Computation {
             PassKind::Turn(turn_pass) if ADJUST => self.agreed_place.map(|place| {
                 Message::Moved(Moved {
                     number,
-                    view_digest: mission,
+                    view_digest,
                     place,
                     position_changed: turn_pass.any,
                     worst_sir: turn_pass.worst,

@@ -11,8 +11,8 @@
 //!
 //! A reply proves that the neighbour was alive after this relay sent the message that it answers. The result of a pass proves it
 //! for the next relay, from the time at which the pass was first forwarded. The next pass proves it for the previous relay, from
-//! the time at which the last result was first sent. A leader that is restarted by its firmware does not wait for that result;
-//! the time is then too late by at most one pass.
+//! the time at which the last result was first sent. If the leader's firmware calls
+//! `Relay::restart`, the next pass begins before that result, and the previous relay takes a time that is up to one pass too late.
 
 mod computation;
 mod gathering;

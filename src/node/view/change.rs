@@ -530,6 +530,16 @@ pub(super) struct ViewVerdict {
 }
 
 /// Request of this relay for a new view, and the timer that repeats the request.
+///
+/// | situation | wait before the request | set by |
+/// | --- | --- | --- |
+/// | reason for a view | 250 us | `request_now` |
+/// | repetition without a result | 8 hop times at first, each time doubled, at most `probe_after` | `poll_due` |
+/// | refused view | about `probe_after`, doubled with each refusal in a row, at most three times | `request_after_refusal` |
+/// | new reason after a refusal | the rest of the first `probe_after` | `start` |
+/// | no pass along the chain since the start | `probe_after` and a round trip, or the time of a first pass if longer | `Node::await_first` |
+///
+/// A relay that has just selected a neighbour does not request a view before the end of `Neighbour::grace`.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
     pending: bool,

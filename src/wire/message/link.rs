@@ -65,16 +65,10 @@ impl Hello {
     /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The eight flags share one
     /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
-        let Self {
-            requests_reply: ask,
-            requests_view: form,
-            fresh,
-            ..
-        } = *self;
         let flags = [
-            ask,
-            form,
-            fresh,
+            self.requests_reply,
+            self.requests_view,
+            self.fresh,
             self.ready,
             self.active,
             self.active_in_view,
@@ -175,9 +169,9 @@ impl Claim {
 }
 
 /// Encodes a fence message into `buffer`; returns its length, or `None` if it does not fit. A fence is the limit
-/// along x that keeps two neighbours apart; `mission` is the digest in the message.
-pub(super) fn encode_fence(mission: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
-    let pass = PassId::new(fence.association, mission);
+/// along x that keeps two neighbours apart; `line_digest` is the digest in the message.
+pub(super) fn encode_fence(line_digest: u16, fence: &Fence, buffer: &mut [u8]) -> Option<usize> {
+    let pass = PassId::new(fence.association, line_digest);
     let numbers = [fence.echo, fence.number].map(Word::new);
     let CrossSection { y_m, altitude_m } = fence.across;
     let places = [fence.x_m, fence.target_m, y_m, altitude_m, fence.apart_m];

@@ -96,14 +96,14 @@ pub(super) const FARTHEST_M: f32 = 2e9;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(super) struct PassId {
     number: Word,
-    mission: Word,
+    digest: Word,
 }
 
 impl PassId {
-    pub(super) const fn new(number: u16, mission: u16) -> Self {
+    pub(super) const fn new(number: u16, digest: u16) -> Self {
         Self {
             number: Word::new(number),
-            mission: Word::new(mission),
+            digest: Word::new(digest),
         }
     }
 
@@ -112,7 +112,7 @@ impl PassId {
     }
 
     pub(super) const fn digest(self) -> u16 {
-        self.mission.number()
+        self.digest.number()
     }
 }
 

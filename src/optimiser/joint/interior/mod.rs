@@ -185,6 +185,9 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: Gains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
+    /// Parts of the line Tx-Rx that are closed to two relays: next to Rx to relay 1, next to Tx to relay N. In units
+    /// of the distance from Tx to Rx.
+    pub(super) closed: [f32; 2],
     nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
@@ -217,6 +220,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     pub(super) const NEW: Self = Self {
         gains: Gains::NONE,
         cells: Cells::NEW,
+        closed: [0.0; 2],
         nodes: [Node {
             x: 0.0,
             hop: Hop::NONE,
@@ -320,10 +324,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         let room = (chain.seat_of)(index).room;
         let at = self.cells.get(index).place(room);
         let (lateral, band) = (room.lateral, room.band);
+        let [far, near] = self.closed;
+        let most = if index == 1 { 1.0 - far } else { 1.0 };
+        let least = if index == chain.mission.relays() {
+            near
+        } else {
+            0.0
+        };
         Spot {
             at: [node.x, at.y_m * unit, at.altitude_m * unit],
-            low: [0.0, lateral.least_m * unit, band.least_m * unit],
-            high: [1.0, lateral.most_m * unit, band.most_m * unit],
+            low: [least, lateral.least_m * unit, band.least_m * unit],
+            high: [most, lateral.most_m * unit, band.most_m * unit],
         }
     }
 

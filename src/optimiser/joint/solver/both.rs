@@ -5,14 +5,15 @@
 //! nearest local optimum, and Algorithm 1 at the new cross-sections gives the target that the relays will agree on, with their
 //! separation. The best chain is kept.
 //!
-//! The first chain is that of the common altitude, which is compared only: the result is not below that of Algorithm 1. The other
+//! The first chain is that of the common altitude, which is compared only: the result is not below that of Algorithm 1. The next
 //! five were chosen from 216 one after another, by the number of 3 840 random scenes in which the best result so far misses the
 //! optimum. They are given from the end with more power on, whose signal may pass the interferer in one hop; relays away from the
-//! interferer or high are mostly better than relays close to it, since the method finds its way down but not around.
+//! interferer or high are mostly better than relays close to it, since the method finds its way down but not around. The
+//! last one keeps relay 1 from the x beyond the interferer, which are another local optimum for it. From the other chains the method
+//! mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
 use super::passes::end_after;
-use crate::mission::Interferer;
 use crate::optimiser::joint::chain::{Seat, SolverContext};
 use crate::optimiser::joint::interior::Interior;
 use crate::optimiser::joint::site::{Cell, Cells, Room};
@@ -21,6 +22,8 @@ use crate::optimiser::pass::{Behind, Link};
 use crate::optimiser::search::Infeasible;
 use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
+use crate::root::sqrt;
+use crate::sir::square;
 use core::task::Poll;
 
 /// Number of relays for which one portion of the solver's work continues Algorithm 1. The algorithm computes the x of
@@ -43,43 +46,74 @@ struct Start {
     aside: [f32; 3],
     /// Altitudes of the first and the last relay: 0 is the lowest permitted one, 1 the highest.
     up: [f32; 2],
-    /// First and last x of evenly spaced relays, as fractions of the distance from Tx to Rx. They are counted from
-    /// the end with more power. `None` if Algorithm 1 computes all x.
-    even: Option<[f32; 2]>,
+    along: Along,
 }
 
-const STARTS: [Start; 5] = [
+/// Initial x of the relays.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Along {
+    /// x that Algorithm 1 computes for the relays' cross-sections.
+    Line,
+    /// First and last x of evenly spaced relays, as fractions of the distance from Tx to Rx. They are counted from
+    /// the end with more power.
+    Even([f32; 2]),
+    /// x that Algorithm 1 computes without those closed by `close_beyond`. The cross-sections lead down to the end with
+    /// less power, as part of an ellipse.
+    Arc,
+}
+
+const STARTS: [Start; 6] = [
     Start {
-        aside: [0.96, 0.96, 0.96],
-        up: [0.96, 0.96],
-        even: None,
+        aside: [1.0, 1.0, 1.0],
+        up: [1.0, 1.0],
+        along: Along::Line,
     },
     Start {
         aside: [0.9, 0.45, 0.0],
         up: [0.96, 0.04],
-        even: None,
+        along: Along::Line,
     },
     Start {
         aside: [0.96, 0.96, 0.96],
         up: [0.96, 0.04],
-        even: Some([0.5, 1.0]),
+        along: Along::Even([0.5, 1.0]),
     },
     Start {
         aside: [0.0, 0.9, 0.0],
         up: [0.96, 0.04],
-        even: Some([0.0, 1.0]),
+        along: Along::Even([0.0, 1.0]),
     },
     Start {
         aside: [0.9, 0.45, 0.0],
         up: [0.04, 0.96],
-        even: Some([0.0, 0.5]),
+        along: Along::Even([0.0, 0.5]),
+    },
+    Start {
+        aside: [1.0, 1.0, 1.0],
+        up: [1.0, 1.0],
+        along: Along::Arc,
     },
 ];
 
 impl Start {
-    /// Returns the lateral offset and altitude in `room` of the relay at `share` of this initial chain. `share` is 0
-    /// for the relay at the end with more power (Tx or Rx), and 1 for the relay at the other end.
-    fn cross_section(self, interferer: &Interferer, share: f32, room: Room) -> CrossSection {
+    /// Returns the lateral offset and altitude in `room` of relay `index` of this initial chain.
+    fn cross_section(
+        self,
+        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        index: u16,
+        room: Room,
+    ) -> CrossSection {
+        let (relays, before) = (chain.mission.relays(), before(chain, index));
+        // 0 for the relay at the end with more power, 1 for the relay at the other end.
+        let share = if relays > 1 {
+            f32::from(before) / f32::from(relays - 1)
+        } else {
+            0.5
+        };
+        let scale = match self.along {
+            Along::Arc => quarter(before, relays + 1)[0],
+            Along::Line | Along::Even(_) => 1.0,
+        };
         let Room { lateral, band } = room;
         let ([near, middle, far], [first, last]) = (self.aside, self.up);
         let bent = 2.0 * share - 1.0;
@@ -90,14 +124,14 @@ impl Start {
                 } else {
                     far - middle
                 };
-        let away_m = if interferer.y_m > 0.0 {
+        let away_m = if chain.interferer.y_m > 0.0 {
             lateral.least_m
         } else {
             lateral.most_m
         };
         room.nearest(CrossSection {
-            y_m: aside * away_m,
-            altitude_m: band.least_m + (first + share * (last - first)) * band.span_m(),
+            y_m: scale * aside * away_m,
+            altitude_m: scale * (band.least_m + (first + share * (last - first)) * band.span_m()),
         })
     }
 }
@@ -221,6 +255,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
                     return Poll::Pending;
                 };
                 self.reached = sigma;
+                self.interior.closed = [0.0; 2];
                 Work::Seek(
                     Seek::down(sigma + ABOVE, ABOVE, 3.0, JUDGED),
                     Purpose::Result,
@@ -235,6 +270,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
         self.work = next;
         Poll::Pending
+    }
+
+    /// Returns true if the current initial chain is [`Along::Arc`].
+    fn is_arc(&self) -> bool {
+        self.start().is_some_and(|start| start.along == Along::Arc)
     }
 
     fn next_start(&mut self) -> Work {
@@ -257,23 +297,21 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         let end = (done + PUT).min(relays);
         let after = end + 1;
         for index in done + 1..after {
-            let share = if relays > 1 {
-                f32::from(index - 1) / f32::from(relays - 1)
-            } else {
-                0.5
-            };
-            let share = if is_turned(chain) { 1.0 - share } else { share };
             let room = (chain.seat_of)(index).room;
             let at = if self.number > 0 {
-                start.cross_section(chain.interferer, share, room)
+                start.cross_section(chain, index, room)
             } else {
                 room.nearest(config.common.on_line().cross_section)
             };
             self.interior.cells.set(index, Cell::of(at, room));
         }
+        self.interior.closed = [0.0; 2];
+        if start.along == Along::Arc {
+            self.close_beyond(chain);
+        }
         if end < relays {
             Work::Begin(end)
-        } else if start.even.is_some() {
+        } else if let Along::Even(_) = start.along {
             Work::Put(0)
         } else {
             // The common altitude is compared, so its target is as exact as those of results.
@@ -282,8 +320,37 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
+    /// Closes the x beyond the interferer to the relay next to the end with more power. At these x its SIR rises with
+    /// the distance from that end.
+    ///
+    /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
+    /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The interferer is taken
+    /// for as far from the line as the relay's cross-section from the interferer.
+    fn close_beyond(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
+        let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
+        let index = if is_turned { chain.mission.relays() } else { 1 };
+        let at = self
+            .interior
+            .cells
+            .get(index)
+            .place((chain.seat_of)(index).room);
+        let a_squared = square(at.y_m - chain.interferer.y_m) + square(at.altitude_m);
+        let x_m = if is_turned {
+            distance_m - chain.interferer.x_m
+        } else {
+            chain.interferer.x_m
+        };
+        let lowest_m = 0.5 * (x_m + sqrt(square(x_m) + 4.0 * a_squared));
+        let closed = (1.0 - lowest_m / distance_m).max(0.0);
+        self.interior.closed = if is_turned {
+            [0.0, closed]
+        } else {
+            [closed, 0.0]
+        };
+    }
+
     /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, has the description of chain 1, of which it only uses `even`: the x are those of Algorithm 1.
+    /// altitude, has the description of chain 1, of which it only uses `along`: the x are those of Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
@@ -320,11 +387,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     ) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.mission.relays();
-        let even = self.start().and_then(|start| start.even);
-        let even = even.filter(|_| self.again == 0);
-        let is_again = self.again > 1;
+        let along = match self.start() {
+            Some(start) if self.again == 0 => start.along,
+            _ => Along::Line,
+        };
+        let is_close = self.again > 1 || self.is_arc();
         let [far, close] = OFF;
-        let off = if is_again { close } else { far };
+        let off = if is_close { close } else { far };
         let end = (done + PUT).min(relays);
         let after = end + 1;
         for index in done + 1..after {
@@ -332,11 +401,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
             let place = self.interior.cells.get(index).place(room).at(0.0);
             let share = f32::from(index) / f32::from(relays + 1);
             let turned = |x: f32| if is_turned(chain) { 1.0 - x } else { x };
-            let x_m = if let Some([first, last]) = even {
-                turned(first + turned(share) * (last - first)) * distance_m
-            } else {
-                let [x_m, _] = self.interior.noted(index);
-                x_m + off * (share * distance_m - x_m)
+            let x_m = match along {
+                Along::Line | Along::Arc => {
+                    let [x_m, _] = self.interior.noted(index);
+                    x_m + off * (share * distance_m - x_m)
+                }
+                Along::Even([first, last]) => {
+                    turned(first + turned(share) * (last - first)) * distance_m
+                }
             };
             self.interior
                 .put(chain, index, Placement { x_m, ..place }, off);
@@ -344,7 +416,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         if end < relays {
             return Work::Put(end);
         }
-        self.interior.start(chain, is_again);
+        self.interior.start(chain, is_close);
         Work::Interior
     }
 
@@ -390,17 +462,24 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
             .cells
             .least_step(chain.mission, chain.seat_of, index);
         pass.end_m = end_after(chain.mission, pass.end_m, step);
-        let link = self.line_link(chain, index, pass.end_m);
+        let end_m = if index == 1 {
+            let [far, _] = self.interior.closed;
+            pass.end_m.min((1.0 - far) * chain.distance_m())
+        } else {
+            pass.end_m
+        };
+        let link = self.line_link(chain, index, end_m);
         let mut x_m = link.reach(target, pass.x_m)?;
         if index >= chain.mission.relays() {
             let (slack, place) = link.ending(target, pass.x_m, x_m)?;
-            if !(slack >= 0.0) {
+            let [_, near] = self.interior.closed;
+            if !(slack >= 0.0 && place >= near * chain.distance_m()) {
                 return None;
             }
             x_m = place;
             pass.is_back = true;
         }
-        self.interior.note(index, [x_m, pass.end_m]);
+        self.interior.note(index, [x_m, end_m]);
         (pass.index, pass.x_m) = (index, x_m);
         Some(())
     }
@@ -456,10 +535,28 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if Rx has more power than Tx. The initial chains are then described from Rx.
+/// Returns true if the initial chains are described from Rx. That is so if Rx has more power than Tx; with equal powers
+/// if less SIR is required on the way back, because on the ground Rx receives less interference than relay 1.
 fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
     let config = chain.mission.config();
-    config.rx_power_w > config.tx_power_w
+    let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
+    rx_w > tx_w || (rx_w >= tx_w && config.reverse < 1.0)
+}
+
+/// Returns the number of relays between relay `index` and the end with more power (Tx or Rx).
+fn before(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> u16 {
+    if is_turned(chain) {
+        chain.mission.relays() - index
+    } else {
+        index - 1
+    }
+}
+
+/// Returns the coordinates of a point on the unit circle. For `part` from 0 to `whole` it goes from (1, 0) to (0, 1).
+fn quarter(part: u16, whole: u16) -> [f32; 2] {
+    let [a, b] = [whole.saturating_sub(part), part].map(f32::from);
+    let radius = sqrt(square(a) + square(b));
+    [a / radius, b / radius]
 }
 
 /// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1

@@ -7,10 +7,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser as _;
+use serde_json::Value;
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Alarm, Condition, Fence, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Screen,
-    Snapshot, Urgency,
+    Alarm, Condition, Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot,
+    Screen, Snapshot, Task, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -27,8 +28,13 @@ struct Shown {
 
 impl Shown {
     /// Shows ten snapshots of `next` a second.
-    fn begin(mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
-        let screen = Arc::new(Screen::start("127.0.0.1:0".parse().unwrap()).unwrap());
+    fn begin(next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Screen::start("127.0.0.1:0".parse().unwrap()).unwrap();
+        Self::on(screen, next)
+    }
+
+    fn on(screen: Screen, mut next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
+        let screen = Arc::new(screen);
         let has_ended = Arc::new(AtomicBool::new(false));
         let (shown, stop) = (Arc::clone(&screen), Arc::clone(&has_ended));
         let thread = thread::spawn(move || {
@@ -270,6 +276,95 @@ fn only_alarms_that_last_sound_and_are_in_the_title() {
     assert_eq!(listed, 2);
 }
 
+#[test]
+fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
+    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None).unwrap();
+    let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
+    let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
+    let desk = serde_json::json!({
+        "sited": false, "number": 1, "stage": "ready", "version": 2, "digest": "0x1234", "adopted": [], "arrived": [], "relays": 3,
+        "preview": {
+            "changes": [{ "value": "altitude", "old": "20 m", "new": "30 m" }], "worst_before": [1.0, null], "worst_after": [2.25, -3.5],
+            "moves": [{ "relay": 1, "metres": 12.34, "from": place(400.0), "to": place(412.34) }],
+            "targets": [[412.34, 0.0]],
+        },
+    });
+    let shown = Shown::on(screen, move || Snapshot {
+        desk: Some(desk.clone()),
+        ..full(3, 0.0)
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(4));
+    browser.until("!byId('desk').hidden");
+    browser.run("byId('desk').open = true");
+    let over = "document.documentElement.scrollWidth - window.innerWidth";
+    assert!(number(&mut browser, over) <= 0.0);
+    let text = browser.text("byId('changes').textContent");
+    for part in [
+        "altitude: 20 m → 30 m",
+        "worst hop: 1.0 dB → 2.3 dB toward Rx, -3.5 dB back",
+        "relay 1 moves 12.3 m: x 400.0",
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
+    // The preview on the page is that of another browser.
+    assert_eq!(browser.value("byId('hold').disabled"), true);
+    browser.run("byId('form').elements.altitude.value = ' 30 '; byId('form').requestSubmit()");
+    let task = next();
+    assert_eq!(
+        (task.task, &task.body[..]),
+        (Task::Preview, "{\"altitude\":\"30\"}")
+    );
+    task.reply(Ok("{\"preview\":1}".to_owned()));
+    browser.until("!byId('hold').disabled");
+    let press = "byId('hold').dispatchEvent(new PointerEvent('pointerdown'))";
+    browser.run(press);
+    thread::sleep(Duration::from_millis(700));
+    browser.run("byId('hold').dispatchEvent(new PointerEvent('pointerup'))");
+    browser.run("byId('hold').focus()");
+    browser.key("Enter", 13);
+    browser.run("byId('hold').click()");
+    thread::sleep(Duration::from_millis(1_500));
+    assert!(
+        posts.try_recv().is_err(),
+        "held for 0.7 s, pressed and clicked"
+    );
+    let begun = Instant::now();
+    browser.run(press);
+    let task = next();
+    assert!(
+        begun.elapsed() > Duration::from_millis(950),
+        "{:?}",
+        begun.elapsed()
+    );
+    let body = "{\"preview\":1,\"digest\":\"0x1234\"}";
+    assert_eq!((task.task, &task.body[..]), (Task::Upload, body));
+    task.reply(Err("preview 1 was used already".to_owned()));
+    browser
+        .until("byId('desk-state').textContent.startsWith('Refused: preview 1 was used already')");
+    // A page without new data uploads nothing.
+    let stale = "(document.body.classList.add('stale'), isReady())";
+    assert_eq!(browser.value(stale), false);
+    // A drag of Rx moves it, and not the map; without sites along the line only.
+    let at = browser.value("(() => { const box = byId('canvas').getBoundingClientRect(); const [x, y] = map.pixels(received.last.rx.x_m, 0); return [box.x + x, box.y + y]; })()");
+    let [x, y] = [0, 1].map(|it| at[it].as_f64().unwrap());
+    browser.drag([x, y], [x - 60.0, y + 30.0], 5);
+    let task = next();
+    let body: serde_json::Value = serde_json::from_str(&task.body).unwrap();
+    let (to, beside) = body["receiver"].as_str().unwrap().split_once(',').unwrap();
+    let to: f64 = to.parse().unwrap();
+    assert!(
+        (500.0..1_990.0).contains(&to) && beside == "0" && body["altitude"] == "30",
+        "{body}"
+    );
+    assert_eq!(browser.value("map.fitted"), true);
+    task.reply(Err("no".to_owned()));
+    save("desk", &browser.screenshot());
+    // The browser reports each refused request.
+    let errors = browser.errors();
+    assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
+}
+
 /// Returns a snapshot of `relays` relays that move, with everything that the map can show.
 fn full(relays: u16, time_s: f64) -> Snapshot {
     let distance_m = 2_000.0;
@@ -369,7 +464,7 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
                 );
                 assert!(over <= 0.0, "{name} {scheme} {what}: {over} px too wide");
                 let small = browser.value(
-                    "[...document.querySelectorAll('button')].map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
+                    "[...document.querySelectorAll('button')].filter((it) => it.checkVisibility()).map((it) => it.getBoundingClientRect().height).filter((high) => high < 30)",
                 );
                 assert_eq!(
                     small.to_string(),
@@ -390,13 +485,19 @@ fn a_hundred_relays_are_drawn_ten_times_a_second() {
     let shown = shown_full(100);
     let mut browser = Browser::start("about:blank", 1920, 1080);
     thread::sleep(Duration::from_secs(1));
-    browser.open(&shown.screen.url());
-    browser.until("performance.getEntriesByName('first-contentful-paint').length > 0");
-    let paint = number(
-        &mut browser,
-        "performance.getEntriesByName('first-contentful-paint')[0].startTime",
-    );
-    println!("first paint after {paint:.0} ms");
+    let mut paints: Vec<f64> = (0..7)
+        .map(|_| {
+            browser.open("about:blank");
+            browser.open(&shown.screen.url());
+            let paint = "performance.getEntriesByName('first-contentful-paint')[0]";
+            browser.until(&format!("location.protocol === 'http:' && {paint}"));
+            number(&mut browser, &format!("{paint}.startTime"))
+        })
+        .collect();
+    println!("first paints of {} loads: {paints:.0?} ms", paints.len());
+    paints.sort_by(f64::total_cmp);
+    // The first one of a browser starts its processes. An idle machine takes less than 100 ms; this one may be busy.
+    assert!(paints[0] < 500.0, "{paints:?}");
     browser.until(&shows(100));
     // Ways of full length.
     browser.run(
@@ -461,4 +562,90 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
     let pressed = browser.text("byId('sound').getAttribute('aria-pressed')");
     assert_eq!(pressed, "true");
     assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
+/// JavaScript: the texts with a contrast below 4.5 to 1 (WCAG 2.1 AA), without those of disabled buttons and of the canvas.
+const FAINT: &str = r"(() => {
+  const linear = (part) => (part <= 10.3 ? part / 3294.6 : ((part / 255 + 0.055) / 1.055) ** 2.4);
+  const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
+  const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  const behind = (it) => { const of = parts(getComputedStyle(it).backgroundColor); return of[3] === 0 ? behind(it.parentElement) : of; };
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), faint = [];
+  while (walker.nextNode()) {
+    const [text, it] = [walker.currentNode.textContent.trim(), walker.currentNode.parentElement];
+    if (!text || !it.getClientRects().length || it.closest('.unseen, :disabled')) continue;
+    const [one, other] = [light(parts(getComputedStyle(it).color)), light(behind(it))];
+    const ratio = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+    if (ratio < 4.5) faint.push(`${text}: ${ratio.toFixed(1)}`);
+  }
+  return faint;
+})()";
+
+/// Checks contrast, names and keyboard focus of everything on the page, with alarms of each urgency.
+///
+/// With `AXE=axe.min.js`, a copy of axe-core 4, it also runs all rules of axe-core.
+#[test]
+fn the_page_has_no_serious_fault_of_accessibility() {
+    let alarm = |number, urgency, cleared_s| Alarm {
+        number,
+        time_s: 1.0,
+        urgency,
+        text: format!("relay {number} lost: reported by relays 2 and 4"),
+        cleared_s,
+    };
+    let shown = Shown::begin(move || Snapshot {
+        alarms: vec![
+            alarm(1, Urgency::Critical, None),
+            alarm(2, Urgency::Warning, None),
+            alarm(3, Urgency::Notice, Some(2.0)),
+        ],
+        log: vec![LogLine {
+            time_s: 1.0,
+            text: "relay 2: does not receive relay 3".to_owned(),
+        }],
+        ..full(9, 3.0)
+    });
+    let axe = std::env::var("AXE").map(|file| std::fs::read_to_string(file).unwrap());
+    for (width, is_dark) in [(1280, false), (1280, true), (390, false), (390, true)] {
+        let mut browser = shown.opened(width, 900);
+        if is_dark {
+            browser.prefer_dark();
+        }
+        browser.until(&shows(9));
+        let what = format!("{width} px, dark: {is_dark}");
+        assert_eq!(browser.value(FAINT).to_string(), "[]", "{what}");
+        let nodes = browser.accessible();
+        let is_control = |it: &&Value| {
+            let role = it["role"]["value"].as_str().unwrap_or_default();
+            ["button", "link", "textbox", "application", "region"].contains(&role)
+        };
+        let nameless = |it: &&Value| it["name"]["value"].as_str().is_none_or(str::is_empty);
+        let nameless: Vec<_> = nodes.iter().filter(is_control).filter(nameless).collect();
+        assert!(nameless.is_empty(), "{what}: {nameless:#?}");
+        // The focus visits everything in the order of the document, and is visible.
+        let all = number(
+            &mut browser,
+            "[...document.querySelectorAll('button:enabled, [tabindex]')].length",
+        );
+        browser.run("document.body.focus(); window.visited = []");
+        for _ in 0..all as usize {
+            browser.key("Tab", 9);
+            browser.run("const it = document.activeElement; if (it.matches(':focus-visible') && getComputedStyle(it).outlineWidth === '3px') visited.push(it)");
+        }
+        let in_order = browser.value("new Set(visited).size === visited.length && visited.every((it, at) => at === 0 || visited[at - 1].compareDocumentPosition(it) & 4) && visited.length");
+        assert_eq!(in_order.as_f64(), Some(all), "{what}");
+        if let Ok(axe) = &axe {
+            browser.run(axe);
+            let faults = browser.value(
+                "axe.run({ resultTypes: ['violations'] }).then((it) => it.violations.map((one) => `${one.impact} ${one.id}: ${one.nodes.map((node) => node.target).join()}`))",
+            );
+            println!("axe-core, {what}: {faults}");
+            assert!(
+                !["serious", "critical"]
+                    .iter()
+                    .any(|it| faults.to_string().contains(it))
+            );
+        }
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
 }

@@ -1,0 +1,156 @@
+"use strict";
+// Form for a new mission, its preview, and the button that is held to upload it. A page that only shows has no token, and no form.
+
+/** Time for which the button has to be held, ms. */
+const HOLD = 1000;
+
+/** `mine` is the number of the preview of the values in the form, or null; `held` is the timer of the button. */
+const desk = { token: null, state: {}, mine: null, held: 0, note: "" };
+
+const metres = (value) => value.toFixed(1);
+
+/** Sends a task. Returns the answer; a refusal is an error with the reason. */
+async function post(path, body) {
+  const headers = { "Content-Type": "application/json", "X-Relay-Token": desk.token };
+  const response = await fetch(path, { method: "POST", headers, body: JSON.stringify(body) });
+  const text = (await response.text()).trim();
+  if (!response.ok) throw new Error(text || response.statusText);
+  return JSON.parse(text);
+}
+
+/** Returns the values in the form; empty fields stay as flown. */
+function values() {
+  const pairs = [...new FormData(byId("form"))].map(([name, value]) => [name, value.trim()]);
+  return Object.fromEntries(pairs.filter(([, value]) => value));
+}
+
+async function preview() {
+  edited();
+  try {
+    desk.mine = (await post("/preview", values())).preview;
+  } catch (error) {
+    desk.note = `Refused: ${error.message}.`;
+  }
+  describe();
+}
+
+async function upload() {
+  const { number: preview, digest } = desk.state;
+  try {
+    await post("/upload", { preview, digest });
+  } catch (error) {
+    desk.note = `Refused: ${error.message}.`;
+  }
+  describe();
+}
+
+/** Forgets the preview of earlier values. */
+function edited() {
+  release();
+  desk.mine = null;
+  desk.note = "";
+  describe();
+}
+
+/** Returns true if the form's own preview can be uploaded, and the page does not show an old state. */
+const isReady = () => desk.mine !== null && desk.mine === desk.state.number && desk.state.stage === "ready" && !document.body.classList.contains("stale");
+
+/** Takes the token and the state of the tasks from a snapshot. */
+function takeDesk({ token, desk: state }) {
+  desk.token = token;
+  desk.state = state || {};
+  byId("desk").hidden = !state;
+  if (!token || !state) return;
+  byId("form").hidden = Boolean(state.why);
+  for (const it of document.querySelectorAll("#form .sited")) it.hidden = !state.sited;
+  describe();
+}
+
+const listed = (numbers) => (numbers.length ? numbers.join(", ") : "none");
+
+/** Returns the text about the newest preview or upload. */
+function stateText({ why, number, stage, fault, version, adopted, arrived, relays }) {
+  if (why) return `No uploads: ${why}.`;
+  if (!stage) return "Empty fields stay as flown. Drag Rx on the map, or type values.";
+  const what = number ? `Preview ${number}` : `Version ${version}`;
+  const words = {
+    asking: "asks the chain for its mission",
+    computing: "is being computed",
+    ready: `is ready: version ${version} of the mission`,
+    checking: "asks the chain for its mission once more",
+    uploading: `is being uploaded as version ${version}`,
+    flown: `is flown as version ${version}`,
+    failed: `has failed: ${fault}`,
+  };
+  const progress = stage === "uploading" || stage === "flown" ? `; adopted by ${adopted.length} of ${relays} (${listed(adopted)}), arrived: ${listed(arrived)}` : "";
+  return `${what} ${words[stage]}${progress}`;
+}
+
+/** Returns the worst SIRs of a mission: toward Rx, and back if known. */
+function worstText(sirs) {
+  if (!sirs) return "unknown";
+  const [there, back] = sirs.map((db) => (typeof db === "number" ? `${db.toFixed(1)} dB` : null));
+  return back ? `${there ?? "–"} toward Rx, ${back} back` : there ?? "unknown";
+}
+
+/** Shows the state, the preview, and the positions on the map; only what has changed is written. */
+function describe() {
+  const { state } = desk;
+  say("desk-state", [desk.note, stateText(state)].filter(Boolean).join(" "));
+  byId("hold").disabled = !isReady();
+  if (!isReady()) release();
+  const shown = state.preview;
+  const key = shown ? JSON.stringify([state.number, state.stage, shown]) : "";
+  if (key === desk.shown) return;
+  desk.shown = key;
+  const lines = shown ? shown.changes.map(({ value, old, new: now }) => `${value}: ${old} → ${now}`) : [];
+  if (shown?.moves) {
+    lines.push(`worst hop: ${worstText(shown.worst_before)} → ${worstText(shown.worst_after)}`);
+    for (const { relay, metres: way, from, to } of shown.moves) lines.push(`relay ${relay} moves ${metres(way)} m: x ${metres(from.x_m)}, y ${metres(from.y_m)}, h ${metres(from.h_m)} → x ${metres(to.x_m)}, y ${metres(to.y_m)}, h ${metres(to.h_m)}`);
+  } else if (shown && state.stage !== "computing") {
+    lines.push("the moves of the relays cannot be computed in advance");
+  }
+  byId("changes").replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  // An uploaded mission may have another line, and the map other coordinates.
+  map.targets = state.stage === "ready" ? shown.targets : [];
+  map.request();
+}
+
+function release() {
+  clearTimeout(desk.held);
+  desk.held = 0;
+  byId("hold").classList.remove("held");
+}
+
+function hold() {
+  if (!isReady() || desk.held) return;
+  byId("hold").classList.add("held");
+  desk.held = setTimeout(() => {
+    release();
+    upload();
+  }, HOLD);
+}
+
+/** A drag of Rx fills the form; a mission without sites can only move it along the line. */
+map.dragged = ([x, y], isDone) => {
+  const field = byId("form").elements.receiver;
+  field.value = `${metres(x)},${desk.state.sited ? metres(y) : 0}`;
+  edited();
+  if (isDone) preview();
+};
+map.canDrag = () => desk.token && !byId("desk").hidden && byId("desk").open && !desk.state.why;
+
+byId("form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  preview();
+});
+byId("form").addEventListener("input", edited);
+const button = byId("hold");
+button.addEventListener("pointerdown", hold);
+for (const end of ["pointerup", "pointerleave", "pointercancel", "blur", "keyup"]) button.addEventListener(end, release);
+button.addEventListener("contextmenu", (event) => event.preventDefault());
+button.addEventListener("keydown", (event) => {
+  if (event.key !== " " && event.key !== "Enter") return;
+  event.preventDefault();
+  if (!event.repeat) hold();
+});

@@ -1,0 +1,299 @@
+//! Uploads from the page of a ground station, and requests that must not reach the chain.
+
+use std::io::Read as _;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::chain::{Chain, Place, simulated};
+use crate::files::{Files, answer, status_of, until};
+use crate::medium::{Medium, QUIET};
+use crate::process::{LIMIT, Relay};
+use crate::web::{address, connect, snapshots};
+use crate::with_source;
+
+/// Page of a station, as a browser uses it.
+struct Page {
+    address: String,
+    token: String,
+}
+
+impl Page {
+    fn open(station: &mut Relay) -> Self {
+        let address = address(station);
+        let first = snapshots(&address).next().unwrap();
+        let token = first["token"].as_str().unwrap().to_owned();
+        Self { address, token }
+    }
+
+    /// Sends a task, with `change` made to the request. Returns the status and the answer.
+    fn sends(&self, path: &str, body: &Value, change: [&str; 2]) -> (u16, String) {
+        let (own, body, token) = (&self.address, body.to_string(), &self.token);
+        let length = body.len();
+        let request = format!(
+            "POST {path} HTTP/1.1\r\nHost: {own}\r\nOrigin: http://{own}\r\nX-Relay-Token: {token}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}"
+        );
+        let request = request.replacen(change[0], change[1], 1);
+        let mut answer = String::new();
+        let _ = connect(own, request.as_bytes()).read_to_string(&mut answer);
+        let status = answer.get(9..12).and_then(|it| it.parse().ok());
+        let text = answer.split_once("\r\n\r\n").map(|(_, text)| text.trim());
+        (status.unwrap_or(0), text.unwrap_or_default().to_owned())
+    }
+
+    fn post(&self, path: &str, body: &Value) -> (u16, String) {
+        self.sends(path, body, ["", ""])
+    }
+
+    /// Returns the state of the tasks once it is at `stage`.
+    fn until(&self, stage: &str) -> Value {
+        let begun = Instant::now();
+        let mut states = snapshots(&self.address).map(|mut it| it["desk"].take());
+        let found = states.find(|it| {
+            assert!(begun.elapsed() < LIMIT, "{it:#}");
+            it["stage"] == stage
+        });
+        found.unwrap()
+    }
+}
+
+fn f32_bits(value: &Value) -> u32 {
+    (value.as_f64().unwrap() as f32).to_bits()
+}
+
+/// Starts two relays on one channel with a station at Tx (tty 2), and room for one at Rx (tty 3).
+fn chain_with_page() -> (Chain, Relay, Page) {
+    let mut chain = Chain::on_channel(2, Medium::new(4, QUIET));
+    for index in [1, 2] {
+        let signed = chain.files.signed("key", &format!("epoch{index}"));
+        let relay = chain.relay(index, &signed);
+        chain.relays.push(relay);
+    }
+    chain.lines("converged: ");
+    let (tty, signed) = (chain.media[0].tty(2), chain.files.signed("key", "tx"));
+    let socket = chain.files.text("status");
+    let mut station = Relay::ground(&format!(
+        "--of 2 --end tx --shared --stand --web 127.0.0.1:0 --tty {tty} --status-socket {socket} {signed}"
+    ));
+    let page = Page::open(&mut station);
+    (chain, station, page)
+}
+
+#[test]
+fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
+    let (mut chain, mut station, page) = chain_with_page();
+    let refused = page.post("/upload", &json!({ "preview": 1, "digest": "0x0000" }));
+    assert_eq!(refused, (409, "there is no preview".to_owned()));
+    let refused = page.post("/preview", &json!({ "altitude": "0" }));
+    assert!(
+        refused.0 == 409 && refused.1.contains("within 0.1 to 10000"),
+        "{refused:?}"
+    );
+    // Outside the geofence: the preview names the relay and the limit, and cannot be uploaded.
+    let (status, number) = page.post("/preview", &json!({ "altitude": "50" }));
+    assert_eq!((status, &number[..]), (200, "{\"preview\":1}"));
+    let state = page.until("failed");
+    let why = "altitude 50 m: must be within 20 to 20 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m";
+    assert_eq!(state["fault"], why);
+    let request = json!({ "preview": 1, "digest": state["digest"] });
+    assert_eq!(
+        page.post("/upload", &request),
+        (409, "preview 1 is not ready".to_owned())
+    );
+
+    let uploaded: Vec<Place> = simulated(&with_source(80.0, 700.0, -300.0), 2);
+    assert_eq!(
+        page.post("/preview", &json!({ "interferer": "80,700,-300" }))
+            .0,
+        200
+    );
+    let state = page.until("ready");
+    let preview = &state["preview"];
+    let change = json!([{ "value": "interferer", "old": "80 W at x 500 m, y 400 m", "new": "80 W at x 700 m, y -300 m" }]);
+    assert_eq!(preview["changes"], change);
+    let moves = preview["moves"].as_array().unwrap();
+    for (moved, place) in moves.iter().zip(&uploaded) {
+        let to = ["x_m", "y_m", "h_m"].map(|part| f32_bits(&moved["to"][part]));
+        assert_eq!(to, place[..3]);
+        assert!(moved["metres"].as_f64().unwrap() > 10.0, "{moved}");
+    }
+    assert!(
+        moves.len() == 2 && preview["worst_after"][0].is_f64(),
+        "{preview}"
+    );
+    let digest = &state["digest"];
+    let refused = page.post("/upload", &json!({ "preview": 1, "digest": digest }));
+    assert!(
+        refused.1.contains("the newest one, which is preview 2"),
+        "{refused:?}"
+    );
+    let refused = page.post("/upload", &json!({ "preview": 2, "digest": "0x0000" }));
+    assert!(refused.1.contains("has the digest 0x"), "{refused:?}");
+    assert!(!chain.relays[0].has_printed("uploaded: "));
+    let request = json!({ "preview": 2, "digest": digest });
+    assert_eq!(page.post("/upload", &request).0, 200);
+    // The same request again is refused at once, and later.
+    let again = (
+        409,
+        "preview 2 was used already: make a new preview".to_owned(),
+    );
+    assert_eq!(page.post("/upload", &request), again);
+    station.line("flown: 2 of 2 relays fly version 1 of the mission");
+    assert_eq!(page.post("/upload", &request), again);
+    chain.settles_at(&uploaded);
+    let state = page.until("flown");
+    assert_eq!(state["version"], 1);
+
+    // The other end of the chain uploads a mission after the preview.
+    assert_eq!(page.post("/preview", &json!({ "noise": "1e-9" })).0, 200);
+    let request = json!({ "preview": 3, "digest": page.until("ready")["digest"] });
+    let (tty, signed) = (chain.media[0].tty(3), chain.files.signed("key", "rx"));
+    Relay::ground(&format!(
+        "--of 2 --end rx --shared --tty {tty} {signed} --version 2 --new-tx-power 2 --yes"
+    ))
+    .succeeds();
+    assert_eq!(page.post("/upload", &request).0, 200);
+    let state = page.until("failed");
+    let why = "preview 3: computed for version 1 of the mission, but the chain has another mission now, version 2: make a new preview";
+    assert_eq!(state["fault"], why);
+    station.stopped();
+    for relay in &mut chain.relays {
+        assert!(!relay.has_printed("uploaded: version 3"));
+    }
+}
+
+#[test]
+fn requests_without_their_secrets_do_not_reach_the_chain() {
+    let (mut chain, station, page) = chain_with_page();
+    let received = || {
+        let said = status_of(chain.files.path("status"));
+        assert!(said["station"]["upload"].is_null(), "{said:#}");
+        (
+            Instant::now(),
+            said["station"]["counters"]["received"].as_f64().unwrap(),
+        )
+    };
+    let rate =
+        |from: (Instant, f64), to: (Instant, f64)| (to.1 - from.1) / (to.0 - from.0).as_secs_f64();
+    std::thread::sleep(Duration::from_secs(2));
+    let first = received();
+    std::thread::sleep(Duration::from_secs(8));
+    let quiet = rate(first, received());
+    assert!(quiet > 0.5, "{quiet} frames/s: the relays report");
+    let begun = received();
+    let browsers: Vec<_> = (0..50)
+        .map(|_| {
+            connect(
+                &page.address,
+                format!("GET /events HTTP/1.1\r\nHost: {}\r\n\r\n", page.address).as_bytes(),
+            )
+        })
+        .collect();
+    let (body, mut count) = (json!({ "interferer": "80,700,-300" }), 0);
+    let mut longest = Duration::ZERO;
+    while count < 5_000 || begun.0.elapsed() < Duration::from_secs(8) {
+        for (change, expected) in [
+            (["Host: 127.0.0.1", "Host: evil.example"], 403),
+            (
+                ["Origin: http://127.0.0.1", "Origin: http://evil.example"],
+                403,
+            ),
+            (["Origin", "X-Origin"], 403),
+            (["X-Relay-Token: ", "X-Relay-Token: 0"], 403),
+            (["X-Relay-Token", "X-Token"], 403),
+            (["application/json", "text/plain"], 400),
+        ] {
+            let (status, text) = page.sends("/preview", &body, change);
+            // Slow readers take connections until they are dropped.
+            assert!(
+                status == expected || status == 503,
+                "{change:?}: {status} {text}"
+            );
+            count += 1;
+        }
+        let asked = Instant::now();
+        received();
+        longest = longest.max(asked.elapsed());
+    }
+    let loaded = rate(begun, received());
+    println!(
+        "{count} requests; {quiet:.1} frames/s before, {loaded:.1} meanwhile; longest status {longest:?}"
+    );
+    assert!(loaded > 0.7 * quiet && longest < Duration::from_millis(1_500));
+    drop(browsers);
+    station.stopped();
+    for relay in &mut chain.relays {
+        assert!(!relay.has_printed("uploaded: "));
+    }
+}
+
+#[test]
+fn the_page_asks_for_the_password_in_the_file() {
+    let (files, tty) = (Files::new(), crate::pty::Pty::new());
+    let (signed, tty) = (files.signed("key", "epoch"), tty.path().display());
+    let file = files.write_key("password", "correct horse\n");
+    let web = format!("--web 127.0.0.1:0 --web-password {file}");
+    let mut station = Relay::ground(&format!(
+        "--of 1 --end tx --stand --tty {tty} {signed} {web}"
+    ));
+    let own = address(&mut station);
+    for (password, status) in [
+        ("OmNvcnJlY3QgaG9yc2Y=", "401"),
+        ("OmNvcnJlY3QgaG9yc2U=", "200"),
+    ] {
+        let request =
+            format!("GET / HTTP/1.1\r\nHost: {own}\r\nAuthorization: Basic {password}\r\n\r\n");
+        let mut answer = String::new();
+        let _ = connect(&own, request.as_bytes()).read_to_string(&mut answer);
+        assert_eq!(&answer[9..12], status);
+    }
+    station.stopped();
+}
+
+#[test]
+fn the_status_socket_takes_the_same_tasks() {
+    let chain = Chain::with_ground(1, QUIET);
+    let files = &chain.files;
+    let mut relay = chain.relay(1, &files.signed("key", "relay"));
+    relay.line("converged: ");
+    let (socket, tty) = (files.text("status"), chain.tx.as_ref().unwrap().tty(0));
+    let own = format!("--status-socket {socket} {}", files.signed("key", "ground"));
+    let mut station = Relay::ground(&format!("--stand --end tx --of 1 --tty {tty} {own}"));
+    let commanded = |line: &str| {
+        let said = answer(&socket, &format!("{line}\n"), false);
+        let said: Value = serde_json::from_str(&said).unwrap();
+        (
+            said["done"] == true,
+            said["text"].as_str().unwrap().to_owned(),
+        )
+    };
+    let usage = "must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, at a station with --stand, or empty to read its state";
+    for line in ["land", "preview altitude", "upload 1", "upload x 0x1"] {
+        assert_eq!(commanded(line), (false, format!("{line}: {usage}")));
+    }
+    let refused = commanded("preview land=1");
+    assert!(
+        refused.1.contains("unexpected argument '--new-land'"),
+        "{refused:?}"
+    );
+    assert_eq!(
+        commanded("preview interferer=80,700,-300"),
+        (true, "{\"preview\":1}".to_owned())
+    );
+    let said = until(&socket, |said| {
+        said["station"]["upload"]["stage"] == "ready"
+    });
+    let digest = said["station"]["upload"]["digest"].as_str().unwrap();
+    assert!(commanded(&format!("upload 1 {digest}")).0);
+    station.line("flown: 1 of 1 relays fly version 1 of the mission");
+    let refused = commanded(&format!("upload 1 {digest}"));
+    assert_eq!(
+        refused,
+        (
+            false,
+            "preview 1 was used already: make a new preview".to_owned()
+        )
+    );
+    relay.settles_at(simulated(&with_source(80.0, 700.0, -300.0), 1)[0]);
+    station.stopped();
+}
