@@ -155,7 +155,11 @@ pub struct Settings {
     /// If all drones arrive together, no hop is worse on the way than before or after ([`docs::batteries`](crate::docs::batteries)).
     /// Choose it so that the longest way, about a spacing of the chain, takes no more than the drones' usual speed. The same for
     /// all relays of a chain.
+    /// At most four times `dead_after`.
     pub respacing: Duration,
+    /// True if a relay without a guard may leave the chain (`Relay::leave`). Its neighbours then fly close to the drone
+    /// that still holds its place: beside the end of a chain to within a few metres.
+    pub leave_without_guard: bool,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
     /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
     /// Set it on all relays of a chain, or on none.
@@ -201,6 +205,7 @@ impl Settings {
         without_quorum: WithoutQuorum::Hold,
         guard: None,
         respacing: Duration::from_micros(0),
+        leave_without_guard: false,
         sited: false,
     };
 
@@ -316,6 +321,8 @@ pub enum SetupError {
     WithoutQuorum,
     /// A number of `guard` is out of range, or the crate was built without the feature `guard`.
     Guard,
+    /// `respacing` is longer than four times `dead_after`, or the crate was built without the feature `departures`.
+    Respacing,
 }
 
 error_texts!(SetupError {
@@ -333,6 +340,7 @@ error_texts!(SetupError {
     Silence => "probe_after must be above 0 and dead_after above probe_after",
     WithoutQuorum => "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4",
     Guard => "guard: geofence limits must be within -1e7 to 1e7 m, each lower limit at most its upper limit; separation_m within 0 to 1e5, relays within 1 to 1000, hover_m within 0 to 1e3; guard needs the cargo feature `guard`",
+    Respacing => "respacing must be at most four times dead_after; it needs the cargo feature `departures`",
 });
 
 pub(crate) fn check(
@@ -410,6 +418,12 @@ pub(crate) fn check(
         .is_some_and(|confines| !cfg!(feature = "guard") || !confines.is_valid())
     {
         return Err(SetupError::Guard);
+    }
+    let longest = settings
+        .dead_after
+        .times(if cfg!(feature = "departures") { 4 } else { 0 });
+    if settings.respacing > longest {
+        return Err(SetupError::Respacing);
     }
     Ok(())
 }

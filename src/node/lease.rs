@@ -92,8 +92,10 @@ pub(crate) struct Lease {
     requests: Option<Requests>,
     /// Number of relays of the view when no relay requested to leave; known at the leader.
     complement: u16,
-    /// Start of the wait for a spare or for the relays' motion. It is the last view, or the first request to leave.
-    waits_since: Instant,
+    /// Relay that requests to leave, 0 for none, and the time since which it does; known at the leader, over all views.
+    leaver: (u16, Instant),
+    /// Time of the first renewal of this view at the leader: all relays then had new positions.
+    settled_at: Instant,
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -118,7 +120,8 @@ impl Lease {
             orders: Orders::NONE,
             requests: None,
             complement: 0,
-            waits_since: now,
+            leaver: (0, now),
+            settled_at: now,
         }
     }
 
@@ -134,25 +137,39 @@ impl Lease {
 
     /// Returns the leader's orders for the next renewal, by the requests in the last one.
     ///
-    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If there is a spare, it joins first, unless the view already has
-    /// more relays than without requests. Neither wait is longer than the maximum duration of a lease.
+    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If there
+    /// is a spare, it joins first, unless the view already has more relays than without requests. A relay that does not
+    /// arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than that duration,
+    /// or than its remaining endurance: so half of the endurance remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
-        let Some(requests) = self.requests else {
+        let Some(requests) = self.requests.filter(|_| cfg!(feature = "departures")) else {
             return Orders::NONE;
         };
+        let (now, most) = (context.now, longest_lease(context.settings()));
         let relays = context.mission().relays();
+        let in_place = requests.in_place || now.since(self.settled_at).times(2) >= most;
         let mut orders = Orders {
-            in_place: requests.in_place,
+            in_place,
             ..Orders::NONE
         };
         if requests.leaver == 0 || self.complement == 0 {
             self.complement = relays;
-            self.waits_since = context.now;
         }
-        let late = context.now.since(self.waits_since) >= longest_lease(context.settings());
-        if requests.leaver != 0 && requests.spare != 0 && relays <= self.complement && !late {
-            orders.joiner = requests.spare;
-        } else if requests.in_place && self.orders.in_place || late {
+        if requests.leaver != self.leaver.0 {
+            self.leaver = (requests.leaver, now);
+        }
+        let waited = now.since(self.leaver.1);
+        let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
+        let late = waited >= most || waited >= left;
+        // A spare that was called is silent while it joins.
+        let spare = if requests.spare == 0 {
+            self.orders.joiner
+        } else {
+            requests.spare
+        };
+        if requests.leaver != 0 && spare != 0 && relays <= self.complement && !late {
+            orders.joiner = spare;
+        } else if in_place && self.orders.in_place || late {
             orders.leaver = requests.leaver;
         }
         orders
@@ -219,7 +236,6 @@ impl Lease {
         let known = self.older_leases_end.filter(|_| self.accepted.0 == base);
         self.older_leases_end = known.map(|until| until.max(rest).max(self.vouched_until));
         self.accepted = (view, rest);
-        self.waits_since = now;
         self.end();
     }
 
@@ -254,6 +270,7 @@ impl Lease {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
             self.next_at = Some(now + PAUSE);
+            self.settled_at = now;
         }
     }
 
@@ -334,7 +351,11 @@ impl Lease {
             in_place: context.requests.in_place && self.is_agreed,
             ..context.requests
         };
-        self.requests = Some(received.map_or(own, |received| received.merge(own)));
+        self.requests = Some(match received {
+            Some(received) if cfg!(feature = "departures") => received.merge(own),
+            Some(received) => received,
+            None => own,
+        });
         self.vouched_until = self
             .vouched_until
             .max(context.now + from_tenths(current.span));

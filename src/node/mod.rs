@@ -42,4 +42,6 @@ pub(crate) mod sample;
 mod steering;
 pub(crate) mod view;
 
-pub(crate) use dispatch::{Node, departure};
+pub(crate) use dispatch::Node;
+#[cfg(feature = "departures")]
+pub(crate) use dispatch::departure;

@@ -25,12 +25,24 @@ pub(crate) struct Steering {
     /// Agreed position of the last call, and the place to fly to now, which moves there in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
-    /// Motion to the agreed position: its first place, its start, and the time of its next step. `None` at the position.
-    motion: Option<(Placement, Instant, Instant)>,
+    /// Motion to the agreed position; `None` at the position.
+    motion: Option<Motion>,
 }
 
 /// Number of steps of a motion to a new agreed position, as a power of two.
 const STEPS: u32 = 5;
+
+/// True with the feature `departures`; without it setpoints do not move in steps.
+const RESPACING: bool = cfg!(feature = "departures");
+
+/// Motion to a new agreed position: its first place, its start, its duration, and the time of its next step.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    from: Placement,
+    since: Instant,
+    span: Duration,
+    at: Instant,
+}
 
 impl Steering {
     /// State before [`begin`](Self::begin): no guard, and no setpoint.
@@ -92,17 +104,31 @@ impl Steering {
     fn advance(&mut self, now: Instant, agreed: Option<Placement>, span: Duration) {
         if agreed != self.agreed {
             self.agreed = agreed;
+            // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
+            let left = self.motion.map(|it| (it.since + it.span).since(now));
+            let span = left.map_or(span, |left| left.min(span));
             self.motion = self
                 .wanted
-                .filter(|_| agreed.is_some() && span > Duration::from_micros(0))
-                .map(|from| (from, now, now));
+                .filter(|_| RESPACING && agreed.is_some() && span > Duration::from_micros(0))
+                .map(|from| Motion {
+                    from,
+                    since: now,
+                    span,
+                    at: now,
+                });
         }
         self.wanted = agreed;
-        let (Some((from, since, at)), Some(to)) = (&mut self.motion, agreed) else {
+        let (Some(motion), Some(to)) = (&mut self.motion, agreed) else {
             return;
         };
+        let Motion {
+            from,
+            since,
+            span,
+            at,
+        } = motion;
         let steps =
-            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(span).max(1));
+            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(*span).max(1));
         let Some(part) = u8::try_from(steps)
             .ok()
             .filter(|steps| *steps >> STEPS == 0)
@@ -124,7 +150,12 @@ impl Steering {
 
     /// Returns true while the setpoint moves to a new agreed position.
     pub(crate) const fn is_moving(&self) -> bool {
-        self.motion.is_some()
+        RESPACING && self.motion.is_some()
+    }
+
+    /// Returns the place to fly to if a motion to the agreed position stops now; `None` before the first agreement.
+    pub(crate) fn stopped(&self) -> Option<Placement> {
+        self.wanted.filter(|_| RESPACING)
     }
 
     pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
@@ -217,6 +248,6 @@ impl Steering {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        earliest(self.remind_at, self.motion.map(|(.., at)| at))
+        earliest(self.remind_at, self.motion.map(|motion| motion.at))
     }
 }

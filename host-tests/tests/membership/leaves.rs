@@ -37,6 +37,7 @@ fn departing(relays: u16, leaves: &[(u16, Option<u16>)]) -> Setup {
         .iter()
         .map(|(relay, left)| (*relay, seconds(AT_S), *left));
     setup.leaves = leaves.collect();
+    setup.settings.leave_without_guard = true;
     end_at(&mut setup, seconds(500));
     setup
 }
@@ -306,6 +307,7 @@ fn replaced(link: &Link, rng: &mut ChaCha8Rng, seed: u64) -> Replaced {
     setup.flight = Some(FlightSpec::multicopters(start, 0.0, 0.0));
     // A spacing of the chain at 6 m/s, at least 8 s.
     let respacing_s = (link.distance_m / 60.0).max(8.0);
+    setup.settings.leave_without_guard = true;
     setup.settings.respacing = Duration::from_millis((1e3 * respacing_s) as u64);
     setup.spares = vec![spare];
     setup.track = true;

@@ -140,14 +140,20 @@ pub(crate) fn with_departures(seed: u64) -> Schedule {
     for at in 0..usize::from(schedule.kind.mission.relays()) {
         if rng.random_bool(0.4) {
             // Some are spares from the start.
-            let leaves_us = if rng.random_bool(0.3) {
+            let is_spare = rng.random_bool(0.3);
+            let leaves_us = if is_spare || rng.random_bool(0.1) {
                 1
             } else {
                 rng.random_range(1..=end_us + 30 * SECOND)
             };
             let endurance_s = rng.random_bool(0.5).then(|| rng.random_range(0..=600));
             let stays_us = leaves_us + span(rng);
-            schedule.put(leaves_us, ScheduledEvent::Leave(at, endurance_s));
+            let event = if is_spare {
+                ScheduledEvent::Spare(at)
+            } else {
+                ScheduledEvent::Leave(at, endurance_s)
+            };
+            schedule.put(leaves_us, event);
             schedule.put(stays_us, ScheduledEvent::Stay(at));
         }
     }

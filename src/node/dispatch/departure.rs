@@ -5,29 +5,29 @@
 //!
 //! | event | action |
 //! | --- | --- |
-//! | `leave`, before this relay has taken part in anything | go outside as a spare |
-//! | order to leave; hello of a neighbour that has selected the relay beyond | go outside; keep the setpoint |
+//! | `wait_as_spare`, or `leave`, before this relay has taken part in anything | go outside, as a spare or as a leaver |
+//! | order to leave; both neighbours have selected the relay beyond (the only one at an end) | go outside; keep the setpoint |
 //! | order for the neighbour to leave, received by all | ask the nodes beyond it for a hello; at the end of the chain: give up the neighbour |
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
 //! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
-//! | outside, hello of a member that the view without this relay is complete and in place | raise `MayLeave` |
-//! | outside, called or `stay`, or not free for eight times `dead_after` | join as a relay that was lost |
+//! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
+//! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost |
 
 use super::{Layers, Node};
-use crate::event::Event;
-use crate::node::context::{Member, longest_lease};
+use crate::event::{Event, NodeEvent};
+use crate::node::context::{Member, longest_lease, tenths};
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::message::{Hello, Requests};
 
 /// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
 const IN_PLACE_M: f32 = 3.0;
 
-/// Time after which a departure counts as blocked, in units of `dead_after`. The neighbours then do not receive each
+/// Time after which an ordered departure counts as blocked, in units of `dead_after`. The neighbours then do not receive each
 /// other. It is requested again after the same time.
 const BLOCKED_AFTER: u32 = 4;
 
@@ -54,6 +54,9 @@ pub enum Departure {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum DepartureRefusal {
+    /// Departure refused: without a guard the neighbours fly close to the drone that still holds its place. See
+    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard).
+    Guard,
     /// Departure refused: over two wires per relay the neighbours cannot receive each other.
     Wires,
     /// Departure refused: the remaining relays would have no quorum, or there are none.
@@ -65,6 +68,7 @@ pub enum DepartureRefusal {
 }
 
 error_texts!(DepartureRefusal {
+    Guard => "without a guard no relay leaves the chain, unless leave_without_guard is true: its neighbours fly close to it",
     Wires => "a relay with two wires cannot leave the chain: its neighbours do not receive each other",
     Quorum => "the relay cannot leave the chain: the remaining relays would have no quorum",
     Gap => "the relay cannot leave the chain: the numbers of its neighbours differ by more than 4",
@@ -75,18 +79,22 @@ error_texts!(DepartureRefusal {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Leaving {
     requested: bool,
-    /// Remaining endurance, s; `None` if unknown.
-    endurance_s: Option<u16>,
+    /// Time at which the drone's endurance ends; `None` if unknown.
+    lasts_until: Option<Instant>,
     /// Time at which this relay went outside of the chain; `None` inside.
     outside_since: Option<Instant>,
+    /// True for each side at which the chain ended with this relay when it went outside.
+    ended: [bool; 2],
+    /// True for each side whose neighbour has selected the relay beyond this one.
+    passed: [bool; 2],
     spare: bool,
     free: bool,
     /// Time of the first order to leave since the request; `None` before.
     ordered_at: Option<Instant>,
     /// Last reported position of the drone; `None` before any.
     place: Option<Placement>,
-    /// Current setpoint; `None` before the first agreement, and while it moves to a new position.
-    setpoint: Option<Placement>,
+    /// Position to arrive at; `None` before the first agreement, and while the setpoint moves to a new position.
+    goal: Option<Placement>,
     /// Spare that was received last, and when.
     heard_spare: Option<(u16, Instant)>,
     /// Relay outside of the chain, on this side, that has to be told when it may leave.
@@ -107,18 +115,24 @@ impl Leaving {
         self.place = Some(place);
     }
 
-    pub(crate) const fn record_setpoint(&mut self, setpoint: Option<Placement>) {
-        self.setpoint = setpoint;
+    pub(crate) const fn record_goal(&mut self, goal: Option<Placement>) {
+        self.goal = goal;
     }
 
-    /// Returns true if the drone has arrived at the setpoint, as far as its position is known.
+    /// Records the adoption of a view: an order of the view before has ended.
+    pub(crate) const fn end_order(&mut self) {
+        self.ordered_at = None;
+        self.passed = [false; 2];
+    }
+
+    /// Returns true if the drone has arrived at its agreed position, as far as its own position is known.
     fn is_in_place(&self) -> bool {
-        self.setpoint.is_some_and(|setpoint| {
+        self.goal.is_some_and(|goal| {
             self.place.is_none_or(|place| {
                 let off_m = [
-                    place.x_m - setpoint.x_m,
-                    place.y_m - setpoint.y_m,
-                    place.altitude_m - setpoint.altitude_m,
+                    place.x_m - goal.x_m,
+                    place.y_m - goal.y_m,
+                    place.altitude_m - goal.altitude_m,
                 ];
                 off_m.iter().all(|off_m| off_m.abs() <= IN_PLACE_M)
             })
@@ -148,6 +162,8 @@ impl Layers {
         let ordered_for = self.leaving.ordered_at.map(|at| now.since(at));
         if settings.wiring == Wiring::Pair {
             Some(DepartureRefusal::Wires)
+        } else if settings.guard.is_none() && !settings.leave_without_guard {
+            Some(DepartureRefusal::Guard)
         } else if relays < 2 || settings.quorum && weight <= relays {
             Some(DepartureRefusal::Quorum)
         } else if before != 0 && after.saturating_sub(before) > CANDIDATES {
@@ -164,20 +180,18 @@ impl Layers {
     pub(super) fn requests(&self, now: Instant, member: &Member) -> Requests {
         let Leaving {
             requested,
-            endurance_s,
+            lasts_until,
             heard_spare,
             ..
         } = self.leaving;
+        // 0 is the mark of the relay that has the order to leave.
+        let endurance_s = lasts_until.map_or(u16::MAX, |at| (tenths(at.since(now)) / 10).max(1));
         let leaves = requested && self.departure_refusal(now, member).is_none();
         let ordered = self.lease.orders().leaver == member.node;
         let known = heard_spare.filter(|(_, at)| now.since(*at) < member.settings.dead_after);
         Requests {
             leaver: if leaves { member.node } else { 0 },
-            endurance_s: if ordered || !leaves {
-                0
-            } else {
-                endurance_s.unwrap_or(u16::MAX)
-            },
+            endurance_s: if ordered || !leaves { 0 } else { endurance_s },
             spare: known.map_or(0, |(node, _)| node),
             in_place: self.leaving.is_in_place(),
         }
@@ -186,16 +200,29 @@ impl Layers {
 
 impl Node {
     /// Requests to leave the chain. `endurance_s` is the remaining endurance of the drone, s; `None` if unknown. A relay that
-    /// has not taken part in anything since its start becomes a spare.
+    /// has not taken part in anything since its start goes outside at once.
     pub(crate) fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
         let leaving = &mut self.layers.leaving;
-        leaving.endurance_s = endurance_s;
-        if leaving.requested {
+        leaving.lasts_until =
+            endurance_s.map(|left_s| now + Duration::from_millis(1_000).times(left_s.into()));
+        if leaving.requested && !leaving.spare {
             return;
         }
         leaving.requested = true;
-        leaving.ordered_at = None;
-        if self.searches() && self.layers.round.is_fresh() {
+        leaving.spare = false;
+        leaving.end_order();
+        let refused = self.layers.departure_refusal(now, &self.member).is_some();
+        if !refused && self.layers.round.is_fresh() && !self.layers.leaving.is_outside() {
+            self.go_outside(now, false);
+        }
+    }
+
+    /// Makes this relay a spare outside of the chain. No effect if it has taken part in anything since its start, leads,
+    /// has requested to leave, or has two wires.
+    pub(crate) fn wait_as_spare(&mut self, now: Instant) {
+        let leaving = &self.layers.leaving;
+        let may = self.searches() && self.layers.round.is_fresh() && !leaving.requested;
+        if may && !leaving.is_outside() {
             self.go_outside(now, true);
         }
     }
@@ -220,6 +247,13 @@ impl Node {
 
     /// Leaves the view: this relay has no neighbours, and no relay selects it. It keeps its setpoint.
     fn go_outside(&mut self, now: Instant, spare: bool) {
+        // A relay that has just started knows no neighbours: it counts as an end only if there is no number beyond.
+        let ends = [self.member.node == 1, self.member.node == self.member.all];
+        let fresh = self.layers.round.is_fresh();
+        self.layers.leaving.ended = [0, 1].map(|at: usize| {
+            let known = self.layers.neighbours.nodes().get(at).copied().flatten();
+            known.is_none() && (!fresh || ends.get(at).copied().unwrap_or(false))
+        });
         self.become_active(now);
         self.layers.view.request.stop();
         for side in [Side::Upstream, Side::Downstream] {
@@ -238,7 +272,7 @@ impl Node {
         }
         leaving.spare = false;
         leaving.free = false;
-        leaving.ordered_at = None;
+        leaving.end_order();
         for side in [Side::Upstream, Side::Downstream] {
             self.layers.neighbours.at_mut(side).give_up(now, false);
         }
@@ -249,7 +283,8 @@ impl Node {
         }
     }
 
-    /// Returns this relay to the chain if it is outside and could not become free for too long.
+    /// Returns this relay to the chain if it is outside and could not become free for too long. Without a later view
+    /// the relay is still needed.
     pub(super) fn return_if_expired(&mut self, now: Instant) {
         let Leaving {
             outside_since,
@@ -257,7 +292,12 @@ impl Node {
             free,
             ..
         } = self.layers.leaving;
-        let most = longest_lease(&self.member.settings);
+        let settings = &self.member.settings;
+        let most = if self.layers.view.latest_view() > self.member.view {
+            longest_lease(settings).times(2)
+        } else {
+            settings.dead_after
+        };
         if !spare && !free && outside_since.is_some_and(|at| now.since(at) >= most) {
             self.come_back(now);
         }
@@ -274,8 +314,13 @@ impl Node {
     /// relays are in place.
     pub(super) fn frees(&self, side: Side, to: u16) -> bool {
         let lease = &self.layers.lease;
-        let complete = lease.is_whole() && lease.orders().in_place;
+        let complete = lease.is_whole() && lease.until().is_some() && lease.orders().in_place;
         complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
+    }
+
+    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away.
+    pub(super) fn on_freed(&mut self, side: Side, to: u16) {
+        self.raise_node_event(NodeEvent::MayLeaveTold, side, to);
     }
 
     /// Returns true if node `to` at `side`, outside of the chain, is called to join it.
@@ -291,6 +336,8 @@ impl Node {
             let at = self.layers.leaving.ordered_at;
             let at = at.filter(|at| now.since(*at) < blocked);
             self.layers.leaving.ordered_at = Some(at.unwrap_or(now));
+        } else if orders.leaver != 0 {
+            self.layers.leaving.end_order();
         }
         if orders.in_place
             && let Some((side, node)) = self.layers.leaving.waiting.take()
@@ -343,12 +390,21 @@ impl Node {
                 .neighbours
                 .at_mut(side)
                 .record_unselected(now, &settings);
+            let later = hello.latest_view > self.member.view;
             let leaving = &mut self.layers.leaving;
-            if hello.outside && !hello.fresh && !leaving.spare && !leaving.free {
+            let [up, down] = leaving.ended;
+            // The chain goes on beyond this relay as it did before.
+            let goes_on = match (side, hello.neighbour) {
+                (Side::Upstream, 0) => down,
+                (Side::Upstream, beyond) => beyond > own,
+                (Side::Downstream, 0) => up,
+                (Side::Downstream, beyond) => beyond < own,
+            };
+            let told = hello.outside && !hello.fresh && later && goes_on;
+            if told && !leaving.spare && !leaving.free {
                 leaving.free = true;
                 self.raise(Event::MayLeave);
             } else if hello.ready && !hello.fresh && leaving.spare {
-                leaving.requested = false;
                 self.come_back(now);
             }
             return true;
@@ -372,8 +428,16 @@ impl Node {
         {
             *at = now;
         }
-        let ordered = self.layers.lease.orders().leaver == own && self.layers.leaving.requested;
-        if is_neighbour && ordered && hello.neighbour != own {
+        let ordered = self.layers.lease.orders().leaver == own && leaving.requested;
+        if is_neighbour && let Some(passed) = leaving.passed.get_mut(side as usize) {
+            *passed = hello.neighbour != own;
+        }
+        let passed = leaving.passed;
+        let is_passed = [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .zip(passed)
+            .all(|(side, passed)| passed || self.layers.neighbours.at(side).has_no_peer());
+        if is_neighbour && ordered && is_passed && !self.layers.view.has_no_quorum() {
             self.go_outside(now, false);
             return true;
         }

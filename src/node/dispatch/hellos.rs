@@ -50,7 +50,11 @@ impl Node {
                     } else {
                         self.is_between(now, side, to) || self.calls(side, to)
                     };
-                    let outside = hello.outside || self.frees(side, to);
+                    let frees = !hello.outside && self.frees(side, to);
+                    if frees {
+                        self.on_freed(side, to);
+                    }
+                    let outside = hello.outside || frees;
                     let hello = Hello {
                         ready,
                         outside,

@@ -45,6 +45,7 @@ use departure::Leaving;
 
 mod adoption;
 mod claims;
+#[cfg_attr(not(feature = "departures"), path = "no_departure.rs")]
 pub(crate) mod departure;
 mod hellos;
 mod incoming;
@@ -326,7 +327,8 @@ impl Node {
     /// change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
-        let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
+        let is_in = !self.is_passive() && !self.layers.leaving.is_outside();
+        let may = leads && !self.layers.view.has_no_quorum() && is_in;
         if may && self.layers.view.outstanding().is_none() {
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.round.restart(&context);

@@ -14,7 +14,13 @@ impl Node {
     fn wanted_place(&self) -> Option<Placement> {
         let agreed = self.layers.round.agreed_place()?;
         Some(if self.layers.view.has_no_quorum() {
-            self.member.settings.without_quorum.place(agreed)
+            let place = self.member.settings.without_quorum.place(agreed);
+            if place == agreed {
+                // A motion to the agreed position stops.
+                self.steering.stopped().unwrap_or(place)
+            } else {
+                place
+            }
         } else {
             agreed
         })
@@ -30,9 +36,17 @@ impl Node {
         if self.steering.steer(now, wanted, span) {
             self.raise(Event::SetpointChanged);
         }
-        let setpoint = self.steering.setpoint(wanted);
-        let arrives = setpoint.filter(|_| !self.steering.is_moving());
-        self.layers.leaving.record_setpoint(arrives);
+        // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
+        let is_held = [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .any(|side| self.steering.hold_reason(side) == Some(HoldReason::Lost));
+        let goal = if is_held {
+            self.steering.setpoint(wanted)
+        } else {
+            self.layers.round.agreed_place()
+        };
+        let goal = goal.filter(|_| !self.steering.is_moving());
+        self.layers.leaving.record_goal(goal);
     }
 
     pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {

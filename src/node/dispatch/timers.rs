@@ -34,7 +34,10 @@ impl Node {
                 self.on_neighbour_timeout(now, side);
             }
         }
-        if self.awaits_first() && self.is_solving(now) {
+        if self.layers.leaving.is_outside() {
+            // A relay outside has no vote: an upload or the end of a computation must not make it propose.
+            self.layers.view.request.stop();
+        } else if self.awaits_first() && self.is_solving(now) {
             if self.layers.view.request.is_due(now) {
                 self.await_first(now);
             }

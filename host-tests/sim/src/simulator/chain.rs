@@ -407,7 +407,7 @@ fn switched_on(
     };
     let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
     if setup.spares.contains(&index) {
-        relay.leave(now, None);
+        relay.wait_as_spare(now);
     }
     if let Some(upload) = stored {
         let resumed = relay.resume(upload);

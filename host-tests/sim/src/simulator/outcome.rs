@@ -85,6 +85,8 @@ pub enum TimelineEvent {
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
+    /// The relay has told another one, outside of the chain, that its drone may fly away.
+    MayLeaveTold,
 }
 
 /// Entry in the log of a run: an event at one node.

@@ -405,6 +405,7 @@ impl Chain {
                     self.pending_planned += 1;
                     (TimelineEvent::MayLeave, None)
                 }
+                Event::MayLeaveTold { node, .. } => (TimelineEvent::MayLeaveTold, Some(node)),
                 Event::SensorOff { node } => (TimelineEvent::SensorOff, Some(node)),
                 Event::LeaseLapsed => (TimelineEvent::LeaseLapsed, None),
                 Event::Converged => {

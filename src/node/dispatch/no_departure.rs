@@ -1,0 +1,74 @@
+//! Departures in a build without the feature `departures`.
+//!
+//! This relay hands on the requests and orders of the others, and selects no node outside of the chain.
+
+#![expect(
+    clippy::unused_self,
+    reason = "the same interface as that of `departure`"
+)]
+
+use super::{Layers, Node};
+use crate::node::context::Member;
+use crate::place::Placement;
+use crate::side::Side;
+use crate::time::Instant;
+use crate::wire::message::{Hello, Requests};
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Leaving;
+
+impl Leaving {
+    pub(crate) const fn is_outside(self) -> bool {
+        false
+    }
+
+    pub(crate) const fn is_spare(self) -> bool {
+        false
+    }
+
+    pub(crate) const fn record_place(self, _: Placement) {}
+
+    pub(crate) const fn record_goal(self, _: Option<Placement>) {}
+
+    pub(crate) const fn end_order(self) {}
+}
+
+impl Layers {
+    pub(super) const fn requests(&self, _: Instant, _: &Member) -> Requests {
+        Requests {
+            in_place: true,
+            ..Requests::NONE
+        }
+    }
+}
+
+impl Node {
+    pub(super) const fn return_if_expired(&self, _: Instant) {}
+
+    pub(super) const fn frees(&self, _: Side, _: u16) -> bool {
+        false
+    }
+
+    pub(super) const fn on_freed(&self, _: Side, _: u16) {}
+
+    pub(super) const fn calls(&self, _: Side, _: u16) -> bool {
+        false
+    }
+
+    pub(super) const fn follow_orders(&self, _: Instant) {}
+
+    pub(super) fn on_departure(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        hello: &Hello,
+    ) -> bool {
+        let is_outside = hello.outside && hello.fresh;
+        if is_outside && self.layers.neighbours.at(side).node() == from {
+            self.layers.neighbours.at_mut(side).give_up(now, false);
+            self.steering.set_neighbour(side, None);
+        }
+        is_outside
+    }
+}
