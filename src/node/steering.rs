@@ -251,3 +251,36 @@ impl Steering {
         earliest(self.remind_at, self.motion.map(|motion| motion.at))
     }
 }
+
+#[cfg(all(test, feature = "departures"))]
+mod tests {
+    use super::Steering;
+    use crate::place::Placement;
+    use crate::time::{Duration, Instant};
+
+    fn at_ms(ms: u64) -> Instant {
+        Instant::ZERO + Duration::from_millis(ms)
+    }
+
+    /// Checks that agreements that come faster than the motion's duration do not put off its end.
+    #[test]
+    fn frequent_agreements_do_not_put_off_the_arrival() {
+        let span = Duration::from_millis(20_000);
+        let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
+        let mut steering = Steering::NONE;
+        steering.steer(at_ms(0), place(0.0), span);
+        let mut reached_m = 0.0;
+        for step in 0..21 {
+            // Every second another agreement, a little farther.
+            let agreed = place(100.0 + step as f32 / 10.0);
+            steering.steer(at_ms(1_000 * step), agreed, span);
+            let x_m = steering.setpoint(agreed).unwrap().x_m;
+            assert!(
+                x_m >= reached_m && x_m <= reached_m + 10.0,
+                "{x_m} after {reached_m}"
+            );
+            reached_m = x_m;
+        }
+        assert!(!steering.is_moving() && reached_m >= 102.0, "{reached_m}");
+    }
+}

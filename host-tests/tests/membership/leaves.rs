@@ -4,11 +4,13 @@ use chacha20::ChaCha8Rng;
 use host_tests::flights::end_at;
 use host_tests::placing::{places, solve};
 use rand::{RngExt, SeedableRng};
+use uav_relay::Method;
 use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::random::{self, Chain, Style};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Place, sir};
 use uav_relay_sim::simulator::drones::{FlightSpec, Point, point};
+use uav_relay_sim::simulator::faults::OneWayFailure;
 
 use super::*;
 
@@ -108,6 +110,134 @@ fn a_relay_at_a_wide_gap_is_refused() {
     let outcome = run(setup.clone()).unwrap();
     judge(&setup, &outcome, &without(&[4, 5, 6])).unwrap();
     assert_eq!(freed(&outcome, 3), None);
+}
+
+/// Checks that no relay leaves without a guard, unless the settings allow it.
+#[test]
+fn without_a_guard_a_relay_is_refused() {
+    let mut setup = departing(8, &[(3, None)]);
+    setup.settings.leave_without_guard = false;
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, &ALL).unwrap();
+    assert_eq!(freed(&outcome, 3), None);
+}
+
+/// Checks that relays without any endurance left leave one at a time, too.
+#[test]
+fn relays_without_endurance_leave_one_at_a_time() {
+    let mut setup = departing(8, &[(5, Some(0))]);
+    for (relay, after_s) in [(4, 2), (3, 4), (6, 6)] {
+        setup.leaves.push((relay, seconds(AT_S + after_s), Some(0)));
+    }
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, &[1, 2, 7, 8]).unwrap();
+    let mut order = [5, 3, 4, 6].map(|relay| freed(&outcome, relay).unwrap());
+    println!("{order:?}");
+    order.sort_by(f64::total_cmp);
+    assert!(
+        order.windows(2).all(|pair| pair[0] + 10.0 < pair[1]),
+        "{order:?}"
+    );
+    assert!(!outcome.moments.iter().any(|moment| is_loss(moment.what)));
+}
+
+/// Checks that a relay is not freed if its two neighbours lose each other at any time before: it is their only bridge.
+#[test]
+fn a_relay_stays_if_its_neighbours_lose_each_other() {
+    let mut stayed = 0;
+    for tenths in (0..300).step_by(5) {
+        let mut setup = departing(8, &[(6, None)]);
+        setup.radio_reach = 2;
+        let from = Instant::from_millis(1_000 * AT_S + 100 * tenths);
+        for (by, of) in [(5, 7), (7, 5)] {
+            setup.deaf.push(OneWayFailure {
+                by,
+                of,
+                from,
+                until: None,
+            });
+        }
+        let outcome = run(setup.clone()).unwrap();
+        let cut = tenths as f64 / 10.0;
+        // The news of a cut takes as long as a lost neighbour.
+        match freed(&outcome, 6) {
+            Some(free) => assert!(free < cut + 15.0, "cut after {cut} s, free after {free} s"),
+            None => {
+                stayed += 1;
+                judge(&setup, &outcome, &ALL).unwrap_or_else(|what| panic!("{cut} s: {what}"));
+            }
+        }
+    }
+    println!("the relay stays in {stayed} of 60 runs");
+    assert!(stayed > 10, "{stayed}");
+}
+
+/// Checks that a relay that restarts and asks to leave is no spare: it may leave, and is not called.
+#[test]
+fn a_relay_that_restarts_and_leaves_is_no_spare() {
+    let mut setup = departing(8, &[(3, None)]);
+    setup.kills = vec![(6, seconds(AT_S - 5))];
+    setup.boots = vec![(6, seconds(AT_S - 3))];
+    setup
+        .leaves
+        .push((6, Instant::from_millis(1_000 * (AT_S - 3) + 1), Some(60)));
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, &without(&[3, 6])).unwrap();
+    let accepted = |what| matches!(what, TimelineEvent::ViewAccepted { .. });
+    println!("free {:?}", [3, 6].map(|relay| freed(&outcome, relay)));
+    assert!(freed(&outcome, 3).is_some() && freed(&outcome, 6).is_some());
+    let since = AT_S as f64 - 3.0;
+    assert!(times(&outcome, 6, accepted).iter().all(|at| *at < since));
+}
+
+/// Checks that a relay outside of the chain proposes no view, by the joint method and without the quorum rule.
+#[test]
+fn a_spare_by_the_joint_method_proposes_nothing() {
+    for quorum in [true, false] {
+        let mut setup = departing(6, &[(4, None)]);
+        setup.leaves[0].1 = seconds(120);
+        setup.settings.method = Method::Joint;
+        setup.settings.quorum = quorum;
+        setup.spares = vec![3];
+        let outcome = run(setup.clone()).unwrap();
+        judge(&setup, &outcome, &[1, 2, 3, 5, 6]).unwrap();
+        let acts = |what| {
+            matches!(
+                what,
+                TimelineEvent::ViewAccepted { .. } | TimelineEvent::NoQuorum
+            )
+        };
+        assert!(
+            times(&outcome, 3, acts).iter().all(|at| *at > 120.0),
+            "{quorum}"
+        );
+        assert!(times(&outcome, 4, |what| what == TimelineEvent::MayLeave).len() == 1);
+    }
+}
+
+/// Checks that a relay may leave although no drone stays within the tolerance of its place.
+#[test]
+fn a_relay_leaves_drones_that_never_arrive() {
+    let mut setup = departing(8, &[(4, None)]);
+    let (mission, _) = of_link(&Link::paper(8), 1e-4).unwrap();
+    let target = solve(&mission, &[]).unwrap().target;
+    let start: Vec<Point> = places(&mission, &[], target)
+        .into_iter()
+        .map(point)
+        .collect();
+    setup.flight = Some(FlightSpec::multicopters(start, 0.0, 8.0));
+    let outcome = run(setup.clone()).unwrap();
+    println!("free after {:?} s", freed(&outcome, 4));
+    assert!(freed(&outcome, 4).is_some());
+    let views = times(&outcome, 5, |what| {
+        matches!(what, TimelineEvent::ViewAccepted { .. })
+    });
+    assert!(
+        views.iter().filter(|at| **at > AT_S as f64).count() <= 1,
+        "{views:?}"
+    );
+    let told = |relay| times(&outcome, relay, |what| what == TimelineEvent::MayLeaveTold).len();
+    assert!(told(3) + told(5) > 0);
 }
 
 /// Checks departures that are cancelled at any time, and those of relays that die at any time.

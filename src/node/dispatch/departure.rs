@@ -102,6 +102,10 @@ pub(crate) struct Leaving {
 }
 
 impl Leaving {
+    pub(crate) fn new() -> Self {
+        Self::default()
+    }
+
     pub(crate) const fn is_outside(&self) -> bool {
         self.outside_since.is_some()
     }

@@ -110,7 +110,7 @@ impl Node {
                 lease: Lease::new(!seed.rotate_left(16), now, settings),
                 update: MissionUpdate::new(&member, seed.rotate_left(4), now),
                 round: Round::new(leads, number, profile, settings, seed, now),
-                leaving: Leaving::default(),
+                leaving: Leaving::new(),
             },
             steering: Steering::NONE,
             reporting: Reporting::default(),

@@ -14,10 +14,14 @@ use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::message::{Hello, Requests};
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Leaving;
 
 impl Leaving {
+    pub(crate) const fn new() -> Self {
+        Self
+    }
+
     pub(crate) const fn is_outside(self) -> bool {
         false
     }
