@@ -8,7 +8,6 @@ use crate::side::Heading;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
 use crate::wire::digest::{MissionId, digest};
-use crate::wire::message::Requests;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
@@ -75,8 +74,6 @@ pub(crate) struct Context<'a> {
     pub(crate) end: bool,
     /// Remaining leases of other relays, which delay the use of a new view's positions.
     pub(crate) other_leases: OtherLeases,
-    /// Requests of this relay to the leader: departure, spare, arrival at its position.
-    pub(crate) requests: Requests,
 }
 
 impl<'a> Context<'a> {

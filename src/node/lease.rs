@@ -90,11 +90,19 @@ pub(crate) struct Lease {
     orders: Orders,
     /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
     requests: Option<Requests>,
-    /// Number of relays of the view when no relay requested to leave; known at the leader.
+    /// What this relay requests, and what it knows of departures as the leader. Empty without the feature `departures`.
+    departures: [Departures; cfg!(feature = "departures") as usize],
+}
+
+/// Requests of this relay, and its knowledge of departures as the leader.
+#[derive(Clone, Copy, Debug)]
+struct Departures {
+    requests: Requests,
+    /// Number of relays of the view when no relay requested to leave.
     complement: u16,
-    /// Relay that requests to leave, 0 for none, and the time since which it does; known at the leader, over all views.
+    /// Relay that requests to leave, 0 for none, and the time since which it does, over all views.
     leaver: (u16, Instant),
-    /// Time of the first renewal of this view at the leader: all relays then had new positions.
+    /// Time of the first renewal of this view: all relays then had new positions.
     settled_at: Instant,
 }
 
@@ -119,9 +127,19 @@ impl Lease {
             circulation: Circulation::new(seed),
             orders: Orders::NONE,
             requests: None,
-            complement: 0,
-            leaver: (0, now),
-            settled_at: now,
+            departures: [Departures {
+                requests: Requests::NONE,
+                complement: 0,
+                leaver: (0, now),
+                settled_at: now,
+            }; cfg!(feature = "departures") as usize],
+        }
+    }
+
+    /// Sets the requests of this relay to the leader: departure, spare, arrival at its position.
+    pub(crate) fn set_requests(&mut self, requests: Requests) {
+        if let Some(departures) = self.departures.first_mut() {
+            departures.requests = requests;
         }
     }
 
@@ -142,23 +160,23 @@ impl Lease {
     /// arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than that duration,
     /// or than its remaining endurance: so half of the endurance remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
-        let Some(requests) = self.requests.filter(|_| cfg!(feature = "departures")) else {
+        let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
         };
         let (now, most) = (context.now, longest_lease(context.settings()));
         let relays = context.mission().relays();
-        let in_place = requests.in_place || now.since(self.settled_at).times(2) >= most;
+        let in_place = requests.in_place || now.since(known.settled_at).times(2) >= most;
         let mut orders = Orders {
             in_place,
             ..Orders::NONE
         };
-        if requests.leaver == 0 || self.complement == 0 {
-            self.complement = relays;
+        if requests.leaver == 0 || known.complement == 0 {
+            known.complement = relays;
         }
-        if requests.leaver != self.leaver.0 {
-            self.leaver = (requests.leaver, now);
+        if requests.leaver != known.leaver.0 {
+            known.leaver = (requests.leaver, now);
         }
-        let waited = now.since(self.leaver.1);
+        let waited = now.since(known.leaver.1);
         let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
         let late = waited >= most || waited >= left;
         // A spare that was called is silent while it joins.
@@ -167,7 +185,7 @@ impl Lease {
         } else {
             requests.spare
         };
-        if requests.leaver != 0 && spare != 0 && relays <= self.complement && !late {
+        if requests.leaver != 0 && spare != 0 && relays <= known.complement && !late {
             orders.joiner = spare;
         } else if in_place && self.orders.in_place || late {
             orders.leaver = requests.leaver;
@@ -270,7 +288,9 @@ impl Lease {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
             self.next_at = Some(now + PAUSE);
-            self.settled_at = now;
+            if let Some(departures) = self.departures.first_mut() {
+                departures.settled_at = now;
+            }
         }
     }
 
@@ -347,15 +367,16 @@ impl Lease {
         else {
             return;
         };
-        let own = Requests {
-            in_place: context.requests.in_place && self.is_agreed,
-            ..context.requests
+        self.requests = match self.departures.first() {
+            None => received,
+            Some(Departures { requests, .. }) => {
+                let own = Requests {
+                    in_place: requests.in_place && self.is_agreed,
+                    ..*requests
+                };
+                Some(received.map_or(own, |received| received.merge(own)))
+            }
         };
-        self.requests = Some(match received {
-            Some(received) if cfg!(feature = "departures") => received.merge(own),
-            Some(received) => received,
-            None => own,
-        });
         self.vouched_until = self
             .vouched_until
             .max(context.now + from_tenths(current.span));

@@ -22,11 +22,8 @@ pub(crate) struct Steering {
     remind_at: Option<Instant>,
     /// Setpoint last reported to the firmware; `None` if there was no setpoint.
     reported_setpoint: Option<Placement>,
-    /// Agreed position of the last call, and the place to fly to now, which moves there in steps.
-    agreed: Option<Placement>,
-    wanted: Option<Placement>,
-    /// Motion to the agreed position; `None` at the position.
-    motion: Option<Motion>,
+    /// Way to a new agreed position in steps. Empty without the feature `departures`.
+    way: [Way; RESPACING as usize],
 }
 
 /// Number of steps of a motion to a new agreed position, as a power of two.
@@ -44,15 +41,95 @@ struct Motion {
     at: Instant,
 }
 
+/// Way to a new agreed position, so that all relays of a chain arrive at the same time.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    /// Agreed position of the last call, and the place to fly to now, which moves there in steps.
+    agreed: Option<Placement>,
+    wanted: Option<Placement>,
+    /// Motion to the agreed position; `None` at the position.
+    motion: Option<Motion>,
+}
+
+impl Way {
+    const NONE: Self = Self {
+        agreed: None,
+        wanted: None,
+        motion: None,
+    };
+
+    /// Moves the place to fly to by the steps that are due on the way to the position `agreed`. Returns it.
+    fn advance(
+        &mut self,
+        now: Instant,
+        agreed: Option<Placement>,
+        span: Duration,
+    ) -> Option<Placement> {
+        self.step(now);
+        if agreed == self.agreed {
+            return self.wanted;
+        }
+        self.agreed = agreed;
+        // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
+        let left = self.motion.map(|it| (it.since + it.span).since(now));
+        let span = left.map_or(span, |left| left.min(span));
+        self.motion = self
+            .wanted
+            .filter(|_| agreed.is_some() && span > Duration::from_micros(0))
+            .map(|from| Motion {
+                from,
+                since: now,
+                span,
+                at: now,
+            });
+        if self.motion.is_none() {
+            self.wanted = agreed;
+        }
+        self.step(now);
+        self.wanted
+    }
+
+    /// Moves the place to fly to by the steps of the current motion that are due.
+    fn step(&mut self, now: Instant) {
+        let (Some(motion), Some(to)) = (&mut self.motion, self.agreed) else {
+            return;
+        };
+        let Motion {
+            from,
+            since,
+            span,
+            at,
+        } = motion;
+        let steps =
+            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(*span).max(1));
+        let Some(part) = u8::try_from(steps)
+            .ok()
+            .filter(|steps| *steps >> STEPS == 0)
+        else {
+            self.motion = None;
+            self.wanted = Some(to);
+            return;
+        };
+        if *at <= now {
+            *at = now + Duration::from_micros((span.as_micros() >> STEPS).max(1));
+        }
+        let part = f32::from(part) / 32.0;
+        let between = |from: f32, to: f32| from + (to - from) * part;
+        self.wanted = Some(Placement {
+            x_m: between(from.x_m, to.x_m),
+            y_m: between(from.y_m, to.y_m),
+            altitude_m: between(from.altitude_m, to.altitude_m),
+        });
+    }
+}
+
 impl Steering {
     /// State before [`begin`](Self::begin): no guard, and no setpoint.
     pub(crate) const NONE: Self = Self {
         guard: None,
         remind_at: None,
         reported_setpoint: None,
-        agreed: None,
-        wanted: None,
-        motion: None,
+        way: [Way::NONE; RESPACING as usize],
     };
 
     /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
@@ -80,8 +157,10 @@ impl Steering {
         agreed: Option<Placement>,
         span: Duration,
     ) -> bool {
-        self.advance(now, agreed, span);
-        let agreed = self.wanted;
+        let agreed = match self.way.first_mut() {
+            Some(way) => way.advance(now, agreed, span),
+            None => agreed,
+        };
         if let Some(agreed) = agreed
             && let Some(guard) = self.guard()
         {
@@ -100,68 +179,20 @@ impl Steering {
         changed
     }
 
-    /// Moves the place to fly to by the steps that are due on the way to the position `agreed`.
-    fn advance(&mut self, now: Instant, agreed: Option<Placement>, span: Duration) {
-        if agreed != self.agreed {
-            self.agreed = agreed;
-            // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
-            let left = self.motion.map(|it| (it.since + it.span).since(now));
-            let span = left.map_or(span, |left| left.min(span));
-            self.motion = self
-                .wanted
-                .filter(|_| RESPACING && agreed.is_some() && span > Duration::from_micros(0))
-                .map(|from| Motion {
-                    from,
-                    since: now,
-                    span,
-                    at: now,
-                });
-        }
-        self.wanted = agreed;
-        let (Some(motion), Some(to)) = (&mut self.motion, agreed) else {
-            return;
-        };
-        let Motion {
-            from,
-            since,
-            span,
-            at,
-        } = motion;
-        let steps =
-            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(*span).max(1));
-        let Some(part) = u8::try_from(steps)
-            .ok()
-            .filter(|steps| *steps >> STEPS == 0)
-        else {
-            self.motion = None;
-            return;
-        };
-        if *at <= now {
-            *at = now + Duration::from_micros((span.as_micros() >> STEPS).max(1));
-        }
-        let part = f32::from(part) / 32.0;
-        let between = |from: f32, to: f32| from + (to - from) * part;
-        self.wanted = Some(Placement {
-            x_m: between(from.x_m, to.x_m),
-            y_m: between(from.y_m, to.y_m),
-            altitude_m: between(from.altitude_m, to.altitude_m),
-        });
-    }
-
     /// Returns true while the setpoint moves to a new agreed position.
-    pub(crate) const fn is_moving(&self) -> bool {
-        RESPACING && self.motion.is_some()
+    pub(crate) fn is_moving(&self) -> bool {
+        matches!(&self.way[..], [way] if way.motion.is_some())
     }
 
     /// Returns the place to fly to if a motion to the agreed position stops now; `None` before the first agreement.
     pub(crate) fn stopped(&self) -> Option<Placement> {
-        self.wanted.filter(|_| RESPACING)
+        self.way.first()?.wanted
     }
 
     pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
         match &self.guard {
             Some(guard) if GUARD => guard.setpoint(),
-            _ if self.is_moving() => self.wanted,
+            _ if self.is_moving() => self.stopped(),
             _ => agreed,
         }
     }
@@ -248,7 +279,8 @@ impl Steering {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        earliest(self.remind_at, self.motion.map(|motion| motion.at))
+        let motion = self.way.first().and_then(|way| way.motion);
+        earliest(self.remind_at, motion.map(|motion| motion.at))
     }
 }
 
@@ -270,9 +302,10 @@ mod tests {
         let mut steering = Steering::NONE;
         steering.steer(at_ms(0), place(0.0), span);
         let mut reached_m = 0.0;
-        for step in 0..21 {
+        let mut agreed = None;
+        for step in 0..20 {
             // Every second another agreement, a little farther.
-            let agreed = place(100.0 + step as f32 / 10.0);
+            agreed = place(100.0 + step as f32 / 10.0);
             steering.steer(at_ms(1_000 * step), agreed, span);
             let x_m = steering.setpoint(agreed).unwrap().x_m;
             assert!(
@@ -281,6 +314,7 @@ mod tests {
             );
             reached_m = x_m;
         }
-        assert!(!steering.is_moving() && reached_m >= 102.0, "{reached_m}");
+        steering.steer(at_ms(20_000), agreed, span);
+        assert!(!steering.is_moving() && steering.setpoint(agreed) == agreed);
     }
 }

@@ -18,7 +18,7 @@ use crate::event::{Event, NodeEvent};
 use crate::node::context::{Member, longest_lease, tenths};
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::place::Placement;
-use crate::settings::Wiring;
+use crate::settings::{Settings, Wiring};
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
@@ -106,6 +106,11 @@ impl Leaving {
         Self::default()
     }
 
+    /// Returns the duration of the motion to a newly agreed position.
+    pub(crate) const fn respacing(settings: &Settings) -> Duration {
+        settings.respacing
+    }
+
     pub(crate) const fn is_outside(&self) -> bool {
         self.outside_since.is_some()
     }
@@ -179,9 +184,8 @@ impl Layers {
         }
     }
 
-    /// Returns the requests of this relay to the leader.
-    #[inline(never)] // called from many places
-    pub(super) fn requests(&self, now: Instant, member: &Member) -> Requests {
+    /// Updates the requests of this relay to the leader, for the next renewal.
+    pub(super) fn update_requests(&mut self, now: Instant, member: &Member) {
         let Leaving {
             requested,
             lasts_until,
@@ -193,12 +197,13 @@ impl Layers {
         let leaves = requested && self.departure_refusal(now, member).is_none();
         let ordered = self.lease.orders().leaver == member.node;
         let known = heard_spare.filter(|(_, at)| now.since(*at) < member.settings.dead_after);
-        Requests {
+        let requests = Requests {
             leaver: if leaves { member.node } else { 0 },
             endurance_s: if ordered || !leaves { 0 } else { endurance_s },
             spare: known.map_or(0, |(node, _)| node),
             in_place: self.leaving.is_in_place(),
-        }
+        };
+        self.lease.set_requests(requests);
     }
 }
 

@@ -248,7 +248,11 @@ impl Node {
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
-        let leaver = self.layers.lease.orders().leaver;
+        let leaver = if cfg!(feature = "departures") {
+            self.layers.lease.orders().leaver
+        } else {
+            0
+        };
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
         neighbour.record_unselected(now, settings);

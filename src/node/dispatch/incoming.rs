@@ -180,6 +180,7 @@ impl Node {
         if side != wanted {
             return bump(&mut self.telemetry.stats.misdirected);
         }
+        self.layers.update_requests(now, &self.member);
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
         let effects = match message {

@@ -358,7 +358,6 @@ impl Layers {
             latest: self.update.latest(),
             end: self.neighbours.at(onward).has_no_peer(),
             other_leases: self.lease.other_leases(now),
-            requests: self.requests(now, member),
         }
     }
 

@@ -10,9 +10,10 @@
 use super::{Layers, Node};
 use crate::node::context::Member;
 use crate::place::Placement;
+use crate::settings::Settings;
 use crate::side::Side;
-use crate::time::Instant;
-use crate::wire::message::{Hello, Requests};
+use crate::time::{Duration, Instant};
+use crate::wire::message::Hello;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Leaving;
@@ -20,6 +21,10 @@ pub(crate) struct Leaving;
 impl Leaving {
     pub(crate) const fn new() -> Self {
         Self
+    }
+
+    pub(crate) const fn respacing(_: &Settings) -> Duration {
+        Duration::from_micros(0)
     }
 
     pub(crate) const fn is_outside(self) -> bool {
@@ -38,12 +43,7 @@ impl Leaving {
 }
 
 impl Layers {
-    pub(super) const fn requests(&self, _: Instant, _: &Member) -> Requests {
-        Requests {
-            in_place: true,
-            ..Requests::NONE
-        }
-    }
+    pub(super) const fn update_requests(&self, _: Instant, _: &Member) {}
 }
 
 impl Node {

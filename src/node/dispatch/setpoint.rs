@@ -1,6 +1,7 @@
 //! Setpoint for the autopilot, and the reports of the drone that it depends on.
 
 use super::Node;
+use super::departure::Leaving;
 use crate::event::Event;
 use crate::guard::HoldReason;
 use crate::node::context::Member;
@@ -31,7 +32,7 @@ impl Node {
         let span = if self.layers.view.has_no_quorum() {
             Duration::from_micros(0)
         } else {
-            self.member.settings.respacing
+            Leaving::respacing(&self.member.settings)
         };
         if self.steering.steer(now, wanted, span) {
             self.raise(Event::SetpointChanged);

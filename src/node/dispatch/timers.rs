@@ -21,6 +21,7 @@ impl Node {
         let context = self.layers.context(now, &self.member);
         let effects = self.layers.round.handle_timeout(&context);
         self.apply(now, effects);
+        self.layers.update_requests(now, &self.member);
         let context = self.layers.context(now, &self.member);
         let effects = self.layers.lease.handle_timeout(&context);
         self.apply(now, effects);

@@ -15,7 +15,7 @@ use crate::sensing::Listen;
 use crate::settings::{Adjust, Method, Settings};
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Message, Requests};
+use crate::wire::message::Message;
 use std::vec::Vec;
 
 const RELAYS: u16 = 3;
@@ -64,7 +64,6 @@ impl Line {
                 view: ViewId::LOADED,
                 earlier_lease_left: None,
             },
-            requests: Requests::NONE,
         };
         call(&mut self.rounds[at], &context)
     }

@@ -40,7 +40,7 @@ use crate::settings::Settings;
 use crate::time::Instant;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
-use crate::wire::message::{Decision, Message, Poll, Proposal, Requests, Successor};
+use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
 /// Checks the view change for every order of events in a chain of `relays` relays. The numbers of link cuts,
 /// proposals and reboots are limited.
@@ -419,7 +419,6 @@ impl Check {
             latest: member.active,
             end: chain.after(at).is_none(),
             other_leases: OtherLeases::NONE,
-            requests: Requests::NONE,
         }
     }
 

@@ -11,7 +11,7 @@ use crate::settings::Settings;
 use crate::time::Instant;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
-use crate::wire::message::{Decision, Message, Poll, Proposal, Requests, Successor};
+use crate::wire::message::{Decision, Message, Poll, Proposal, Successor};
 
 pub(super) fn id(number: u32, node: u32) -> ViewId {
     ViewId::from_bits(number << 10 | node)
@@ -119,7 +119,6 @@ pub(super) fn context(member: &Member, latest: MissionId, end: bool, now: Instan
         latest,
         end,
         other_leases: OtherLeases::NONE,
-        requests: Requests::NONE,
     }
 }
 
