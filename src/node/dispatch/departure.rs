@@ -15,6 +15,7 @@
 
 use super::{Layers, Node};
 use crate::event::{Event, NodeEvent};
+use crate::guard::HoldReason;
 use crate::node::context::{Member, longest_lease, tenths};
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::place::Placement;
@@ -122,10 +123,6 @@ impl Leaving {
 
     pub(crate) const fn record_place(&mut self, place: Placement) {
         self.place = Some(place);
-    }
-
-    pub(crate) const fn record_goal(&mut self, goal: Option<Placement>) {
-        self.goal = goal;
     }
 
     /// Records the adoption of a view: an order of the view before has ended.
@@ -335,6 +332,20 @@ impl Node {
     /// Returns true if node `to` at `side`, outside of the chain, is called to join it.
     pub(super) fn calls(&self, side: Side, to: u16) -> bool {
         self.layers.lease.orders().joiner == to && self.is_beside(side, to)
+    }
+
+    /// Updates the position at which this relay counts as in place; `wanted` is the place to fly to.
+    pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
+        // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
+        let is_held = [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .any(|side| self.steering.hold_reason(side) == Some(HoldReason::Lost));
+        let goal = if is_held {
+            self.steering.setpoint(wanted)
+        } else {
+            self.layers.round.agreed_place()
+        };
+        self.layers.leaving.goal = goal.filter(|_| !self.steering.is_moving());
     }
 
     /// Follows the leader's orders in the last lease renewal.

@@ -37,8 +37,6 @@ impl Leaving {
 
     pub(crate) const fn record_place(self, _: Placement) {}
 
-    pub(crate) const fn record_goal(self, _: Option<Placement>) {}
-
     pub(crate) const fn end_order(self) {}
 }
 
@@ -59,20 +57,13 @@ impl Node {
         false
     }
 
+    pub(super) const fn update_goal(&self, _: Option<Placement>) {}
+
     pub(super) const fn follow_orders(&self, _: Instant) {}
 
-    pub(super) fn on_departure(
-        &mut self,
-        now: Instant,
-        side: Side,
-        from: u16,
-        hello: &Hello,
-    ) -> bool {
-        let is_outside = hello.outside && hello.fresh;
-        if is_outside && self.layers.neighbours.at(side).node() == from {
-            self.layers.neighbours.at_mut(side).give_up(now, false);
-            self.steering.set_neighbour(side, None);
-        }
-        is_outside
+    /// Returns true if node `from` is outside of the chain, and must not be selected. If it is the neighbour, its hello
+    /// ends the link as any hello of a neighbour that has not selected this relay.
+    pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
+        hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
     }
 }

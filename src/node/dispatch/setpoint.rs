@@ -37,17 +37,7 @@ impl Node {
         if self.steering.steer(now, wanted, span) {
             self.raise(Event::SetpointChanged);
         }
-        // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
-        let is_held = [Side::Upstream, Side::Downstream]
-            .into_iter()
-            .any(|side| self.steering.hold_reason(side) == Some(HoldReason::Lost));
-        let goal = if is_held {
-            self.steering.setpoint(wanted)
-        } else {
-            self.layers.round.agreed_place()
-        };
-        let goal = goal.filter(|_| !self.steering.is_moving());
-        self.layers.leaving.record_goal(goal);
+        self.update_goal(wanted);
     }
 
     pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {
