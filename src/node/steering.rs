@@ -279,8 +279,10 @@ impl Steering {
     }
 
     pub(crate) fn next_timeout(&self) -> Option<Instant> {
-        let motion = self.way.first().and_then(|way| way.motion);
-        earliest(self.remind_at, motion.map(|motion| motion.at))
+        match self.way.first() {
+            Some(way) => earliest(self.remind_at, way.motion.map(|motion| motion.at)),
+            None => self.remind_at,
+        }
     }
 }
 

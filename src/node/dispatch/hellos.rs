@@ -44,22 +44,16 @@ impl Node {
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
                     let offer_number = self.layers.update.next_offer_number(now, &self.member);
-                    let hello = self.hello(now, side, ask, offer_number);
-                    let ready = if hello.outside {
-                        self.layers.leaving.is_spare()
+                    let mut hello = self.hello(now, side, ask, offer_number);
+                    if hello.outside {
+                        hello.ready = self.layers.leaving.is_spare();
                     } else {
-                        self.is_between(now, side, to) || self.calls(side, to)
-                    };
-                    let frees = !hello.outside && self.frees(side, to);
-                    if frees {
-                        self.on_freed(side, to);
+                        hello.ready = self.is_between(now, side, to) || self.calls(side, to);
+                        hello.outside = self.frees(side, to);
+                        if hello.outside {
+                            self.on_freed(side, to);
+                        }
                     }
-                    let outside = hello.outside || frees;
-                    let hello = Hello {
-                        ready,
-                        outside,
-                        ..hello
-                    };
                     return Some((side, to, hello));
                 }
             }
