@@ -118,10 +118,10 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
-    /// This relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
     /// fly away.
     MayLeave,
-    /// This relay has told a node outside of the chain at `side` that its drone may fly away.
+    /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
     /// be repeated.

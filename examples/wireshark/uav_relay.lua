@@ -113,7 +113,7 @@ local messages = {
         { name = "agreed_relays", kind = "u16", unit = "", text = "number of relays of the agreed view" },
         { name = "votes", kind = "u16", unit = "", text = "number of members of the agreed view up to the sender" },
         { name = "lease_left_ds", kind = "u16", unit = "0.1 s", text = "remaining lease of the other members of the agreed view", per = 10, base = "s" },
-        { name = "earlier_lease_left_ds", kind = "u16", unit = "0.1 s", text = "time until positions may be used, because of leases of earlier views", per = 10, base = "s" },
+        { name = "earlier_lease_left_ds", kind = "u16", unit = "0.1 s", text = "time until positions may be used, for leases of earlier views", per = 10, base = "s" },
         { name = "proposer", kind = "bool", unit = "", text = "true if the proposer of the agreed view is one of the voters" },
         { name = "successor", kind = "option", of = { kind = "group", fields = {
             { name = "proposal", kind = "view", unit = "", text = "proposal by which the successor was decided" },
@@ -190,9 +190,9 @@ local messages = {
     [0x10] = { name = "Pulsed", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
-        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: it has reached the last relay, and the acknowledgement has come back from there; else the other fields have no meaning" },
+        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: the acknowledgement has come back from the last relay; else the other fields have no meaning" },
         { name = "leaver", kind = "u16", unit = "", text = "relay that requests to leave, or 0" },
-        { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of its drone; 65535 if unknown, 0 if it is the `leaver` of the Pulse" },
+        { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of its drone, at least 1; 65535 if unknown; 0 if it is the `leaver` of the Pulse" },
         { name = "spare", kind = "u16", unit = "", text = "relay outside that would join, or 0" },
         { name = "in_place", kind = "bool", unit = "", text = "true if the sender and all relays after it are in place" },
     } },

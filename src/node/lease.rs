@@ -90,7 +90,7 @@ pub(crate) struct Lease {
     orders: Orders,
     /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
     requests: Option<Requests>,
-    /// What this relay requests, and what it knows of departures as the leader. Empty without the feature `departures`.
+    /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
     departures: [Departures; cfg!(feature = "departures") as usize],
 }
 

@@ -32,7 +32,7 @@ const STEPS: u32 = 5;
 /// True with the feature `departures`; without it setpoints do not move in steps.
 const RESPACING: bool = cfg!(feature = "departures");
 
-/// Motion to a new agreed position: its first place, its start, its duration, and the time of its next step.
+/// Motion to a new agreed position: first place, start, duration, and time of the next step.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from: Placement,
@@ -184,7 +184,7 @@ impl Steering {
         matches!(&self.way[..], [way] if way.motion.is_some())
     }
 
-    /// Returns the place to fly to if a motion to the agreed position stops now; `None` before the first agreement.
+    /// Returns the place to fly to if the motion stops now; `None` before the first agreement.
     pub(crate) fn stopped(&self) -> Option<Placement> {
         self.way.first()?.wanted
     }

@@ -729,12 +729,11 @@ impl Relay {
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
-    /// use uav_relay::{Departure, DepartureRefusal, Instant, Settings};
+    /// use uav_relay::{Departure, Instant, Settings};
     ///
     /// let mut relay = relay(Settings::default());
     /// relay.leave(Instant::from_millis(1_000), Some(240));
-    /// let refused = Departure::Refused(DepartureRefusal::Wires);
-    /// assert_eq!(relay.departure(Instant::from_millis(1_000)), refused, "two wires per relay");
+    /// assert_eq!(relay.departure(Instant::from_millis(1_000)), Departure::NeedsChannel, "two wires per relay");
     /// ```
     #[cfg(feature = "departures")]
     pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
@@ -742,7 +741,7 @@ impl Relay {
         self.node.leave(now, endurance_s);
     }
 
-    /// Makes this relay a spare: it waits outside of the chain until the leader calls it to replace another relay.
+    /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
     ///
     /// Call it right after the start: it has no effect once the relay has taken part in anything. The first leader
     /// cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it has to wait at

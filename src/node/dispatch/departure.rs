@@ -41,40 +41,24 @@ pub enum Departure {
     Member,
     /// Departure requested: the relay holds its place until the leader's order.
     Requested,
-    /// Departure requested, but not possible now. The relay holds its place; the reason may pass.
-    Refused(DepartureRefusal),
-    /// Outside of the chain, as a spare that the leader may call.
-    Spare,
-    /// Outside of the chain: the others close up. The relay holds its place.
-    Outside,
-    /// Outside of the chain: the drone may fly away.
-    Free,
-}
-
-/// Reason why a relay cannot leave the chain now.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum DepartureRefusal {
     /// Departure refused: without a guard the neighbours fly close to the drone that still holds its place. See
     /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard).
-    Guard,
-    /// Departure refused: over two wires per relay the neighbours cannot receive each other.
-    Wires,
-    /// Departure refused: the remaining relays would have no quorum, or there are none.
-    Quorum,
-    /// Departure refused: the numbers of the two neighbours differ by more than four.
-    Gap,
+    NeedsGuard,
+    /// Departure refused: over two wires per relay the neighbours do not receive each other.
+    NeedsChannel,
+    /// Departure refused for now: the remaining relays would have no quorum, or there are none.
+    NeedsQuorum,
+    /// Departure refused for now: the numbers of the two neighbours differ by more than four.
+    WideGap,
     /// Departure refused for a minute: the two neighbours have not selected each other.
-    Neighbours,
+    Blocked,
+    /// Spare outside of the chain, which the leader may call.
+    Spare,
+    /// Relay outside of the chain: it holds its place, and the others close up.
+    Outside,
+    /// Relay outside of the chain: the drone may fly away.
+    Free,
 }
-
-error_texts!(DepartureRefusal {
-    Guard => "without a guard no relay leaves the chain, unless leave_without_guard is true: its neighbours fly close to it",
-    Wires => "a relay with two wires cannot leave the chain: its neighbours do not receive each other",
-    Quorum => "the relay cannot leave the chain: the remaining relays would have no quorum",
-    Gap => "the relay cannot leave the chain: the numbers of its neighbours differ by more than 4",
-    Neighbours => "the relay cannot leave the chain now: its neighbours have not selected each other",
-});
 
 /// Departure of this relay, and what it knows of spares.
 #[derive(Clone, Copy, Debug, Default)]
@@ -94,7 +78,7 @@ pub(crate) struct Leaving {
     ordered_at: Option<Instant>,
     /// Last reported position of the drone; `None` before any.
     place: Option<Placement>,
-    /// Position to arrive at; `None` before the first agreement, and while the setpoint moves to a new position.
+    /// Position to arrive at; `None` before the first agreement, and while the setpoint moves.
     goal: Option<Placement>,
     /// Spare that was received last, and when.
     heard_spare: Option<(u16, Instant)>,
@@ -148,7 +132,7 @@ impl Leaving {
 
 impl Layers {
     /// Returns the reason why this relay cannot leave the chain now; `None` if it can.
-    fn departure_refusal(&self, now: Instant, member: &Member) -> Option<DepartureRefusal> {
+    fn departure_refusal(&self, now: Instant, member: &Member) -> Option<Departure> {
         let Member {
             node,
             mission,
@@ -167,15 +151,15 @@ impl Layers {
         let blocked = settings.dead_after.times(BLOCKED_AFTER);
         let ordered_for = self.leaving.ordered_at.map(|at| now.since(at));
         if settings.wiring == Wiring::Pair {
-            Some(DepartureRefusal::Wires)
+            Some(Departure::NeedsChannel)
         } else if settings.guard.is_none() && !settings.leave_without_guard {
-            Some(DepartureRefusal::Guard)
+            Some(Departure::NeedsGuard)
         } else if relays < 2 || settings.quorum && weight <= relays {
-            Some(DepartureRefusal::Quorum)
+            Some(Departure::NeedsQuorum)
         } else if before != 0 && after.saturating_sub(before) > CANDIDATES {
-            Some(DepartureRefusal::Gap)
+            Some(Departure::WideGap)
         } else if ordered_for.is_some_and(|span| blocked <= span && span < blocked.times(2)) {
-            Some(DepartureRefusal::Neighbours)
+            Some(Departure::Blocked)
         } else {
             None
         }
@@ -246,7 +230,7 @@ impl Node {
             _ if leaving.spare => Departure::Spare,
             _ if leaving.is_outside() => Departure::Outside,
             _ if !leaving.requested => Departure::Member,
-            Some(refusal) => Departure::Refused(refusal),
+            Some(refused) => refused,
             None => Departure::Requested,
         }
     }

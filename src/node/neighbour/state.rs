@@ -366,7 +366,7 @@ impl Neighbour {
         }
     }
 
-    /// Gives up the neighbour, without a search if `ends` is true: the chain ends here, or this relay leaves it.
+    /// Gives up the neighbour. No search follows if `ends` is true: the chain ends here, or this relay leaves it.
     pub(crate) fn give_up(&mut self, now: Instant, ends: bool) {
         self.search(now);
         self.heartbeat = PendingHeartbeat::NONE;

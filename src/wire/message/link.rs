@@ -47,7 +47,7 @@ pub struct Hello {
     /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
     /// destination.
     pub refused: bool,
-    /// With `fresh`: the sender is outside of the chain, and no relay selects it. Else the destination is outside: a
+    /// True with `fresh` if the sender is outside of the chain: no relay selects it. True without it if the destination is outside: a
     /// view without it is agreed on, and the relays of that view are in place.
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
