@@ -368,7 +368,11 @@ impl Lease {
             return;
         };
         self.requests = match self.departures.first() {
-            None => received,
+            // The last relay of the chain starts with this.
+            None => received.or(Some(Requests {
+                in_place: true,
+                ..Requests::NONE
+            })),
             Some(Departures { requests, .. }) => {
                 let own = Requests {
                     in_place: requests.in_place && self.is_agreed,

@@ -314,7 +314,7 @@ impl Requests {
         leaver: 0,
         endurance_s: 0,
         spare: 0,
-        in_place: true,
+        in_place: false,
     };
 
     /// Returns the requests of two parts of the chain. The more urgent departure counts, and the spare of the lower
