@@ -125,20 +125,20 @@ fn without_a_guard_a_relay_is_refused() {
 /// Checks that relays without any endurance left leave one at a time, too.
 #[test]
 fn relays_without_endurance_leave_one_at_a_time() {
-    let mut setup = departing(8, &[(5, Some(0))]);
-    for (relay, after_s) in [(4, 2), (3, 4), (8, 6)] {
-        setup.leaves.push((relay, seconds(AT_S + after_s), Some(0)));
+    for tenths in 0..30 {
+        let mut setup = departing(8, &[(5, Some(0))]);
+        let second = Instant::from_millis(1_000 * AT_S + 100 * tenths);
+        setup.leaves.push((4, second, Some(0)));
+        setup.leaves.push((3, seconds(AT_S + 4), Some(0)));
+        let outcome = run(setup.clone()).unwrap();
+        judge(&setup, &outcome, &without(&[3, 4, 5])).unwrap();
+        let mut order = [3, 4, 5].map(|relay| freed(&outcome, relay).unwrap());
+        order.sort_by(f64::total_cmp);
+        let is_apart = order.windows(2).all(|pair| pair[0] + 10.0 < pair[1]);
+        assert!(is_apart, "{tenths} tenths: {order:?}");
+        let lost = outcome.moments.iter().find(|moment| is_loss(moment.what));
+        assert!(lost.is_none(), "{tenths} tenths: {lost:?}");
     }
-    let outcome = run(setup.clone()).unwrap();
-    judge(&setup, &outcome, &[1, 2, 6, 7]).unwrap();
-    let mut order = [5, 3, 4, 8].map(|relay| freed(&outcome, relay).unwrap());
-    println!("{order:?}");
-    order.sort_by(f64::total_cmp);
-    assert!(
-        order.windows(2).all(|pair| pair[0] + 10.0 < pair[1]),
-        "{order:?}"
-    );
-    assert!(!outcome.moments.iter().any(|moment| is_loss(moment.what)));
 }
 
 /// Checks that a relay is not freed if its two neighbours lose each other at any time before: it is their only bridge.
