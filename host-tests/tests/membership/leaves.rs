@@ -141,7 +141,7 @@ fn relays_without_endurance_leave_one_at_a_time() {
     }
 }
 
-/// Checks that a relay is not freed if its two neighbours lose each other at any time before: it is their only bridge.
+/// Checks that a relay is not freed if its neighbours lose each other: it is their only bridge.
 #[test]
 fn a_relay_stays_if_its_neighbours_lose_each_other() {
     let mut stayed = 0;
@@ -190,7 +190,7 @@ fn a_relay_that_restarts_and_leaves_is_no_spare() {
     assert!(times(&outcome, 6, accepted).iter().all(|at| *at < since));
 }
 
-/// Checks that a relay outside of the chain proposes no view, by the joint method and without the quorum rule.
+/// Checks that a spare proposes no view, by the joint method and without the quorum rule.
 #[test]
 fn a_spare_by_the_joint_method_proposes_nothing() {
     for quorum in [true, false] {
