@@ -118,6 +118,19 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
+    /// fly away.
+    MayLeave,
+    /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
+    ///
+    /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
+    /// be repeated.
+    MayLeaveTold {
+        /// Side of this relay on which the node is: toward Tx or toward Rx.
+        side: Side,
+        /// Index of the node whose drone may fly away.
+        node: u16,
+    },
 }
 
 /// Events that concern no node and that the firmware receives first, before those that concern a node. The other
@@ -149,6 +162,8 @@ const POLLED_LAST: &[Event] = &[
     Event::Adopted,
     Event::NewEstimate,
     Event::InterfererUnclear,
+    #[cfg(feature = "departures")]
+    Event::MayLeave,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.
@@ -165,6 +180,8 @@ pub(crate) enum NodeEvent {
     Index,
     /// Sensor fault: measurements of the node do not fit those of the other nodes.
     Sensor,
+    #[cfg(feature = "departures")]
+    MayLeaveTold,
 }
 
 impl NodeEvent {
@@ -177,6 +194,8 @@ impl NodeEvent {
         Self::Epoch,
         Self::Index,
         Self::Sensor,
+        #[cfg(feature = "departures")]
+        Self::MayLeaveTold,
     ];
 
     const fn event(self, side: Side, node: u16) -> Event {
@@ -189,6 +208,8 @@ impl NodeEvent {
             Self::Epoch => Event::EpochWentBack { node },
             Self::Index => Event::DuplicateIndex { node },
             Self::Sensor => Event::SensorOff { node },
+            #[cfg(feature = "departures")]
+            Self::MayLeaveTold => Event::MayLeaveTold { side, node },
         }
     }
 }
@@ -196,20 +217,20 @@ impl NodeEvent {
 /// Raised events that the firmware has not polled yet, with the nodes that they concern.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
-    events: u16,
+    events: u32,
     /// Raised events that concern a node at the upstream [0] and the downstream [1] side. Bit i stands for
     /// `NodeEvent::ALL[i]`.
-    kinds: [u8; 2],
-    nodes: [[u16; 8]; 2],
+    kinds: [u16; 2],
+    nodes: [[u16; NodeEvent::ALL.len()]; 2],
 }
 
 impl Pending {
     #[inline(never)] // a search, in every place where an event is raised
-    fn bit(event: Event) -> u16 {
+    fn bit(event: Event) -> u32 {
         POLLED_FIRST
             .iter()
             .chain(POLLED_LAST)
-            .zip(0..16)
+            .zip(0..32)
             .find(|(known, _)| **known == event)
             .map_or(0, |(_, bit)| 1 << bit)
     }
@@ -234,9 +255,9 @@ impl Pending {
         if let Some(opposite) = opposite
             && nodes.get(opposite as usize) == Some(&node)
         {
-            *bits &= !(1 << opposite as u8);
+            *bits &= !(1 << opposite as u16);
         }
-        *bits |= 1 << kind as u8;
+        *bits |= 1 << kind as u16;
         if let Some(place) = nodes.get_mut(kind as usize) {
             *place = node;
         }
@@ -256,7 +277,7 @@ impl Pending {
             let sides = [Side::Upstream, Side::Downstream].into_iter();
             let places = self.kinds.iter_mut().zip(&self.nodes);
             for (side, (bits, nodes)) in sides.zip(places) {
-                let bit = 1 << kind as u8;
+                let bit = 1 << kind as u16;
                 if *bits & bit != 0 {
                     *bits &= !bit;
                     let node = nodes.get(kind as usize).copied().unwrap_or_default();

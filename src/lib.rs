@@ -90,6 +90,8 @@ pub use ground::{FlownMission, Ground, Progress};
 pub use guard::HoldReason;
 pub use guard::config::{Geofence, GuardConfig};
 pub use mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
+#[cfg(feature = "departures")]
+pub use node::departure::Departure;
 pub use node::round::state::Phase;
 pub use node::sample::Sample;
 pub use node::view::record::{RecordError, ViewRecord};

@@ -41,6 +41,7 @@ const fn node(event: Event) -> Option<u16> {
     match event {
         Event::NeighbourLost { node, .. }
         | Event::NeighbourBack { node, .. }
+        | Event::MayLeaveTold { node, .. }
         | Event::NotHeard { node }
         | Event::MissionMismatch { node }
         | Event::KeyMismatch { node }
@@ -108,6 +109,8 @@ fn text(event: Event) -> defmt::Str {
             "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
         ),
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
+        Event::MayLeaveTold { .. } => defmt::intern!("may fly away; report it once it has left"),
+        Event::MayLeave => defmt::intern!("the chain has closed up: this drone may fly away"),
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }

@@ -150,6 +150,18 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
     /// has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
+    /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves there in 32 equal steps; 0 for one step.
+    ///
+    /// If all drones arrive together, no hop is worse on the way than before or after ([`docs::batteries`](crate::docs::batteries)).
+    /// Choose it so that the longest way, about a spacing of the chain, takes no more than the drones' usual speed. The same for
+    /// all relays of a chain.
+    /// At most four times `dead_after`.
+    #[cfg(feature = "departures")]
+    pub respacing: Duration,
+    /// True if a relay without a guard may leave the chain (`Relay::leave`). Its neighbours then fly close to the drone
+    /// that still holds its place: beside the end of a chain to within a few metres.
+    #[cfg(feature = "departures")]
+    pub leave_without_guard: bool,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
     /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
     /// Set it on all relays of a chain, or on none.
@@ -194,6 +206,10 @@ impl Settings {
         quorum: true,
         without_quorum: WithoutQuorum::Hold,
         guard: None,
+        #[cfg(feature = "departures")]
+        respacing: Duration::from_micros(0),
+        #[cfg(feature = "departures")]
+        leave_without_guard: false,
         sited: false,
     };
 
@@ -309,6 +325,8 @@ pub enum SetupError {
     WithoutQuorum,
     /// A number of `guard` is out of range, or the crate was built without the feature `guard`.
     Guard,
+    /// `respacing` is longer than four times `dead_after`.
+    Respacing,
 }
 
 error_texts!(SetupError {
@@ -326,6 +344,7 @@ error_texts!(SetupError {
     Silence => "probe_after must be above 0 and dead_after above probe_after",
     WithoutQuorum => "without_quorum.y_m must be within -1e4 to 1e4, without_quorum.up_m within 0 to 1e4",
     Guard => "guard: geofence limits must be within -1e7 to 1e7 m, each lower limit at most its upper limit; separation_m within 0 to 1e5, relays within 1 to 1000, hover_m within 0 to 1e3; guard needs the cargo feature `guard`",
+    Respacing => "respacing must be at most four times dead_after",
 });
 
 pub(crate) fn check(
@@ -403,6 +422,10 @@ pub(crate) fn check(
         .is_some_and(|confines| !cfg!(feature = "guard") || !confines.is_valid())
     {
         return Err(SetupError::Guard);
+    }
+    #[cfg(feature = "departures")]
+    if settings.respacing > settings.dead_after.times(4) {
+        return Err(SetupError::Respacing);
     }
     Ok(())
 }

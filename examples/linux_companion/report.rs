@@ -156,6 +156,10 @@ impl Report {
                 "interferer unclear",
                 "the measurements do not fit a single interferer on the ground, or are too few; the relays keep their last estimate",
             ),
+            Event::MayLeave => tell(
+                "may leave",
+                "the other relays have closed up, so this drone may fly away",
+            ),
             other => self.node_event(now, other, relay),
         }
     }
@@ -191,9 +195,9 @@ impl Report {
 
     fn node_event(&self, now: Instant, event: Event, relay: &Relay) {
         let (node, side) = match event {
-            Event::NeighbourLost { side, node } | Event::NeighbourBack { side, node } => {
-                (node, Some(side))
-            }
+            Event::NeighbourLost { side, node }
+            | Event::NeighbourBack { side, node }
+            | Event::MayLeaveTold { side, node } => (node, Some(side)),
             Event::NotHeard { node }
             | Event::MissionMismatch { node }
             | Event::KeyMismatch { node }
@@ -214,6 +218,10 @@ impl Report {
             Event::NeighbourBack { .. } => {
                 say("back", format_args!("{name} is now the neighbour {toward}"));
             }
+            Event::MayLeaveTold { .. } => say(
+                "told",
+                format_args!("{name} {toward} may fly away; report it once it has left"),
+            ),
             Event::NotHeard { .. } => say(
                 "not heard",
                 format_args!(

@@ -12,7 +12,6 @@ use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::Serial;
 use uav_relay::GuardConfig;
 use uav_relay::flight::autopilot::Autopilot as Link;
-use uav_relay::flight::autopilot::FrameBytes;
 use uav_relay::flight::autopilot::carrot::Pace;
 #[cfg(feature = "mavlink-signing")]
 use uav_relay::flight::autopilot::{Signing, Stamp};
@@ -32,7 +31,7 @@ const RECEIVED: usize = 512;
 const POSITION_ERROR_M: f32 = 1.5;
 
 /// Length of the longest frame to send, bytes.
-const LONGEST: usize = size_of::<FrameBytes>();
+const LONGEST: usize = Link::LONGEST_FRAME;
 
 /// Pause before the next attempt to write to a full port. In this time 115 bytes are sent.
 const PAUSE: Duration = Duration::from_millis(10);

@@ -102,7 +102,7 @@ local messages = {
         { name = "latest_mission_version", kind = "u16", unit = "", text = "version of that mission" },
         { name = "offer_number", kind = "u16", unit = "", text = "number for the offer that answers this hello; 0 at a node that accepts none, and at Tx and Rx unless they ask for the flown mission" },
         { name = "hears", kind = "u8", unit = "", text = "nodes on this side that the sender receives, bit 0 for the nearest, bit 3 for the fourth" },
-        { name = "flags", kind = "flags", words = { "requests_reply", "requests_view", "fresh", "ready", "active", "active_in_view", "refused" }, unit = "", text = "flags" },
+        { name = "flags", kind = "flags", words = { "requests_reply", "requests_view", "fresh", "ready", "active", "active_in_view", "refused", "outside" }, unit = "", text = "flags" },
     } },
     [0x0b] = { name = "Proposal", fields = {
         { name = "mission", kind = "digest", unit = "", text = "digest of the proposed mission" },
@@ -113,7 +113,7 @@ local messages = {
         { name = "agreed_relays", kind = "u16", unit = "", text = "number of relays of the agreed view" },
         { name = "votes", kind = "u16", unit = "", text = "number of members of the agreed view up to the sender" },
         { name = "lease_left_ds", kind = "u16", unit = "0.1 s", text = "remaining lease of the other members of the agreed view", per = 10, base = "s" },
-        { name = "earlier_lease_left_ds", kind = "u16", unit = "0.1 s", text = "time until positions may be used, because of leases of earlier views", per = 10, base = "s" },
+        { name = "earlier_lease_left_ds", kind = "u16", unit = "0.1 s", text = "time until positions may be used, for leases of earlier views", per = 10, base = "s" },
         { name = "proposer", kind = "bool", unit = "", text = "true if the proposer of the agreed view is one of the voters" },
         { name = "successor", kind = "option", of = { kind = "group", fields = {
             { name = "proposal", kind = "view", unit = "", text = "proposal by which the successor was decided" },
@@ -183,11 +183,18 @@ local messages = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "lease_ds", kind = "u16", unit = "0.1 s", text = "duration of the lease after a member has taken part in a renewal", per = 10, base = "s" },
+        { name = "leaver", kind = "u16", unit = "", text = "relay that may leave the view, or 0" },
+        { name = "joiner", kind = "u16", unit = "", text = "relay that is called to join, or 0" },
+        { name = "in_place", kind = "bool", unit = "", text = "true if all relays are in place, see Departures" },
     } },
     [0x10] = { name = "Pulsed", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
-        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: it has reached the last relay, and the acknowledgement has come back from there" },
+        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: the acknowledgement has come back from the last relay; else the other fields have no meaning" },
+        { name = "leaver", kind = "u16", unit = "", text = "relay that requests to leave, or 0" },
+        { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of its drone, at least 1; 65535 if unknown; 0 if it is the `leaver` of the Pulse" },
+        { name = "spare", kind = "u16", unit = "", text = "relay outside that would join, or 0" },
+        { name = "in_place", kind = "bool", unit = "", text = "true if the sender and all relays after it are in place" },
     } },
     [0x11] = { name = "Sense", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },

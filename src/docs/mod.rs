@@ -25,6 +25,9 @@ pub mod link {}
 #[doc = include_str!("lost_relays.md")]
 pub mod lost_relays {}
 
+#[doc = include_str!("batteries.md")]
+pub mod batteries {}
+
 #[doc = include_str!("uploads.md")]
 pub mod uploads {}
 

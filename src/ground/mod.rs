@@ -565,6 +565,7 @@ impl Ground {
                 active: false,
                 active_in_view: false,
                 refused: false,
+                outside: false,
                 offer_number: if is_query { self.query_number } else { 0 },
             })
         };

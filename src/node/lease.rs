@@ -48,7 +48,7 @@ use super::context::{PAUSE, earliest, longest_lease, tenths};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
-use crate::wire::message::{Message, Pulse, Pulsed};
+use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
@@ -86,6 +86,24 @@ pub(crate) struct Lease {
     /// Slowly decaying maximum of recent round trips of lease renewals through the chain.
     round_trip: Duration,
     circulation: Circulation,
+    /// Orders of the leader in the last renewal of this view.
+    orders: Orders,
+    /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
+    requests: Option<Requests>,
+    /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
+    departures: [Departures; cfg!(feature = "departures") as usize],
+}
+
+/// Requests of this relay, and its knowledge of departures as the leader.
+#[derive(Clone, Copy, Debug)]
+struct Departures {
+    requests: Requests,
+    /// Number of relays of the view when no relay requested to leave.
+    complement: u16,
+    /// Relay that requests to leave, 0 for none, and the time since which it does, over all views.
+    leaver: (u16, Instant),
+    /// Time of the first renewal of this view: all relays then had new positions.
+    settled_at: Instant,
 }
 
 const fn from_tenths(tenths: u16) -> Duration {
@@ -107,7 +125,72 @@ impl Lease {
             next_at: None,
             round_trip: Duration::from_micros(0),
             circulation: Circulation::new(seed),
+            orders: Orders::NONE,
+            requests: None,
+            departures: [Departures {
+                requests: Requests::NONE,
+                complement: 0,
+                leaver: (0, now),
+                settled_at: now,
+            }; cfg!(feature = "departures") as usize],
         }
+    }
+
+    /// Sets the requests of this relay to the leader: departure, spare, arrival at its position.
+    pub(crate) fn set_requests(&mut self, requests: Requests) {
+        if let Some(departures) = self.departures.first_mut() {
+            departures.requests = requests;
+        }
+    }
+
+    /// Returns the leader's last orders in this view.
+    pub(crate) const fn orders(&self) -> Orders {
+        self.orders
+    }
+
+    /// Returns true if all relays of the view have the leader's last orders, as far as this relay knows.
+    pub(crate) fn has_completed(&self) -> bool {
+        self.current.is_some() && !self.circulation.is_outstanding()
+    }
+
+    /// Returns the leader's orders for the next renewal, by the requests in the last one.
+    ///
+    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If there
+    /// is a spare, it joins first, unless the view already has more relays than without requests. A relay that does not
+    /// arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than that duration,
+    /// or than its remaining endurance: so half of the endurance remains.
+    fn next_orders(&mut self, context: &Context<'_>) -> Orders {
+        let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
+            return Orders::NONE;
+        };
+        let (now, most) = (context.now, longest_lease(context.settings()));
+        let relays = context.mission().relays();
+        let in_place = requests.in_place || now.since(known.settled_at).times(2) >= most;
+        let mut orders = Orders {
+            in_place,
+            ..Orders::NONE
+        };
+        if requests.leaver == 0 || known.complement == 0 {
+            known.complement = relays;
+        }
+        if requests.leaver != known.leaver.0 {
+            known.leaver = (requests.leaver, now);
+        }
+        let waited = now.since(known.leaver.1);
+        let left = Duration::from_millis(1_000).times(requests.endurance_s.into());
+        let late = waited >= most || waited >= left;
+        // A spare that was called is silent while it joins.
+        let spare = if requests.spare == 0 {
+            self.orders.joiner
+        } else {
+            requests.spare
+        };
+        if requests.leaver != 0 && spare != 0 && relays <= known.complement && !late {
+            orders.joiner = spare;
+        } else if in_place && self.orders.in_place || late {
+            orders.leaver = requests.leaver;
+        }
+        orders
     }
 
     /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. A lease
@@ -182,6 +265,8 @@ impl Lease {
         self.current = None;
         self.next_at = None;
         self.circulation.withdraw();
+        self.orders = Orders::NONE;
+        self.requests = None;
     }
 
     /// Records that all members have accepted this relay's view. Leases of earlier views then end by the time from
@@ -203,6 +288,9 @@ impl Lease {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
             self.next_at = Some(now + PAUSE);
+            if let Some(departures) = self.departures.first_mut() {
+                departures.settled_at = now;
+            }
         }
     }
 
@@ -238,6 +326,7 @@ impl Lease {
             // Another node with this relay's index has agreed on the position.
             return Effects::FOREIGN;
         }
+        self.orders = pulse.orders;
         self.join_renewal(context, pulse.number, pulse.lease);
         effects
     }
@@ -267,16 +356,30 @@ impl Lease {
         self.current = Some(Current { number, span });
         self.circulation.start(context.now);
         if context.is_last() {
-            self.complete_renewal(context);
+            self.complete_renewal(context, None);
         }
     }
 
     /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal.
-    fn complete_renewal(&mut self, context: &Context<'_>) {
+    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this one.
+    fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
             return;
+        };
+        self.requests = match self.departures.first() {
+            // The last relay of the chain starts with this.
+            None => received.or(Some(Requests {
+                in_place: true,
+                ..Requests::NONE
+            })),
+            Some(Departures { requests, .. }) => {
+                let own = Requests {
+                    in_place: requests.in_place && self.is_agreed,
+                    ..*requests
+                };
+                Some(received.map_or(own, |received| received.merge(own)))
+            }
         };
         self.vouched_until = self
             .vouched_until
@@ -330,7 +433,7 @@ impl Lease {
         }
         let forwarded_at = self.circulation.started_at();
         if pulsed.done {
-            self.complete_renewal(context);
+            self.complete_renewal(context, Some(pulsed.requests));
         } else {
             let path = context.path_to_last();
             self.circulation.on_in_progress(context.now, path);
@@ -350,6 +453,7 @@ impl Lease {
             self.next_at = None;
             let number = self.current.map_or(0, |current| current.number);
             let span = self.announced_span(context.settings());
+            self.orders = self.next_orders(context);
             self.join_renewal(context, number.wrapping_add(1), span);
         }
         let lapsed = self.until().is_some_and(|at| at <= now);
@@ -374,6 +478,7 @@ impl Lease {
             number: current.number,
             view_digest: context.digest(),
             lease: current.span,
+            orders: self.orders,
         }))
     }
 
@@ -385,6 +490,10 @@ impl Lease {
             number: current.number,
             view_digest: context.digest(),
             done: reply == Reply::Result,
+            requests: self
+                .requests
+                .filter(|_| reply == Reply::Result)
+                .unwrap_or(Requests::NONE),
         }))
     }
 

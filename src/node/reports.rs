@@ -523,7 +523,7 @@ impl Reporting {
             Wiring::Shared => {
                 let (all, own) = (all_loads(member), load(member, from_end(member, side)));
                 let by_hop = (u64::from(16 * all / own) * u64::from(hop)) >> 4;
-                let of_mean = 256 * all / (own * u32::from(member.all));
+                let of_mean = 256 * all / (own * u32::from(member.all)).max(1);
                 by_hop.min((of_mean * (micros(settings.probe_after) / (256 * 235))).into())
             }
         };

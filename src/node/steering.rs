@@ -1,5 +1,6 @@
 //! Setpoint on the way to the agreed position. Limited by the [guard](crate::guard), or without a guard the agreed position.
 
+use super::context::{earliest, tenths};
 use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
@@ -21,6 +22,105 @@ pub(crate) struct Steering {
     remind_at: Option<Instant>,
     /// Setpoint last reported to the firmware; `None` if there was no setpoint.
     reported_setpoint: Option<Placement>,
+    /// Way to a new agreed position in steps. Empty without the feature `departures`.
+    way: [Way; RESPACING as usize],
+}
+
+/// Number of steps of a motion to a new agreed position, as a power of two.
+const STEPS: u32 = 5;
+
+/// True with the feature `departures`; without it setpoints do not move in steps.
+const RESPACING: bool = cfg!(feature = "departures");
+
+/// Motion to a new agreed position: first place, start, duration, and time of the next step.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    from: Placement,
+    since: Instant,
+    span: Duration,
+    at: Instant,
+}
+
+/// Way to a new agreed position, so that all relays of a chain arrive at the same time.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    /// Agreed position of the last call, and the place to fly to now, which moves there in steps.
+    agreed: Option<Placement>,
+    wanted: Option<Placement>,
+    /// Motion to the agreed position; `None` at the position.
+    motion: Option<Motion>,
+}
+
+impl Way {
+    const NONE: Self = Self {
+        agreed: None,
+        wanted: None,
+        motion: None,
+    };
+
+    /// Moves the place to fly to by the steps that are due on the way to the position `agreed`. Returns it.
+    fn advance(
+        &mut self,
+        now: Instant,
+        agreed: Option<Placement>,
+        span: Duration,
+    ) -> Option<Placement> {
+        self.step(now);
+        if agreed == self.agreed {
+            return self.wanted;
+        }
+        self.agreed = agreed;
+        // A motion that is changed on its way ends as planned, so that frequent agreements do not put off its end.
+        let left = self.motion.map(|it| (it.since + it.span).since(now));
+        let span = left.map_or(span, |left| left.min(span));
+        self.motion = self
+            .wanted
+            .filter(|_| agreed.is_some() && span > Duration::from_micros(0))
+            .map(|from| Motion {
+                from,
+                since: now,
+                span,
+                at: now,
+            });
+        if self.motion.is_none() {
+            self.wanted = agreed;
+        }
+        self.step(now);
+        self.wanted
+    }
+
+    /// Moves the place to fly to by the steps of the current motion that are due.
+    fn step(&mut self, now: Instant) {
+        let (Some(motion), Some(to)) = (&mut self.motion, self.agreed) else {
+            return;
+        };
+        let Motion {
+            from,
+            since,
+            span,
+            at,
+        } = motion;
+        let steps =
+            (u32::from(tenths(now.since(*since))) << STEPS) / u32::from(tenths(*span).max(1));
+        let Some(part) = u8::try_from(steps)
+            .ok()
+            .filter(|steps| *steps >> STEPS == 0)
+        else {
+            self.motion = None;
+            self.wanted = Some(to);
+            return;
+        };
+        if *at <= now {
+            *at = now + Duration::from_micros((span.as_micros() >> STEPS).max(1));
+        }
+        let part = f32::from(part) / 32.0;
+        let between = |from: f32, to: f32| from + (to - from) * part;
+        self.wanted = Some(Placement {
+            x_m: between(from.x_m, to.x_m),
+            y_m: between(from.y_m, to.y_m),
+            altitude_m: between(from.altitude_m, to.altitude_m),
+        });
+    }
 }
 
 impl Steering {
@@ -29,6 +129,7 @@ impl Steering {
         guard: None,
         remind_at: None,
         reported_setpoint: None,
+        way: [Way::NONE; RESPACING as usize],
     };
 
     /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
@@ -49,8 +150,17 @@ impl Steering {
     }
 
     /// Moves the setpoint toward the position `agreed` as far as the guard allows at `now`. Returns true if the
-    /// setpoint has changed.
-    pub(crate) fn steer(&mut self, now: Instant, agreed: Option<Placement>) -> bool {
+    /// setpoint has changed. A motion to a new position takes `span`.
+    pub(crate) fn steer(
+        &mut self,
+        now: Instant,
+        agreed: Option<Placement>,
+        span: Duration,
+    ) -> bool {
+        let agreed = match self.way.first_mut() {
+            Some(way) => way.advance(now, agreed, span),
+            None => agreed,
+        };
         if let Some(agreed) = agreed
             && let Some(guard) = self.guard()
         {
@@ -69,9 +179,20 @@ impl Steering {
         changed
     }
 
+    /// Returns true while the setpoint moves to a new agreed position.
+    pub(crate) fn is_moving(&self) -> bool {
+        matches!(&self.way[..], [way] if way.motion.is_some())
+    }
+
+    /// Returns the place to fly to if the motion stops now; `None` before the first agreement.
+    pub(crate) fn stopped(&self) -> Option<Placement> {
+        self.way.first()?.wanted
+    }
+
     pub(crate) fn setpoint(&self, agreed: Option<Placement>) -> Option<Placement> {
         match &self.guard {
             Some(guard) if GUARD => guard.setpoint(),
+            _ if self.is_moving() => self.stopped(),
             _ => agreed,
         }
     }
@@ -157,7 +278,45 @@ impl Steering {
         self.guard()?.poll()
     }
 
-    pub(crate) const fn next_timeout(&self) -> Option<Instant> {
-        self.remind_at
+    pub(crate) fn next_timeout(&self) -> Option<Instant> {
+        match self.way.first() {
+            Some(way) => earliest(self.remind_at, way.motion.map(|motion| motion.at)),
+            None => self.remind_at,
+        }
+    }
+}
+
+#[cfg(all(test, feature = "departures"))]
+mod tests {
+    use super::Steering;
+    use crate::place::Placement;
+    use crate::time::{Duration, Instant};
+
+    fn at_ms(ms: u64) -> Instant {
+        Instant::ZERO + Duration::from_millis(ms)
+    }
+
+    /// Checks that agreements that come faster than the motion's duration do not put off its end.
+    #[test]
+    fn frequent_agreements_do_not_put_off_the_arrival() {
+        let span = Duration::from_millis(20_000);
+        let place = |x_m: f32| Some(Placement::on_line(x_m, 100.0));
+        let mut steering = Steering::NONE;
+        steering.steer(at_ms(0), place(0.0), span);
+        let mut reached_m = 0.0;
+        let mut agreed = None;
+        for step in 0..20 {
+            // Every second another agreement, a little farther.
+            agreed = place(100.0 + step as f32 / 10.0);
+            steering.steer(at_ms(1_000 * step), agreed, span);
+            let x_m = steering.setpoint(agreed).unwrap().x_m;
+            assert!(
+                x_m >= reached_m && x_m <= reached_m + 10.0,
+                "{x_m} after {reached_m}"
+            );
+            reached_m = x_m;
+        }
+        steering.steer(at_ms(20_000), agreed, span);
+        assert!(!steering.is_moving() && steering.setpoint(agreed) == agreed);
     }
 }

@@ -161,7 +161,7 @@ impl Body<'_, '_> {
         self.word(version);
         self.request_number();
         self.small(0, 15);
-        self.small(0, 31);
+        self.small(0, 0xFE);
     }
 
     /// Appends the first fields of a Proposal or Decision to the message.
@@ -201,10 +201,17 @@ impl Body<'_, '_> {
     fn pulse(&mut self) {
         self.pulse_number();
         self.lease();
+        self.relay();
+        self.relay();
+        self.small(0, 1);
     }
 
     fn pulsed(&mut self) {
         self.pulse_number();
+        self.small(0, 1);
+        self.relay();
+        self.request_number();
+        self.relay();
         self.small(0, 1);
     }
 

@@ -1,10 +1,10 @@
 //! Flights with a guard. No two drones come nearer than the separation, whatever is lost, late or silent.
 
 use chacha20::ChaCha8Rng;
-use host_tests::flights::{APART_M, SEPARATION_M, eight_apart, guard};
+use host_tests::flights::{APART_M, SEPARATION_M, eight_apart, end_at, guard};
 use rand::{RngExt, SeedableRng};
 use uav_relay_sim::simulator::faults::Faults;
-use uav_relay_sim::simulator::outcome::Ending;
+use uav_relay_sim::simulator::outcome::{Ending, Moment};
 
 use super::*;
 
@@ -68,6 +68,36 @@ fn drones_keep_away_from_a_silent_hovering_drone() {
         );
         assert_eq!(outcome.unsafe_setpoints, 0, "SEED={seed}");
     }
+}
+
+/// Checks that drones keep apart while a relay leaves. Its drone then hovers at its place.
+#[test]
+fn drones_keep_away_from_a_relay_that_leaves() {
+    let mut free = 0;
+    for seed in 1..=40 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = guarded(&mut rng);
+        setup.faults.loss = rng.random_range(0.0..0.3);
+        setup.settings.respacing = Duration::from_millis(rng.random_range(0..20_000));
+        let leaver = rng.random_range(1..=8);
+        setup.leaves = vec![(
+            leaver,
+            Instant::from_millis(rng.random_range(0..90_000)),
+            None,
+        )];
+        end_at(&mut setup, seconds(400));
+        let outcome = run(setup).unwrap();
+        let is_free = |moment: &&Moment| moment.what == TimelineEvent::MayLeave;
+        free += outcome.moments.iter().filter(is_free).count();
+        assert!(
+            outcome.nearest_m() >= APART_M,
+            "SEED={seed}: relay {leaver}, {} m",
+            outcome.nearest_m()
+        );
+        assert_eq!(outcome.unsafe_setpoints, 0, "SEED={seed}");
+    }
+    println!("{free} of 40 relays may leave");
+    assert!(free >= 38, "{free}");
 }
 
 /// Checks that drones come too close without a motion guard, so that the test is able to fail.

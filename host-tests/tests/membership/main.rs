@@ -2,6 +2,7 @@
 
 mod duplicates;
 mod flights;
+mod leaves;
 mod losses;
 mod parts;
 mod schedules;

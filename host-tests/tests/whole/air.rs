@@ -45,6 +45,12 @@ pub(crate) enum ScheduledEvent {
     Off(usize),
     /// Event: an operator informs the relay that the other drone with its index is gone.
     Clear(usize),
+    /// Event: the relay requests to leave the chain, with this remaining endurance, s.
+    Leave(usize, Option<u16>),
+    /// Event: the relay becomes a spare, if it has not taken part in anything.
+    Spare(usize),
+    /// Event: the relay cancels its departure, or joins the chain again.
+    Stay(usize),
     /// Event: the link from `from` to `to` is cut. Several cuts of one link add up.
     Cut {
         from: usize,
@@ -309,6 +315,24 @@ impl Air {
                 drone.relay.clear_duplicate_index(now);
                 return Some(at);
             }
+            ScheduledEvent::Leave(at, endurance_s) => {
+                let drone = &mut self.drones[at];
+                let now = drone.clock(self.now_us);
+                drone.relay.leave(now, endurance_s);
+                return Some(at);
+            }
+            ScheduledEvent::Spare(at) => {
+                let drone = &mut self.drones[at];
+                let now = drone.clock(self.now_us);
+                drone.relay.wait_as_spare(now);
+                return Some(at);
+            }
+            ScheduledEvent::Stay(at) => {
+                let drone = &mut self.drones[at];
+                let now = drone.clock(self.now_us);
+                drone.relay.stay(now);
+                return Some(at);
+            }
             ScheduledEvent::Cut { from, to } => self.cuts[from * all + to] += 1,
             ScheduledEvent::Mend { from, to } => self.cuts[from * all + to] -= 1,
             ScheduledEvent::Loss(loss) => self.loss = loss,
@@ -555,6 +579,7 @@ fn switched_on(kind: &Kind, at: usize, start: u32, seed: u32, now: Instant) -> R
         },
     });
     let settings = Settings {
+        leave_without_guard: true,
         wiring: kind.wiring,
         auth,
         hop_time: uav_relay_sim::simulator::faults::LinkSpec::default().hop_time(),

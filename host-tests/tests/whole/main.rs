@@ -13,7 +13,7 @@ use self::air::Air;
 use chacha20::ChaCha8Rng;
 use host_tests::fixtures::voted;
 use rand::{RngExt, SeedableRng};
-use schedule::{SECOND, Schedule, random, with_copy, without_steps};
+use schedule::{SECOND, Schedule, random, with_copy, with_departures, without_steps};
 
 /// Longest permitted time from the last fault until all relays have agreed positions in one view, s. A view is the
 /// agreed membership of the chain.
@@ -99,9 +99,19 @@ fn flown_all(first: u64, count: u64, schedule: fn(u64) -> Schedule) -> Vec<Measu
 
 #[test]
 fn every_schedule_ends_in_one_whole_chain_within_120_s() {
+    ends_whole(random);
+}
+
+/// Checks schedules of faults in which relays also leave, wait outside as spares, and join again.
+#[test]
+fn schedules_with_departures_end_in_one_whole_chain_within_120_s() {
+    ends_whole(with_departures);
+}
+
+fn ends_whole(schedule: fn(u64) -> Schedule) {
     let first = number("SEED", 1);
     let count = number("COUNT", 150);
-    let all = flown_all(first, count, random);
+    let all = flown_all(first, count, schedule);
     let late: Vec<&Measured> = all
         .iter()
         .filter(|found| found.whole_s.is_none_or(|s| s > WHOLE_S as f64))

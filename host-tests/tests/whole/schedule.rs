@@ -132,6 +132,34 @@ pub(crate) fn random(seed: u64) -> Schedule {
     schedule
 }
 
+/// Draws a schedule of faults of every kind in which relays also leave. Each of them stays in the end.
+pub(crate) fn with_departures(seed: u64) -> Schedule {
+    let mut schedule = random(seed);
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x5555);
+    let end_us = schedule.faults_end_us;
+    for at in 0..usize::from(schedule.kind.mission.relays()) {
+        if rng.random_bool(0.4) {
+            // Some are spares from the start.
+            let is_spare = rng.random_bool(0.3);
+            let leaves_us = if is_spare || rng.random_bool(0.1) {
+                1
+            } else {
+                rng.random_range(1..=end_us + 30 * SECOND)
+            };
+            let endurance_s = rng.random_bool(0.5).then(|| rng.random_range(0..=600));
+            let stays_us = leaves_us + span(rng);
+            let event = if is_spare {
+                ScheduledEvent::Spare(at)
+            } else {
+                ScheduledEvent::Leave(at, endurance_s)
+            };
+            schedule.put(leaves_us, event);
+            schedule.put(stays_us, ScheduledEvent::Stay(at));
+        }
+    }
+    schedule
+}
+
 /// Draws a schedule of faults of every kind except steps of clocks.
 pub(crate) fn without_steps(seed: u64) -> Schedule {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);

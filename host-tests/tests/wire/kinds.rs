@@ -109,8 +109,14 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
         granted(view, (mission, 0), 5, 8),
         WireMessage::new("Fence", &fence),
         upload(2, mission),
-        of("Pulse", json!({ "lease_ds": 150 })),
-        of("Pulsed", json!({ "done": true })),
+        of(
+            "Pulse",
+            json!({ "lease_ds": 150, "leaver": 0, "joiner": 0, "in_place": false }),
+        ),
+        of(
+            "Pulsed",
+            json!({ "done": true, "leaver": 0, "endurance_s": 0, "spare": 0, "in_place": false }),
+        ),
         of("Sense", heard.clone()),
         of("Sensed", heard),
         level(mission),

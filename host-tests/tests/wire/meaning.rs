@@ -8,8 +8,9 @@ use uav_relay::place::{CrossSection, Station};
 use uav_relay::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use uav_relay::wire::digest::MissionId;
 use uav_relay::wire::message::{
-    AdjustStep, Claim, Coarse, Decision, Detail, Entry, Heard, Hello, Message, Moved, OwnSeat,
-    Poll, Proposal, Pulse, Pulsed, Reports, Roster, Successor, Sweep, SweepVerdict, Token,
+    AdjustStep, Claim, Coarse, Decision, Detail, Entry, Heard, Hello, Message, Moved, Orders,
+    OwnSeat, Poll, Proposal, Pulse, Pulsed, Reports, Requests, Roster, Successor, Sweep,
+    SweepVerdict, Token,
 };
 use uav_relay::{
     Band, Interference, Interferer, Local, Placement, Profile, Sites, Upload, View, ViewId,
@@ -156,16 +157,8 @@ pub(crate) fn message(wire_message: &WireMessage) -> Message {
             upload: upload(wire_message, &of),
             offer_number: of.word("offer_number"),
         },
-        "Pulse" => Message::Pulse(Pulse {
-            number: of.word("number"),
-            view_digest: of.word("view_digest"),
-            lease: of.word("lease_ds"),
-        }),
-        "Pulsed" => Message::Pulsed(Pulsed {
-            number: of.word("number"),
-            view_digest: of.word("view_digest"),
-            done: of.flag("done", 0),
-        }),
+        "Pulse" => Message::Pulse(pulse(&of)),
+        "Pulsed" => Message::Pulsed(pulsed(&of)),
         "Sense" | "Sensed" => sense(wire_message, &of),
         "Level" => Message::Level {
             mission: of.word("mission"),
@@ -261,6 +254,33 @@ fn reports(of: &MessageFields<'_>) -> Reports {
     report
 }
 
+fn pulse(of: &MessageFields<'_>) -> Pulse {
+    Pulse {
+        number: of.word("number"),
+        view_digest: of.word("view_digest"),
+        lease: of.word("lease_ds"),
+        orders: Orders {
+            leaver: of.word("leaver"),
+            joiner: of.word("joiner"),
+            in_place: of.flag("in_place", 0),
+        },
+    }
+}
+
+fn pulsed(of: &MessageFields<'_>) -> Pulsed {
+    Pulsed {
+        number: of.word("number"),
+        view_digest: of.word("view_digest"),
+        done: of.flag("done", 0),
+        requests: Requests {
+            leaver: of.word("leaver"),
+            endurance_s: of.word("endurance_s"),
+            spare: of.word("spare"),
+            in_place: of.flag("in_place", 0),
+        },
+    }
+}
+
 fn hello(of: &MessageFields<'_>) -> Hello {
     Hello {
         mission: of.word("mission"),
@@ -277,6 +297,7 @@ fn hello(of: &MessageFields<'_>) -> Hello {
         active: of.flag("flags", 4),
         active_in_view: of.flag("flags", 5),
         refused: of.flag("flags", 6),
+        outside: of.flag("flags", 7),
     }
 }
 

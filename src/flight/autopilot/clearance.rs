@@ -58,7 +58,7 @@ impl Clearance {
     /// Updates the lists of lost relays by an event of the relay.
     pub(super) fn handle_event(&mut self, event: Event) {
         match event {
-            Event::NeighbourLost { side, node } => {
+            Event::NeighbourLost { side, node } | Event::MayLeaveTold { side, node } => {
                 let lost = self.side_mut(side);
                 if !lost.nodes.contains(&node) && lost.nodes.push(node).is_err() {
                     lost.is_full = true;

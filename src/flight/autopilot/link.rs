@@ -16,7 +16,7 @@ use crate::flight::autopilot::vehicle::{Position, RadioNoise, Vehicle, VehicleUp
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::{Counters, Incoming, Parser, Received};
-use crate::flight::mavlink::outgoing::{FrameBytes, Outgoing};
+use crate::flight::mavlink::outgoing::{FRAME, FrameBytes, Outgoing};
 use crate::geodetic::{Geodetic, Sites};
 use crate::guard::HoldReason;
 use crate::node::sample::Sample;
@@ -123,6 +123,9 @@ pub struct Autopilot {
 }
 
 impl Autopilot {
+    /// Length of the longest frame to send, bytes.
+    pub const LONGEST_FRAME: usize = FRAME;
+
     /// Creates the link to the autopilot of a drone. The drone flies along the line `axis` from Tx to Rx, within the
     /// speed and acceleration of `pace`.
     pub fn new(axis: Axis, pace: Pace, now: Instant) -> Self {
@@ -820,7 +823,7 @@ impl Autopilot {
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
     /// use uav_relay::flight::autopilot::carrot::Pace;
-    /// use uav_relay::flight::autopilot::{Autopilot, FrameBytes};
+    /// use uav_relay::flight::autopilot::Autopilot;
     /// use uav_relay::flight::axis::Axis;
     /// use uav_relay::{Geodetic, Instant, Relay, Settings};
     ///
@@ -830,12 +833,12 @@ impl Autopilot {
     ///     relay: &mut Relay,
     ///     now: Instant,
     ///     received: &[u8],
-    ///     mut send: impl FnMut(FrameBytes),
+    ///     mut send: impl FnMut(&[u8]),
     /// ) -> Instant {
     ///     link.handle_bytes(now, received);
     ///     link.exchange(relay, now);
     ///     while let Some(frame) = link.poll_transmit(now) {
-    ///         send(frame);
+    ///         send(&frame);
     ///     }
     ///     link.poll_timeout(now)
     /// }

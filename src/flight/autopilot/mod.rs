@@ -29,6 +29,5 @@ pub use vehicle::{OffLine, Position};
 
 pub use super::mavlink::frame::Address;
 pub use super::mavlink::incoming::Counters;
-pub use super::mavlink::outgoing::FrameBytes;
 #[cfg(feature = "mavlink-signing")]
 pub use super::mavlink::signing::{Flaw, Signing, Stamp};

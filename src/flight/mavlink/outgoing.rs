@@ -15,8 +15,11 @@ const SIGNING: usize = if cfg!(feature = "mavlink-signing") {
     0
 };
 
+/// Length of the longest frame to send, bytes, with a signature.
+pub(crate) const FRAME: usize = HEADER + LONGEST + CHECKSUM + SIGNING;
+
 /// MAVLink frame to send; its capacity includes a signature.
-pub type FrameBytes = Vec<u8, { HEADER + LONGEST + CHECKSUM + SIGNING }>;
+pub type FrameBytes = Vec<u8, FRAME>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {

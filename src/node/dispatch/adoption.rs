@@ -60,6 +60,7 @@ impl Node {
             self.layers.lease.confirm_view();
         }
         self.layers.round.renew(rest, leads, works);
+        self.layers.leaving.end_order();
         bump(&mut self.telemetry.stats.views);
         self.telemetry.lapse_reported = false;
         self.telemetry.no_quorum_reported = false;

@@ -44,9 +44,17 @@ impl Node {
                 };
                 if to >= 1 && to <= all && self.side_of(to).is_some() {
                     let offer_number = self.layers.update.next_offer_number(now, &self.member);
-                    let ready = self.is_between(now, side, to);
-                    let hello = self.hello(now, side, ask, offer_number);
-                    return Some((side, to, Hello { ready, ..hello }));
+                    let mut hello = self.hello(now, side, ask, offer_number);
+                    if hello.outside {
+                        hello.ready = self.layers.leaving.is_spare();
+                    } else {
+                        hello.ready = self.is_between(now, side, to) || self.calls(side, to);
+                        hello.outside = self.frees(side, to);
+                        if hello.outside {
+                            self.on_freed(side, to);
+                        }
+                    }
+                    return Some((side, to, hello));
                 }
             }
         }
@@ -61,7 +69,7 @@ impl Node {
             neighbour: self.layers.neighbours.at(side).node(),
             requests_reply: ask,
             requests_view: self.layers.view.request.is_pending() && side == self.back(),
-            fresh: self.layers.round.is_fresh(),
+            fresh: self.layers.round.is_fresh() || self.layers.leaving.is_outside(),
             ready: false,
             behind: self.relays_through(side.other()),
             hears: self
@@ -73,6 +81,7 @@ impl Node {
             active: state.is_active,
             active_in_view: state.is_active_in_view,
             refused: state.is_refused,
+            outside: self.layers.leaving.is_outside(),
             offer_number,
         }
     }
@@ -173,6 +182,9 @@ impl Node {
         if hello.requests_reply {
             self.schedule_hello(side, from, false);
         }
+        if self.on_departure(now, side, from, &hello) {
+            return self.review_neighbours(now);
+        }
         if self.layers.neighbours.at(side).node() == from {
             self.layers
                 .update
@@ -230,12 +242,20 @@ impl Node {
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
+        let leaver = if cfg!(feature = "departures") {
+            self.layers.lease.orders().leaver
+        } else {
+            0
+        };
         let (layers, settings) = (&mut self.layers, &self.member.settings);
         let neighbour = layers.neighbours.at_mut(side);
         neighbour.record_unselected(now, settings);
         // The candidate prefers this relay to a neighbour that is farther away.
         let farther = hello.neighbour.abs_diff(from) > own.abs_diff(from);
-        let taken = hello.neighbour != own && hello.neighbour != 0 && !farther;
+        let before = neighbour.node();
+        // The node beyond a neighbour that is ordered to leave.
+        let passes = leaver != 0 && leaver == before && [own, leaver].contains(&hello.neighbour);
+        let taken = hello.neighbour != own && hello.neighbour != 0 && !farther && !passes;
         if taken || !hello.is_heard(from, own) {
             return;
         }
@@ -250,9 +270,10 @@ impl Node {
             nearer: from.abs_diff(own) < neighbour.node().abs_diff(own),
             ready: hello.ready,
             longer: hello.behind > there || all_but_one,
+            passes,
         };
         if neighbour.consider_candidate(candidate, now, settings) {
-            let tells = neighbour.should_report_found();
+            let tells = neighbour.should_report_found() && !passes;
             neighbour.latest_mission = Some(hello.latest_mission);
             layers
                 .update
@@ -263,6 +284,9 @@ impl Node {
                 self.raise_node_event(NodeEvent::Back, side, from);
             }
             self.schedule_hello(side, from, true);
+            if passes {
+                self.schedule_hello(side, before, false);
+            }
             self.on_mutual(now, side, pairs);
         }
     }

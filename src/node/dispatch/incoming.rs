@@ -180,6 +180,7 @@ impl Node {
         if side != wanted {
             return bump(&mut self.telemetry.stats.misdirected);
         }
+        self.layers.update_requests(now, &self.member);
         let context = self.layers.context(now, &self.member);
         let layers = &mut self.layers;
         let effects = match message {
@@ -207,6 +208,9 @@ impl Node {
             }
         };
         self.apply(now, effects);
+        if let Message::Pulse(_) | Message::Pulsed(_) = message {
+            self.follow_orders(now);
+        }
     }
 
     /// Records that the neighbour at `side` was alive at time `at` or later. It has replied to a message sent at that

@@ -11,6 +11,7 @@
 //! | `setpoint` | setpoint, and reports of the drone |
 //! | `adoption` | adoption of a decided view and its mission |
 //! | `claims` | claims to this node's number |
+//! | `departure` | relays that leave the chain, or wait outside of it |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
 //! | `offers` | newer missions, exchanged with neighbours and with the ground |
 //! | `telemetry` | reports of this relay's state, and those that it hands on |
@@ -40,9 +41,12 @@ use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Claim, Proposal};
+use departure::Leaving;
 
 mod adoption;
 mod claims;
+#[cfg_attr(not(feature = "departures"), path = "no_departure.rs")]
+pub(crate) mod departure;
 mod hellos;
 mod incoming;
 mod offers;
@@ -106,6 +110,7 @@ impl Node {
                 lease: Lease::new(!seed.rotate_left(16), now, settings),
                 update: MissionUpdate::new(&member, seed.rotate_left(4), now),
                 round: Round::new(leads, number, profile, settings, seed, now),
+                leaving: Leaving::new(),
             },
             steering: Steering::NONE,
             reporting: Reporting::default(),
@@ -322,7 +327,8 @@ impl Node {
     /// change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
-        let may = leads && !self.layers.view.has_no_quorum() && !self.is_passive();
+        let is_in = !self.is_passive() && !self.layers.leaving.is_outside();
+        let may = leads && !self.layers.view.has_no_quorum() && is_in;
         if may && self.layers.view.outstanding().is_none() {
             let context = self.layers.context(now, &self.member);
             let effects = self.layers.round.restart(&context);
@@ -338,6 +344,7 @@ pub(super) struct Layers {
     pub(super) lease: Lease,
     pub(super) update: MissionUpdate,
     pub(super) round: Round,
+    pub(super) leaving: Leaving,
 }
 
 impl Layers {

@@ -1,12 +1,13 @@
 //! Setpoint for the autopilot, and the reports of the drone that it depends on.
 
 use super::Node;
+use super::departure::Leaving;
 use crate::event::Event;
 use crate::guard::HoldReason;
 use crate::node::context::Member;
 use crate::place::Placement;
 use crate::side::Side;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 impl Node {
     /// Returns the agreed position, changed as `Settings::without_quorum` requires if there is no quorum. `None`
@@ -14,21 +15,35 @@ impl Node {
     fn wanted_place(&self) -> Option<Placement> {
         let agreed = self.layers.round.agreed_place()?;
         Some(if self.layers.view.has_no_quorum() {
-            self.member.settings.without_quorum.place(agreed)
+            let place = self.member.settings.without_quorum.place(agreed);
+            if place == agreed {
+                // A motion to the agreed position stops.
+                self.steering.stopped().unwrap_or(place)
+            } else {
+                place
+            }
         } else {
             agreed
         })
     }
 
     pub(super) fn steer(&mut self, now: Instant) {
-        if self.steering.steer(now, self.wanted_place()) {
+        let wanted = self.wanted_place();
+        let span = if self.layers.view.has_no_quorum() {
+            Duration::from_micros(0)
+        } else {
+            Leaving::respacing(&self.member.settings)
+        };
+        if self.steering.steer(now, wanted, span) {
             self.raise(Event::SetpointChanged);
         }
+        self.update_goal(wanted);
     }
 
     pub(crate) fn handle_position(&mut self, now: Instant, place: Placement, measured_at: Instant) {
         self.steering.handle_position(measured_at, place);
         self.reporting.handle_position(measured_at, place);
+        self.layers.leaving.record_place(place);
         self.steer(now);
     }
 

@@ -95,6 +95,7 @@ pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
         active: true,
         active_in_view: false,
         refused: false,
+        outside: false,
         offer_number: 9,
     })
 }
@@ -436,4 +437,32 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
             "{told:?}"
         );
     }
+}
+
+/// Checks that a spare requests no view, whatever else happens to it, until it is called or stays.
+#[test]
+#[cfg(feature = "departures")]
+fn a_relay_outside_proposes_nothing() {
+    let settings = Settings {
+        wiring: Wiring::Shared,
+        ..Settings::default()
+    };
+    let identity = Identity {
+        network: 1,
+        index: 2,
+    };
+    let mut node = Node::new(&base(), identity, &settings, 1, Instant::ZERO);
+    node.begin(identity, 1, Instant::ZERO);
+    node.wait_as_spare(Instant::ZERO);
+    assert_eq!(node.departure(NOW), crate::Departure::Spare);
+    for step in 0..100 {
+        let now = NOW + Duration::from_millis(1_000 * step);
+        node.layers.view.request.start(now);
+        node.handle_timeout(now);
+        assert!(!node.layers.view.request.is_pending());
+        assert!(node.layers.view.outstanding().is_none() && !node.layers.view.has_no_quorum());
+        sent_messages(&mut node);
+    }
+    node.stay(NOW + Duration::from_millis(200_000));
+    assert_eq!(node.departure(NOW), crate::Departure::Member);
 }

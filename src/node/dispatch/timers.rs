@@ -21,6 +21,7 @@ impl Node {
         let context = self.layers.context(now, &self.member);
         let effects = self.layers.round.handle_timeout(&context);
         self.apply(now, effects);
+        self.layers.update_requests(now, &self.member);
         let context = self.layers.context(now, &self.member);
         let effects = self.layers.lease.handle_timeout(&context);
         self.apply(now, effects);
@@ -28,12 +29,16 @@ impl Node {
             self.on_solved(now);
         }
         self.drop_links_if_expired(now);
+        self.return_if_expired(now);
         for side in [Side::Upstream, Side::Downstream] {
             if self.layers.neighbours.at(side).is_due(now) {
                 self.on_neighbour_timeout(now, side);
             }
         }
-        if self.awaits_first() && self.is_solving(now) {
+        if self.layers.leaving.is_outside() {
+            // A relay outside has no vote: an upload or the end of a computation must not make it propose.
+            self.layers.view.request.stop();
+        } else if self.awaits_first() && self.is_solving(now) {
             if self.layers.view.request.is_due(now) {
                 self.await_first(now);
             }

@@ -14,8 +14,9 @@
 //!
 //! *Better* is a nearer node that is heard by the node beyond it. A farther node is better in two cases: more relays follow it than
 //! follow the neighbour; or as many follow it as followed the neighbour in the last view. In the second case the neighbour has no
-//! link on its other side, and the chain goes on without it. A node that was the neighbour before the present one is selected again
-//! without a waiting time. If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
+//! link on its other side, and the chain goes on without it. A neighbour that is ordered to leave is replaced at once by the node
+//! beyond it. A node that was the neighbour before the present one is selected again without a waiting time. If two links cross, as
+//! 1 - 3 and 2 - 4 do while 2 and 3 do not hear each other,
 //! neither part of the chain could go on. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
 //!
 //! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, the selected one among
@@ -365,6 +366,21 @@ impl Neighbour {
         }
     }
 
+    /// Gives up the neighbour. No search follows if `ends` is true: the chain ends here, or this relay leaves it.
+    pub(crate) fn give_up(&mut self, now: Instant, ends: bool) {
+        self.search(now);
+        self.heartbeat = PendingHeartbeat::NONE;
+        self.check_at = Some(now + self.tick);
+        if ends {
+            self.state = NeighbourState::NoPeer;
+        }
+    }
+
+    /// Schedules hellos that request an answer, to the four nearest nodes on this side.
+    pub(crate) const fn schedule_hellos(&mut self) {
+        self.hellos.schedule_all();
+    }
+
     const fn search(&mut self, now: Instant) {
         self.node = 0;
         self.searches_since = now;
@@ -429,14 +445,15 @@ impl Neighbour {
                     none
                 };
                 let is_known = node == self.replaced && !candidate.nearer && !waits;
-                candidate.is_better()
-                    && (is_known || self.damping.has_waited(distance, more, now, settings))
+                candidate.passes
+                    || candidate.is_better()
+                        && (is_known || self.damping.has_waited(distance, more, now, settings))
             }
         };
         if !is_selected {
             return false;
         }
-        if !matches!(self.state, NeighbourState::Searching { .. }) {
+        if !matches!(self.state, NeighbourState::Searching { .. }) && !candidate.passes {
             self.grace = now + settings.probe_after;
         }
         self.heartbeat = PendingHeartbeat::NONE;
@@ -457,7 +474,7 @@ impl Neighbour {
 /// Candidate for the neighbour on one side: an unselected node that receives this relay.
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "four things that its hello says"
+    reason = "five things that its hello says"
 )]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Candidate {
@@ -474,6 +491,8 @@ pub(crate) struct Candidate {
     pub(crate) ready: bool,
     /// True if more relays can be reached through the candidate than through the selected neighbour.
     pub(crate) longer: bool,
+    /// True if the selected neighbour is ordered to leave, and the candidate is beyond it.
+    pub(crate) passes: bool,
 }
 
 impl Candidate {

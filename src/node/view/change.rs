@@ -614,7 +614,7 @@ impl ViewRequest {
     }
 
     /// Ends the view request, because a view has been decided or refused.
-    pub(super) const fn stop(&mut self) {
+    pub(crate) const fn stop(&mut self) {
         self.pending = false;
         self.at = None;
         self.not_before = None;

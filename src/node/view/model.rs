@@ -8,9 +8,10 @@
 //! | proposal timed out | a relay without a predecessor proposes anew, with a larger number than any in its part |
 //! | no successor | the relay decides, or abandons the proposal |
 //! | pass | a relay that knows its view to be agreed on informs the next relay, if that is in the same view |
+//! | departure or join | a relay goes outside of the chain, where it has no neighbours, or comes back; its neighbours select each other |
 //! | reboot | the relay keeps only its acceptor state, or loses that, too |
 //!
-//! The numbers of cuts, proposals and reboots are bounded, nothing else is. Time is not modelled. The lease adds that positions
+//! The numbers of cuts, proposals, reboots, departures and joins are bounded, nothing else is. Time is not modelled. The lease adds that positions
 //! of a view are not used before members of the previous view have released theirs.
 //!
 //! A view is *in force* from the time its leader knows that all members have accepted it until a successor is in force. Views
@@ -61,6 +62,41 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(3, (2, 3, 1), true);
     all_holds(4, (2, 2, 1), true);
     all_holds(4, (2, 3, 0), false);
+}
+
+/// Checks that a relay that leaves, or a spare that joins before, keeps one sequence of views.
+#[test]
+fn departures_and_joins_keep_one_sequence_of_views() {
+    for (relays, outside, (cuts, proposals, reboots, moves)) in [
+        (3, 0, (1, 3, 0, 2)),
+        (3, 0b010, (1, 3, 0, 2)),
+        (4, 0b0100, (1, 3, 0, 2)),
+        (4, 0b0010, (0, 3, 1, 2)),
+    ] {
+        Check {
+            outside,
+            moves,
+            cuts,
+            proposals,
+            reboots,
+            heals: relays == 3,
+            ..Check::of(relays)
+        }
+        .holds();
+    }
+}
+
+/// Checks that the model check finds a departure that reduces the quorum before it is agreed on.
+#[test]
+fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
+    let check = Check {
+        rule: Rule::Inside,
+        moves: 1,
+        proposals: 3,
+        ..Check::of(3)
+    };
+    let found = check.search().unwrap();
+    assert_eq!(found.what, ONE_CHAIN, "{}", found.how);
 }
 
 /// Checks the view change with more events than in the usual test; takes some minutes.
@@ -186,6 +222,10 @@ pub(super) struct Chain {
     pub(super) proposals: u8,
     pub(super) reboots: u8,
     pub(super) losses: u8,
+    /// Bit mask of the relays outside of the chain; bit 0 is the first relay.
+    pub(super) outside: u8,
+    /// Number of departures and joins that may still happen.
+    pub(super) moves: u8,
 }
 
 /// Event that can happen next in the model.
@@ -199,6 +239,8 @@ pub(super) enum ModelEvent {
     Passes(usize),
     Reboots(usize),
     Forgets(usize),
+    /// The relay leaves the chain, or joins it again.
+    Moves(usize),
 }
 
 /// Inserts `one` into the sorted list `all`, unless it is there already.
@@ -210,13 +252,16 @@ pub(super) fn insert_sorted<T: Ord>(all: &mut Vec<T>, one: T) {
 
 impl Chain {
     pub(super) fn before(&self, at: usize) -> Option<usize> {
-        (0..at)
-            .rev()
-            .find(|&other| self.parts[other] == self.parts[at])
+        (0..at).rev().find(|&other| self.are_linked(at, other))
     }
 
     pub(super) fn after(&self, at: usize) -> Option<usize> {
-        (at + 1..self.parts.len()).find(|&other| self.parts[other] == self.parts[at])
+        (at + 1..self.parts.len()).find(|&other| self.are_linked(at, other))
+    }
+
+    /// Returns true if two relays are inside of the chain and reach each other.
+    fn are_linked(&self, one: usize, other: usize) -> bool {
+        self.parts[other] == self.parts[one] && self.outside & (1 << one | 1 << other) == 0
     }
 }
 
@@ -296,6 +341,8 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
+    /// Broken rule, for a test: a relay that goes outside counts as agreed on by its neighbours at once.
+    Inside,
     /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that any of
     /// them knows.
     Everybody,
@@ -311,6 +358,9 @@ pub(super) struct Check {
     pub(super) proposals: u8,
     pub(super) reboots: u8,
     pub(super) losses: u8,
+    /// Relays that are outside of the chain at first, as a bit mask.
+    pub(super) outside: u8,
+    pub(super) moves: u8,
     /// True to check in every state that the chain agrees on a view once all links are restored.
     pub(super) heals: bool,
 }
@@ -347,6 +397,8 @@ impl Check {
             proposals: 2,
             reboots: 0,
             losses: 0,
+            outside: 0,
+            moves: 0,
             heals: false,
         }
     }
@@ -508,6 +560,21 @@ impl Check {
         }
     }
 
+    /// Moves relay `at` out of the chain, as `Node::go_outside` does, or back.
+    fn move_relay(&self, chain: &mut Chain, at: usize) {
+        chain.outside ^= 1 << at;
+        let change = &mut chain.relays[at].change;
+        change.leave(Instant::ZERO);
+        change.request = ViewRequest::new(1);
+        if self.rule == Rule::Inside && chain.outside >> at & 1 == 1 {
+            for other in (0..chain.relays.len()).filter(|&other| other != at) {
+                let electorate = &mut chain.relays[other].change.electorate;
+                electorate.agreed.relays = electorate.agreed.relays.saturating_sub(1).max(1);
+            }
+        }
+        self.apply_effects(chain, at, Effects::NONE);
+    }
+
     pub(super) fn reboot(&self, chain: &mut Chain, at: usize, remembers: bool) {
         let electorate = chain.relays[at].change.electorate;
         chain.relays[at] = self.new_relay();
@@ -548,7 +615,7 @@ impl Check {
     /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, the relays
     /// that count as members of such a view must not be more than its number of relays.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
-        self.rule == Rule::Everybody
+        self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {
                 let view = unit.change.electorate.agreed();
                 let members = chain.relays.iter().filter(|unit| {
@@ -611,6 +678,7 @@ impl Check {
         for (part, at) in chain.parts.iter_mut().zip(0..) {
             *part = if there >> at & 1 == 1 { 0 } else { at + 1 };
         }
+        chain.outside = 0;
         if !keeps_air {
             chain.air.clear();
         }
@@ -670,6 +738,8 @@ impl Model for Check {
             proposals: self.proposals,
             reboots: self.reboots,
             losses: self.losses,
+            outside: self.outside,
+            moves: self.moves,
         };
         for at in 0..relays {
             self.apply_effects(&mut chain, at, Effects::NONE);
@@ -681,6 +751,13 @@ impl Model for Check {
         actions.extend(chain.air.iter().copied().map(ModelEvent::Arrives));
         let relays = 0..chain.relays.len();
         for at in relays {
+            if chain.moves > 0 {
+                actions.push(ModelEvent::Moves(at));
+            }
+            if chain.outside >> at & 1 == 1 {
+                // It is silent until it comes back.
+                continue;
+            }
             if chain.proposals > 0 && chain.before(at).is_none() {
                 actions.push(ModelEvent::Proposes(at));
             }
@@ -712,6 +789,7 @@ impl Model for Check {
             ModelEvent::Passes(at) => Self::pass(&mut chain, at),
             ModelEvent::Reboots(at) => self.reboot(&mut chain, at, true),
             ModelEvent::Forgets(at) => self.reboot(&mut chain, at, false),
+            ModelEvent::Moves(at) => self.move_relay(&mut chain, at),
         }
         if chain == *before {
             return None;
@@ -721,6 +799,7 @@ impl Model for Check {
             ModelEvent::Proposes(_) => chain.proposals -= 1,
             ModelEvent::Reboots(_) => chain.reboots -= 1,
             ModelEvent::Forgets(_) => chain.losses -= 1,
+            ModelEvent::Moves(_) => chain.moves -= 1,
             _ => {}
         }
         Some(chain)
@@ -764,11 +843,13 @@ impl Check {
             proposals,
             reboots,
             losses,
+            outside,
+            moves,
             heals,
             ..
         } = self;
         println!(
-            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots and {losses} losses of the votes, \
+            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots, {moves} departures or joins (outside at first: {outside:b}) and {losses} losses of the votes, \
              links are restored: {heals}; searched {} states to depth {} in {:.1} s",
             self.members.len(),
             checker.unique_state_count(),

@@ -11,7 +11,7 @@ use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 /// nodes are those on the side to which the message is sent.
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "seven flags of the wire format"
+    reason = "eight flags of the wire format"
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -29,7 +29,8 @@ pub struct Hello {
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
     /// True if the sender could be inserted between the destination and a neighbour of the destination. This is the
-    /// neighbour that the destination has selected on the sender's side.
+    /// neighbour that the destination has selected on the sender's side. From a sender outside of the chain: it would
+    /// join the chain if called. To a node outside of the chain: it is called.
     pub ready: bool,
     /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are
     /// the connected relays from the sender to the end of the chain away from the destination.
@@ -46,6 +47,9 @@ pub struct Hello {
     /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
     /// destination.
     pub refused: bool,
+    /// True with `fresh` if the sender is outside of the chain: no relay selects it. True without it if the destination is outside: a
+    /// view without it is agreed on, and the relays of that view are in place.
+    pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
 }
@@ -58,7 +62,7 @@ impl Hello {
         distance >= 1 && distance <= 8 && self.hears >> (distance - 1) & 1 == 1
     }
 
-    /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The seven flags share one
+    /// Encodes the hello into `buffer`; returns its length, or `None` if it does not fit. The eight flags share one
     /// byte.
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let flags = [
@@ -69,6 +73,7 @@ impl Hello {
             self.active,
             self.active_in_view,
             self.refused,
+            self.outside,
         ]
         .into_iter()
         .rev()
@@ -97,7 +102,7 @@ impl Hello {
         let neighbour = neighbour.number();
         let behind = behind.number();
         let known = neighbour <= MAX_RELAYS && (1..=MAX_RELAYS).contains(&behind);
-        if !known || hears > 0x0F || flags > 0x7F {
+        if !known || hears > 0x0F {
             return Err(MessageError::Value);
         }
         Ok(Self {
@@ -112,6 +117,7 @@ impl Hello {
             active: flags & 16 != 0,
             active_in_view: flags & 32 != 0,
             refused: flags & 64 != 0,
+            outside: flags & 128 != 0,
             hears,
             offer_number: nonce.number(),
             latest_mission: MissionId {

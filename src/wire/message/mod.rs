@@ -19,7 +19,7 @@ pub use self::report::{Coarse, Detail, Entry, Reports};
 pub use self::round::{
     AdjustStep, Heard, MOST_NAMED, Moved, OwnSeat, OwnSeats, Roster, Sweep, SweepVerdict, Token,
 };
-pub use self::view::{Decision, Poll, Proposal, Pulse, Pulsed, Successor};
+pub use self::view::{Decision, Orders, Poll, Proposal, Pulse, Pulsed, Requests, Successor};
 
 use self::parts::{PassId, Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};

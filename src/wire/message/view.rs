@@ -271,6 +271,71 @@ pub struct Pulse {
     /// Duration of the lease, in tenths of a second: 1 to 65535. The lease of each member starts when that member
     /// takes part in the renewal.
     pub lease: u16,
+    /// Orders of the leader to the relays that leave or join.
+    pub orders: Orders,
+}
+
+/// Orders of the leader, one departure or join at a time, in each lease renewal.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Orders {
+    /// Node that may leave the chain, 0 for none: its neighbours select each other.
+    pub leaver: u16,
+    /// Node outside of the chain that is called to join it, 0 for none.
+    pub joiner: u16,
+    /// True if all relays of the view were in place when the previous renewal completed.
+    pub in_place: bool,
+}
+
+impl Orders {
+    pub(crate) const NONE: Self = Self {
+        leaver: 0,
+        joiner: 0,
+        in_place: false,
+    };
+}
+
+/// Requests to the leader by the relays from the last one to the sender.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Requests {
+    /// Node that needs to leave the chain most urgently, 0 for none.
+    pub leaver: u16,
+    /// Remaining endurance of that node, s; 65535 if unknown, 0 if it has the order to leave.
+    pub endurance_s: u16,
+    /// Node outside of the chain that would join it, 0 for none.
+    pub spare: u16,
+    /// True if all these relays are in place.
+    pub in_place: bool,
+}
+
+impl Requests {
+    pub(crate) const NONE: Self = Self {
+        leaver: 0,
+        endurance_s: 0,
+        spare: 0,
+        in_place: false,
+    };
+
+    /// Returns the requests of two parts of the chain. The more urgent departure counts, and the spare of the lower
+    /// number.
+    pub(crate) fn merge(self, other: Self) -> Self {
+        let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
+        let urgent = if urgency(&other) < urgency(&self) {
+            other
+        } else {
+            self
+        };
+        let spare = match (self.spare, other.spare) {
+            (0, spare) | (spare, 0) => spare,
+            (one, other) => one.min(other),
+        };
+        Self {
+            spare,
+            in_place: self.in_place && other.in_place,
+            ..urgent
+        }
+    }
 }
 
 /// Acknowledgement of a lease renewal; sent back from relay to relay to the leader.
@@ -283,24 +348,37 @@ pub struct Pulsed {
     pub view_digest: u16,
     /// True if the renewal has reached the last relay of the chain. False if it is still on its way.
     pub done: bool,
+    /// Requests of the relays from the last one to the sender. Without meaning unless `done`.
+    pub requests: Requests,
 }
 
 impl Pulse {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
-        write(&(tag::PULSE, pass, Word::new(self.lease)), buffer)
+        let Orders {
+            leaver,
+            joiner,
+            in_place,
+        } = self.orders;
+        let numbers = [self.lease, leaver, joiner].map(Word::new);
+        write(&(tag::PULSE, pass, numbers, in_place), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, lease): (PassId, Word) = read(body)?;
-        let lease = lease.number();
-        if lease == 0 {
+        let (pass, numbers, in_place): (PassId, [Word; 3], bool) = read(body)?;
+        let [lease, leaver, joiner] = numbers.map(Word::number);
+        if lease == 0 || leaver > MAX_RELAYS || joiner > MAX_RELAYS {
             return Err(MessageError::Value);
         }
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
             lease,
+            orders: Orders {
+                leaver,
+                joiner,
+                in_place,
+            },
         })
     }
 }
@@ -308,15 +386,32 @@ impl Pulse {
 impl Pulsed {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
-        write(&(tag::PULSED, pass, self.done), buffer)
+        let Requests {
+            leaver,
+            endurance_s,
+            spare,
+            in_place,
+        } = self.requests;
+        let numbers = [leaver, endurance_s, spare].map(Word::new);
+        write(&(tag::PULSED, pass, self.done, numbers, in_place), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, done): (PassId, bool) = read(body)?;
+        let (pass, done, numbers, in_place): (PassId, bool, [Word; 3], bool) = read(body)?;
+        let [leaver, endurance_s, spare] = numbers.map(Word::number);
+        if leaver > MAX_RELAYS || spare > MAX_RELAYS {
+            return Err(MessageError::Value);
+        }
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
             done,
+            requests: Requests {
+                leaver,
+                endurance_s,
+                spare,
+                in_place,
+            },
         })
     }
 }

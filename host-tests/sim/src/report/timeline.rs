@@ -79,6 +79,8 @@ impl MomentReport {
             TimelineEvent::NewEstimate => "new estimate",
             TimelineEvent::InterfererUnclear => "interferer unclear",
             TimelineEvent::SensorOff => "sensor off",
+            TimelineEvent::MayLeave => "may leave",
+            TimelineEvent::MayLeaveTold => "told to leave",
         };
         let (view, relays) = match moment.what {
             TimelineEvent::ViewAccepted { view, relays, .. } => (Some(view), Some(relays)),

@@ -310,6 +310,7 @@ fn random_message(mission: &Mission, way: ForgedRoute, rng: &mut ChaCha8Rng) -> 
             active: true,
             active_in_view: rng.random(),
             refused: rng.random(),
+            outside: rng.random(),
             offer_number: rng.random(),
         }),
         (3, _) => Message::Proposal(Proposal {

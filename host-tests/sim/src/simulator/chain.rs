@@ -172,6 +172,8 @@ impl Chain {
             event,
             QueuedEvent::Kill
                 | QueuedEvent::Boot
+                | QueuedEvent::Leave(_)
+                | QueuedEvent::Stay
                 | QueuedEvent::Partition
                 | QueuedEvent::Upload
                 | QueuedEvent::Attack(_)
@@ -232,6 +234,8 @@ impl Chain {
                 self.film(index);
                 return;
             }
+            QueuedEvent::Leave(endurance_s) => member.relay.leave(now, endurance_s),
+            QueuedEvent::Stay => member.relay.stay(now),
             QueuedEvent::Bytes { port, bytes } => {
                 // The relay must accept any fragmentation of the byte stream: split at a random offset.
                 let cut = self.rng.random_range(0..=bytes.len());
@@ -402,6 +406,9 @@ fn switched_on(
         index,
     };
     let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
+    if setup.spares.contains(&index) {
+        relay.wait_as_spare(now);
+    }
     if let Some(upload) = stored {
         let resumed = relay.resume(upload);
         debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
@@ -435,6 +442,13 @@ impl Chain {
         for &(index, at) in &setup.boots {
             queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Boot);
         }
+        for &(index, at, endurance_s) in &setup.leaves {
+            let event = QueuedEvent::Leave(endurance_s);
+            queue.put(at, usize::from(index.saturating_sub(1)), event);
+        }
+        for &(index, at) in &setup.stays {
+            queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Stay);
+        }
         for (which, spec) in setup.uploads.iter().enumerate() {
             queue.put(spec.at, which, QueuedEvent::Upload);
         }
@@ -444,6 +458,8 @@ impl Chain {
         let mut pending_planned = put_fleet(&setup, &mut queue)
             + setup.kills.len()
             + setup.boots.len()
+            + setup.leaves.len()
+            + setup.stays.len()
             + setup.uploads.len();
         let parts = setup.partitions.iter().map(|part| (part.from, part.until));
         let deaf = setup.deaf.iter().map(|deaf| (deaf.from, deaf.until));
@@ -587,6 +603,10 @@ pub enum QueuedEvent {
     Kill,
     /// The relay is switched on again.
     Boot,
+    /// The relay requests to leave the chain, with this remaining endurance, s.
+    Leave(Option<u16>),
+    /// The relay cancels its departure.
+    Stay,
     /// A partition or a one-way link failure begins or ends.
     Partition,
     /// A radio on the shared channel reaches its next step, such as the end of a frame.

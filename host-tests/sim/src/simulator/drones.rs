@@ -237,6 +237,11 @@ impl Flight {
         Some(sum(drone.estimated_position(), noise))
     }
 
+    /// Returns the true position of drone `index` (from 0); `None` if there is no such drone.
+    pub(super) fn true_position(&self, index: usize) -> Option<Point> {
+        Some(self.drones.get(index)?.body.at)
+    }
+
     pub(super) fn nearest(&self, now: Instant) -> Option<Nearest> {
         let places: Vec<Point> = self.drones.iter().map(|drone| drone.body.at).collect();
         Nearest::of(&places, now)

@@ -83,6 +83,10 @@ pub enum TimelineEvent {
     InterfererUnclear,
     /// The relay found that one other node's measurements do not agree with those of the rest of the chain.
     SensorOff,
+    /// The relay is outside of the chain, and its drone may fly away.
+    MayLeave,
+    /// The relay has told another one, outside of the chain, that its drone may fly away.
+    MayLeaveTold,
 }
 
 /// Entry in the log of a run: an event at one node.
@@ -214,6 +218,10 @@ pub struct Outcome {
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
     pub margin_m: f64,
+    /// Drones that relay data at each time step: relay number from 1, and true position. Recorded for simple drones
+    /// with [`Setup::track`](super::setup::Setup::track). These are the living relays with a setpoint, without spares and relays
+    /// that may leave.
+    pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
     pub margin_at: Option<Nearest>,
     /// Number of position targets that relays sent while the autopilot accepts none, such as on the ground.

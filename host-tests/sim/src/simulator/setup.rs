@@ -87,6 +87,14 @@ pub struct Setup {
     ///
     /// A relay keeps only what it has stored: an uploaded mission, and its record of votes on views.
     pub boots: Vec<(u16, Instant)>,
+    /// Relays that request to leave the chain: number from 1, time, and remaining endurance, s, if known.
+    ///
+    /// They are switched off once they may leave.
+    pub leaves: Vec<(u16, Instant, Option<u16>)>,
+    /// Relays that cancel their departure: number from 1 and time.
+    pub stays: Vec<(u16, Instant)>,
+    /// Relays that wait outside of the chain from the start until the leader calls them, by number from 1.
+    pub spares: Vec<u16>,
     /// Partitions: periods in which two parts of the chain do not receive each other.
     pub partitions: Vec<Partition>,
     /// True if relays sign frames, with a key drawn from the seed. The epoch counts the starts of a relay.
@@ -148,6 +156,9 @@ impl Setup {
             faults: Faults::default(),
             kills: Vec::new(),
             boots: Vec::new(),
+            leaves: Vec::new(),
+            stays: Vec::new(),
+            spares: Vec::new(),
             partitions: Vec::new(),
             auth: false,
             uploads: Vec::new(),

@@ -2,9 +2,9 @@
 
 use uav_relay::flight::autopilot::AutopilotEvent;
 use uav_relay::flight::autopilot::state::State;
-use uav_relay::{Duration, HoldReason, Instant, Side};
+use uav_relay::{Departure, Duration, HoldReason, Instant, Side};
 
-use super::{Chain, QueuedEvent};
+use super::{Chain, Member, QueuedEvent};
 use crate::simulator::drones::{Flight, Nearest, Point, apart, placement, point};
 use crate::simulator::fleet::Vehicle;
 use crate::simulator::outcome::TimelineEvent;
@@ -285,8 +285,28 @@ impl Chain {
             }
         }
         self.keep(flight.nearest(now));
+        if self.setup.track {
+            let serving = self.serving(&flight);
+            self.outcome.serving.push((now, serving));
+        }
         self.queue.put(now + flight.step, 0, QueuedEvent::Fly);
         self.flight = Some(flight);
+    }
+
+    /// Returns the drones that relay data now, by relay number from 1, with their true positions.
+    fn serving(&self, flight: &Flight) -> Vec<(u16, Point)> {
+        let serves = |member: &Member| {
+            let is_out = matches!(
+                member.relay.departure(self.now),
+                Departure::Spare | Departure::Free
+            );
+            member.killed.is_none() && member.relay.setpoint().is_some() && !is_out
+        };
+        let serving = self.members.iter().enumerate();
+        serving
+            .filter(|(_, member)| serves(member))
+            .filter_map(|(index, member)| Some((member.node, flight.true_position(index)?)))
+            .collect()
     }
 
     /// Records `nearest`, two drones and their distance, if it is the closest approach of the run so far.

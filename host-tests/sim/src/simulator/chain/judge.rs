@@ -400,6 +400,12 @@ impl Chain {
                 Event::DuplicateIndex { node } => (TimelineEvent::DuplicateIndex, Some(node)),
                 Event::NewEstimate => (TimelineEvent::NewEstimate, None),
                 Event::InterfererUnclear => (TimelineEvent::InterfererUnclear, None),
+                Event::MayLeave => {
+                    self.queue.put(self.now, index, QueuedEvent::Kill);
+                    self.pending_planned += 1;
+                    (TimelineEvent::MayLeave, None)
+                }
+                Event::MayLeaveTold { node, .. } => (TimelineEvent::MayLeaveTold, Some(node)),
                 Event::SensorOff { node } => (TimelineEvent::SensorOff, Some(node)),
                 Event::LeaseLapsed => (TimelineEvent::LeaseLapsed, None),
                 Event::Converged => {

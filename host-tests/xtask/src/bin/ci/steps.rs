@@ -19,7 +19,7 @@ pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 /// Feature sets with which the library's tests and a simulated flight are run.
 ///
 /// All other tests use the full set.
-const SETS: [&str; 8] = [
+const SETS: [&str; 9] = [
     "",
     "guard",
     "guard,flight",
@@ -27,6 +27,7 @@ const SETS: [&str; 8] = [
     "altitude,adjust",
     "field,noise,reverse,guard,auth",
     "guard,upload",
+    "guard,departures",
     "telemetry",
 ];
 

@@ -1,0 +1,450 @@
+//! Departure: a relay leaves the chain while it holds its place, or waits outside as a spare.
+//!
+//! Requests travel to the leader in the replies to lease renewals, orders from the leader in the renewals (see `lease`). The states
+//! and rules are in [`docs::batteries`](crate::docs::batteries).
+//!
+//! | event | action |
+//! | --- | --- |
+//! | `wait_as_spare`, or `leave`, before this relay has taken part in anything | go outside, as a spare or as a leaver |
+//! | order to leave; both neighbours have selected the relay beyond (the only one at an end) | go outside; keep the setpoint |
+//! | order for the neighbour to leave, received by all | ask the nodes beyond it for a hello; at the end of the chain: give up the neighbour |
+//! | hello of the node beyond the neighbour that is ordered to leave | select it |
+//! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
+//! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
+//! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost |
+
+use super::{Layers, Node};
+use crate::event::{Event, NodeEvent};
+use crate::guard::HoldReason;
+use crate::node::context::{Member, longest_lease, tenths};
+use crate::node::neighbour::hearing::CANDIDATES;
+use crate::place::Placement;
+use crate::settings::{Settings, Wiring};
+use crate::side::Side;
+use crate::time::{Duration, Instant};
+use crate::view::ViewId;
+use crate::wire::message::{Hello, Requests};
+
+/// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
+const IN_PLACE_M: f32 = 3.0;
+
+/// Time after which an ordered departure counts as blocked, in units of `dead_after`. The neighbours then do not receive each
+/// other. It is requested again after the same time.
+const BLOCKED_AFTER: u32 = 4;
+
+/// State of a relay that leaves the chain or waits outside of it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Departure {
+    /// Member of the chain, or about to join it.
+    Member,
+    /// Departure requested: the relay holds its place until the leader's order.
+    Requested,
+    /// Departure refused: without a guard the neighbours fly close to the drone that still holds its place. See
+    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard).
+    NeedsGuard,
+    /// Departure refused: over two wires per relay the neighbours do not receive each other.
+    NeedsChannel,
+    /// Departure refused for now: the remaining relays would have no quorum, or there are none.
+    NeedsQuorum,
+    /// Departure refused for now: the numbers of the two neighbours differ by more than four.
+    WideGap,
+    /// Departure refused for a minute: the two neighbours have not selected each other.
+    Blocked,
+    /// Spare outside of the chain, which the leader may call.
+    Spare,
+    /// Relay outside of the chain: it holds its place, and the others close up.
+    Outside,
+    /// Relay outside of the chain: the drone may fly away.
+    Free,
+}
+
+/// Departure of this relay, and what it knows of spares.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Leaving {
+    requested: bool,
+    /// Time at which the drone's endurance ends; `None` if unknown.
+    lasts_until: Option<Instant>,
+    /// Time at which this relay went outside of the chain; `None` inside.
+    outside_since: Option<Instant>,
+    /// True for each side at which the chain ended with this relay when it went outside.
+    ended: [bool; 2],
+    /// True for each side whose neighbour has selected the relay beyond this one.
+    passed: [bool; 2],
+    spare: bool,
+    free: bool,
+    /// Time of the first order to leave since the request; `None` before.
+    ordered_at: Option<Instant>,
+    /// Last reported position of the drone; `None` before any.
+    place: Option<Placement>,
+    /// Position to arrive at; `None` before the first agreement, and while the setpoint moves.
+    goal: Option<Placement>,
+    /// Spare that was received last, and when.
+    heard_spare: Option<(u16, Instant)>,
+    /// Relay outside of the chain, on this side, that has to be told when it may leave.
+    waiting: Option<(Side, u16)>,
+}
+
+impl Leaving {
+    pub(crate) fn new() -> Self {
+        Self::default()
+    }
+
+    /// Returns the duration of the motion to a newly agreed position.
+    pub(crate) const fn respacing(settings: &Settings) -> Duration {
+        settings.respacing
+    }
+
+    pub(crate) const fn is_outside(&self) -> bool {
+        self.outside_since.is_some()
+    }
+
+    /// Returns true if this relay waits outside of the chain until it is called.
+    pub(crate) const fn is_spare(&self) -> bool {
+        self.spare
+    }
+
+    pub(crate) const fn record_place(&mut self, place: Placement) {
+        self.place = Some(place);
+    }
+
+    /// Records the adoption of a view: an order of the view before has ended.
+    pub(crate) const fn end_order(&mut self) {
+        self.ordered_at = None;
+        self.passed = [false; 2];
+    }
+
+    /// Returns true if the drone has arrived at its agreed position, as far as its own position is known.
+    fn is_in_place(&self) -> bool {
+        self.goal.is_some_and(|goal| {
+            self.place.is_none_or(|place| {
+                let off_m = [
+                    place.x_m - goal.x_m,
+                    place.y_m - goal.y_m,
+                    place.altitude_m - goal.altitude_m,
+                ];
+                off_m.iter().all(|off_m| off_m.abs() <= IN_PLACE_M)
+            })
+        })
+    }
+}
+
+impl Layers {
+    /// Returns the reason why this relay cannot leave the chain now; `None` if it can.
+    fn departure_refusal(&self, now: Instant, member: &Member) -> Option<Departure> {
+        let Member {
+            node,
+            mission,
+            settings,
+            view,
+            ..
+        } = member;
+        let relays = u32::from(mission.relays());
+        let proposer = match *view {
+            ViewId::LOADED => mission.leader(),
+            view => view.proposer(),
+        };
+        let weight = 2 * relays.saturating_sub(1) + u32::from(proposer != *node);
+        let [before, after] =
+            [Side::Upstream, Side::Downstream].map(|side| self.neighbours.at(side).node());
+        let blocked = settings.dead_after.times(BLOCKED_AFTER);
+        let ordered_for = self.leaving.ordered_at.map(|at| now.since(at));
+        if settings.wiring == Wiring::Pair {
+            Some(Departure::NeedsChannel)
+        } else if settings.guard.is_none() && !settings.leave_without_guard {
+            Some(Departure::NeedsGuard)
+        } else if relays < 2 || settings.quorum && weight <= relays {
+            Some(Departure::NeedsQuorum)
+        } else if before != 0 && after.saturating_sub(before) > CANDIDATES {
+            Some(Departure::WideGap)
+        } else if ordered_for.is_some_and(|span| blocked <= span && span < blocked.times(2)) {
+            Some(Departure::Blocked)
+        } else {
+            None
+        }
+    }
+
+    /// Updates the requests of this relay to the leader, for the next renewal.
+    pub(super) fn update_requests(&mut self, now: Instant, member: &Member) {
+        let Leaving {
+            requested,
+            lasts_until,
+            heard_spare,
+            ..
+        } = self.leaving;
+        // 0 is the mark of the relay that has the order to leave.
+        let endurance_s = lasts_until.map_or(u16::MAX, |at| (tenths(at.since(now)) / 10).max(1));
+        let leaves = requested && self.departure_refusal(now, member).is_none();
+        let ordered = self.lease.orders().leaver == member.node;
+        let known = heard_spare.filter(|(_, at)| now.since(*at) < member.settings.dead_after);
+        let requests = Requests {
+            leaver: if leaves { member.node } else { 0 },
+            endurance_s: if ordered || !leaves { 0 } else { endurance_s },
+            spare: known.map_or(0, |(node, _)| node),
+            in_place: self.leaving.is_in_place(),
+        };
+        self.lease.set_requests(requests);
+    }
+}
+
+impl Node {
+    /// Requests to leave the chain. `endurance_s` is the remaining endurance of the drone, s; `None` if unknown. A relay that
+    /// has not taken part in anything since its start goes outside at once.
+    pub(crate) fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
+        let leaving = &mut self.layers.leaving;
+        leaving.lasts_until =
+            endurance_s.map(|left_s| now + Duration::from_millis(1_000).times(left_s.into()));
+        if leaving.requested && !leaving.spare {
+            return;
+        }
+        leaving.requested = true;
+        leaving.spare = false;
+        leaving.end_order();
+        let refused = self.layers.departure_refusal(now, &self.member).is_some();
+        if !refused && self.layers.round.is_fresh() && !self.layers.leaving.is_outside() {
+            self.go_outside(now, false);
+        }
+    }
+
+    /// Makes this relay a spare outside of the chain. No effect if it has taken part in anything since its start, leads,
+    /// has requested to leave, or has two wires.
+    pub(crate) fn wait_as_spare(&mut self, now: Instant) {
+        let leaving = &self.layers.leaving;
+        let may = self.searches() && self.layers.round.is_fresh() && !leaving.requested;
+        if may && !leaving.is_outside() {
+            self.go_outside(now, true);
+        }
+    }
+
+    /// Cancels the departure: this relay stays in the chain, or joins it again.
+    pub(crate) fn stay(&mut self, now: Instant) {
+        self.layers.leaving.requested = false;
+        self.come_back(now);
+    }
+
+    pub(crate) fn departure(&self, now: Instant) -> Departure {
+        let leaving = &self.layers.leaving;
+        match self.layers.departure_refusal(now, &self.member) {
+            _ if leaving.free => Departure::Free,
+            _ if leaving.spare => Departure::Spare,
+            _ if leaving.is_outside() => Departure::Outside,
+            _ if !leaving.requested => Departure::Member,
+            Some(refused) => refused,
+            None => Departure::Requested,
+        }
+    }
+
+    /// Leaves the view: this relay has no neighbours, and no relay selects it. It keeps its setpoint.
+    fn go_outside(&mut self, now: Instant, spare: bool) {
+        // A relay that has just started knows no neighbours: it counts as an end only if there is no number beyond.
+        let ends = [self.member.node == 1, self.member.node == self.member.all];
+        let fresh = self.layers.round.is_fresh();
+        self.layers.leaving.ended = [0, 1].map(|at: usize| {
+            let known = self.layers.neighbours.nodes().get(at).copied().flatten();
+            known.is_none() && (!fresh || ends.get(at).copied().unwrap_or(false))
+        });
+        self.become_active(now);
+        self.layers.view.request.stop();
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).give_up(now, true);
+        }
+        let leaving = &mut self.layers.leaving;
+        leaving.outside_since = Some(now);
+        leaving.spare = spare;
+    }
+
+    /// Joins the chain again, as a relay that was lost; no effect inside.
+    fn come_back(&mut self, now: Instant) {
+        let leaving = &mut self.layers.leaving;
+        if leaving.outside_since.take().is_none() {
+            return;
+        }
+        leaving.spare = false;
+        leaving.free = false;
+        leaving.end_order();
+        for side in [Side::Upstream, Side::Downstream] {
+            self.layers.neighbours.at_mut(side).give_up(now, false);
+        }
+        if self.layers.round.is_fresh() {
+            self.await_first(now);
+        } else {
+            self.layers.view.request.request_now(now);
+        }
+    }
+
+    /// Returns this relay to the chain if it is outside and could not become free for too long. Without a later view
+    /// the relay is still needed.
+    pub(super) fn return_if_expired(&mut self, now: Instant) {
+        let Leaving {
+            outside_since,
+            spare,
+            free,
+            ..
+        } = self.layers.leaving;
+        let settings = &self.member.settings;
+        let most = if self.layers.view.latest_view() > self.member.view {
+            longest_lease(settings).times(2)
+        } else {
+            settings.dead_after
+        };
+        if !spare && !free && outside_since.is_some_and(|at| now.since(at) >= most) {
+            self.come_back(now);
+        }
+    }
+
+    /// Returns true if `node` is between this relay and its neighbour at `side`, or beyond the end.
+    fn is_beside(&self, side: Side, node: u16) -> bool {
+        let own = self.member.node;
+        let neighbour = self.layers.neighbours.at(side).node();
+        neighbour == 0 || node.abs_diff(own) < neighbour.abs_diff(own)
+    }
+
+    /// Returns true if node `to` at `side`, outside of the chain, may leave. The view without it is agreed on and its
+    /// relays are in place.
+    pub(super) fn frees(&self, side: Side, to: u16) -> bool {
+        let lease = &self.layers.lease;
+        let complete = lease.is_whole() && lease.until().is_some() && lease.orders().in_place;
+        complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
+    }
+
+    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away.
+    pub(super) fn on_freed(&mut self, side: Side, to: u16) {
+        self.raise_node_event(NodeEvent::MayLeaveTold, side, to);
+    }
+
+    /// Returns true if node `to` at `side`, outside of the chain, is called to join it.
+    pub(super) fn calls(&self, side: Side, to: u16) -> bool {
+        self.layers.lease.orders().joiner == to && self.is_beside(side, to)
+    }
+
+    /// Updates the position at which this relay counts as in place; `wanted` is the place to fly to.
+    pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
+        // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
+        let is_held = [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .any(|side| self.steering.hold_reason(side) == Some(HoldReason::Lost));
+        let goal = if is_held {
+            self.steering.setpoint(wanted)
+        } else {
+            self.layers.round.agreed_place()
+        };
+        self.layers.leaving.goal = goal.filter(|_| !self.steering.is_moving());
+    }
+
+    /// Follows the leader's orders in the last lease renewal.
+    pub(super) fn follow_orders(&mut self, now: Instant) {
+        let orders = self.layers.lease.orders();
+        if orders.leaver == self.member.node && self.layers.leaving.requested {
+            let blocked = self.member.settings.dead_after.times(2 * BLOCKED_AFTER);
+            let at = self.layers.leaving.ordered_at;
+            let at = at.filter(|at| now.since(*at) < blocked);
+            self.layers.leaving.ordered_at = Some(at.unwrap_or(now));
+        } else if orders.leaver != 0 {
+            self.layers.leaving.end_order();
+        }
+        if orders.in_place
+            && let Some((side, node)) = self.layers.leaving.waiting.take()
+        {
+            self.schedule_hello(side, node, false);
+        }
+        for side in [Side::Upstream, Side::Downstream] {
+            if orders.joiner != 0
+                && self.side_of(orders.joiner) == Some(side)
+                && self.is_beside(side, orders.joiner)
+            {
+                self.schedule_hello(side, orders.joiner, true);
+            }
+            let neighbour = self.layers.neighbours.at(side);
+            let leaves =
+                orders.leaver != 0 && neighbour.node() == orders.leaver && neighbour.is_agreed();
+            // Before the renewal has completed, relays beyond may not have the order.
+            if !leaves || !self.layers.lease.has_completed() {
+                continue;
+            }
+            let Member { index, mission, .. } = &self.member;
+            let is_end = match side {
+                Side::Upstream => *index <= 2,
+                Side::Downstream => index.saturating_add(1) >= mission.relays(),
+            };
+            if is_end {
+                self.layers.neighbours.at_mut(side).give_up(now, true);
+                self.steering.set_neighbour(side, None);
+                self.schedule_hello(side, orders.leaver, true);
+            } else {
+                self.layers.neighbours.at_mut(side).schedule_hellos();
+            }
+        }
+        self.review_neighbours(now);
+    }
+
+    /// Handles the part of a hello of node `from` that concerns relays outside of the chain. Returns true if nothing else
+    /// in the hello counts: this relay or the sender is outside.
+    pub(super) fn on_departure(
+        &mut self,
+        now: Instant,
+        side: Side,
+        from: u16,
+        hello: &Hello,
+    ) -> bool {
+        let (own, settings) = (self.member.node, self.member.settings);
+        let is_neighbour = self.layers.neighbours.at(side).node() == from;
+        if self.layers.leaving.is_outside() {
+            self.layers
+                .neighbours
+                .at_mut(side)
+                .record_unselected(now, &settings);
+            let later = hello.latest_view > self.member.view;
+            let leaving = &mut self.layers.leaving;
+            let [up, down] = leaving.ended;
+            // The chain goes on beyond this relay as it did before.
+            let goes_on = match (side, hello.neighbour) {
+                (Side::Upstream, 0) => down,
+                (Side::Upstream, beyond) => beyond > own,
+                (Side::Downstream, 0) => up,
+                (Side::Downstream, beyond) => beyond < own,
+            };
+            let told = hello.outside && !hello.fresh && later && goes_on;
+            if told && !leaving.spare && !leaving.free {
+                leaving.free = true;
+                self.raise(Event::MayLeave);
+            } else if hello.ready && !hello.fresh && leaving.spare {
+                self.come_back(now);
+            }
+            return true;
+        }
+        if hello.outside && hello.fresh {
+            if is_neighbour {
+                self.layers.neighbours.at_mut(side).give_up(now, false);
+                self.steering.set_neighbour(side, None);
+            } else if !hello.ready {
+                self.layers.leaving.waiting = Some((side, from));
+            } else if self.is_beside(side, from) {
+                self.layers.leaving.heard_spare = Some((from, now));
+            }
+            return true;
+        }
+        let leaving = &mut self.layers.leaving;
+        // A spare that was called counts as one until it has joined: the departure waits for it.
+        if let Some((node, at)) = &mut leaving.heard_spare
+            && *node == from
+            && !is_neighbour
+        {
+            *at = now;
+        }
+        let ordered = self.layers.lease.orders().leaver == own && leaving.requested;
+        if is_neighbour && let Some(passed) = leaving.passed.get_mut(side as usize) {
+            *passed = hello.neighbour != own;
+        }
+        let passed = leaving.passed;
+        let is_passed = [Side::Upstream, Side::Downstream]
+            .into_iter()
+            .zip(passed)
+            .all(|(side, passed)| passed || self.layers.neighbours.at(side).has_no_peer());
+        if is_neighbour && ordered && is_passed && !self.layers.view.has_no_quorum() {
+            self.go_outside(now, false);
+            return true;
+        }
+        false
+    }
+}

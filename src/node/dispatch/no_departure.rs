@@ -1,0 +1,69 @@
+//! Departures in a build without the feature `departures`.
+//!
+//! This relay hands on the requests and orders of the others, and selects no node outside of the chain.
+
+#![expect(
+    clippy::unused_self,
+    reason = "the same interface as that of `departure`"
+)]
+
+use super::{Layers, Node};
+use crate::node::context::Member;
+use crate::place::Placement;
+use crate::settings::Settings;
+use crate::side::Side;
+use crate::time::{Duration, Instant};
+use crate::wire::message::Hello;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Leaving;
+
+impl Leaving {
+    pub(crate) const fn new() -> Self {
+        Self
+    }
+
+    pub(crate) const fn respacing(_: &Settings) -> Duration {
+        Duration::from_micros(0)
+    }
+
+    pub(crate) const fn is_outside(self) -> bool {
+        false
+    }
+
+    pub(crate) const fn is_spare(self) -> bool {
+        false
+    }
+
+    pub(crate) const fn record_place(self, _: Placement) {}
+
+    pub(crate) const fn end_order(self) {}
+}
+
+impl Layers {
+    pub(super) const fn update_requests(&self, _: Instant, _: &Member) {}
+}
+
+impl Node {
+    pub(super) const fn return_if_expired(&self, _: Instant) {}
+
+    pub(super) const fn frees(&self, _: Side, _: u16) -> bool {
+        false
+    }
+
+    pub(super) const fn on_freed(&self, _: Side, _: u16) {}
+
+    pub(super) const fn calls(&self, _: Side, _: u16) -> bool {
+        false
+    }
+
+    pub(super) const fn update_goal(&self, _: Option<Placement>) {}
+
+    pub(super) const fn follow_orders(&self, _: Instant) {}
+
+    /// Returns true if node `from` is outside of the chain, and must not be selected. If it is the neighbour, its hello
+    /// ends the link as any hello of a neighbour that has not selected this relay.
+    pub(super) fn on_departure(&self, _: Instant, side: Side, from: u16, hello: &Hello) -> bool {
+        hello.outside && hello.fresh && self.layers.neighbours.at(side).node() != from
+    }
+}
