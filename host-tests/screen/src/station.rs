@@ -358,7 +358,7 @@ impl StationView {
         all
     }
 
-    /// Returns true if a relay nearer to the station, a possible way of the reports, has just become silent.
+    /// Returns true if a relay nearer to the station, on the way of reports, has just become silent.
     fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
         let all = self.known.values().map(|it| &it.report);
         let mut nearer = all.filter(|it| match end {

@@ -160,12 +160,11 @@ fn a_relay_stays_if_its_neighbours_lose_each_other() {
         let outcome = run(setup.clone()).unwrap();
         let cut = tenths as f64 / 10.0;
         // The news of a cut takes as long as a lost neighbour.
-        match freed(&outcome, 6) {
-            Some(free) => assert!(free < cut + 15.0, "cut after {cut} s, free after {free} s"),
-            None => {
-                stayed += 1;
-                judge(&setup, &outcome, &ALL).unwrap_or_else(|what| panic!("{cut} s: {what}"));
-            }
+        if let Some(free) = freed(&outcome, 6) {
+            assert!(free < cut + 15.0, "cut after {cut} s, free after {free} s");
+        } else {
+            stayed += 1;
+            judge(&setup, &outcome, &ALL).unwrap_or_else(|what| panic!("{cut} s: {what}"));
         }
     }
     println!("the relay stays in {stayed} of 60 runs");
