@@ -62,7 +62,9 @@ fn outages_of_a_long_flight_are_alarms_and_losses() {
             .unwrap_or_else(|| panic!("{:?}", flight.alarms))
             .time_s
     };
-    assert!((begins("relay 2") - 5_005.0).abs() < 1.0);
+    // Before an agreement reports may be slow.
+    let begin_s = begins("relay 2");
+    assert!((begin_s - 5_010.0).abs() < 1.0, "{begin_s}");
     assert!((begins("no report of any relay for 59 s") - 9_005.0).abs() < 1.0);
     let losses: Vec<_> = flight
         .losses

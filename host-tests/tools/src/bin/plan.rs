@@ -258,12 +258,13 @@ fn compared(
 
 /// Reads the elevation files, and checks the options that need them.
 fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>, Failure> {
-    let error_m = match &options.scenario {
-        Some(_) => companion(options)?
-            .position_error_m
-            .map_or(POSITION_ERROR_M, f64::from),
-        None => POSITION_ERROR_M,
+    let has_files = scenario.terrain.is_some() || !options.terrain.dem.is_empty();
+    let error_m = if has_files {
+        companion(options)?.position_error_m
+    } else {
+        None
     };
+    let error_m = error_m.map_or(POSITION_ERROR_M, f64::from);
     let elevation = Elevation::load(scenario, &options.terrain.dem, error_m).map_err(|line| {
         let file = if line.starts_with("site") {
             format!("{}: ", options.file())
