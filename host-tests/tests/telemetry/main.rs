@@ -276,7 +276,7 @@ fn runs(seeds: u64, span: [Instant; 2], end: Side, change: impl Fn(&mut Setup)) 
 #[test]
 fn radios_that_collide() {
     // With hidden nodes the aim, 2 s, is missed: more reports collide.
-    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 2.6)] {
+    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 2.9)] {
         let change = |setup: &mut Setup| setup.radio_reach = reach;
         let (figures, most) = runs(12, [s(40), s(280)], Side::Upstream, change);
         figures.print(&format!("8 relays, 57 600 baud, CSMA, {name}"), most);
@@ -291,8 +291,9 @@ fn half_of_all_frames_lost() {
     let (figures, most) = runs(5, [s(120), s(420)], Side::Upstream, change);
     figures.print("8 relays, 57 600 baud, 50 % lost", most);
     assert!(most <= 0.1 * RATE, "{most}");
+    // Departures made lease renewals 12 bytes longer in each round trip, which cost 3 s here and 0.4 s with hidden nodes.
     // The aim, 5 s, is missed: a report needs two frames on average, one a second, and those of the far relays twice as many.
-    assert!(figures.age_s(0.95) <= 11.0, "{}", figures.age_s(0.95));
+    assert!(figures.age_s(0.95) <= 14.5, "{}", figures.age_s(0.95));
 }
 
 #[test]
