@@ -291,7 +291,7 @@ fn half_of_all_frames_lost() {
     let (figures, most) = runs(5, [s(120), s(420)], Side::Upstream, change);
     figures.print("8 relays, 57 600 baud, 50 % lost", most);
     assert!(most <= 0.1 * RATE, "{most}");
-    // Departures made lease renewals 12 bytes longer in each round trip, which cost 3 s here and 0.4 s with hidden nodes.
+    // A lease renewal with the fields of departures is 12 bytes longer in a round trip, which leaves reports less room.
     // The aim, 5 s, is missed: a report needs two frames on average, one a second, and those of the far relays twice as many.
     assert!(figures.age_s(0.95) <= 14.5, "{}", figures.age_s(0.95));
 }
