@@ -183,18 +183,22 @@ local messages = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
         { name = "lease_ds", kind = "u16", unit = "0.1 s", text = "duration of the lease after a member has taken part in a renewal", per = 10, base = "s" },
-        { name = "leaver", kind = "u16", unit = "", text = "relay that may leave the view, or 0" },
-        { name = "joiner", kind = "u16", unit = "", text = "relay that is called to join, or 0" },
         { name = "in_place", kind = "bool", unit = "", text = "true if all relays are in place, see Departures" },
+        { name = "nodes", kind = "option", of = { kind = "group", fields = {
+            { name = "leaver", kind = "u16", unit = "", text = "relay that may leave the view, or 0" },
+            { name = "joiner", kind = "u16", unit = "", text = "relay that is called to join, or 0" },
+        } }, unit = "", text = "none if both are 0:" },
     } },
     [0x10] = { name = "Pulsed", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the renewal, wrapping" },
         { name = "view_digest", kind = "digest", unit = "", text = "digest of the sender's mission and view" },
-        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed: the acknowledgement has come back from the last relay; else the other fields have no meaning" },
-        { name = "leaver", kind = "u16", unit = "", text = "relay that requests to leave, or 0" },
-        { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of its drone, at least 1; 65535 if unknown; 0 if it is the `leaver` of the Pulse" },
-        { name = "spare", kind = "u16", unit = "", text = "relay outside that would join, or 0" },
+        { name = "endurance_s", kind = "u16", unit = "s", text = "endurance of the drone of `leaver`, at least 1; 65535 if unknown; 0 if it is the `leaver` of the Pulse" },
         { name = "in_place", kind = "bool", unit = "", text = "true if the sender and all relays after it are in place" },
+        { name = "nodes", kind = "option", of = { kind = "group", fields = {
+            { name = "leaver", kind = "u16", unit = "", text = "relay that would leave, or 0" },
+            { name = "spare", kind = "u16", unit = "", text = "one that would join, or 0" },
+        } }, unit = "", text = "none if both are 0:" },
+        { name = "done", kind = "bool", unit = "", text = "true if the renewal has completed, back from the last relay; else the other fields have no meaning" },
     } },
     [0x11] = { name = "Sense", fields = {
         { name = "number", kind = "u16", unit = "", text = "number of the pass, wrapping" },

@@ -255,6 +255,24 @@ impl<'s> Draw<'s> {
     }
 }
 
+/// Changes views of a Decision until they are in order.
+fn decision(fields: &mut Fields<'_>) {
+    let get = |fields: &Fields<'_>, name: &str| Numbers(fields).get(name);
+    let (base, view) = (get(fields, "base_view"), get(fields, "proposed_view"));
+    if base > view {
+        fields.set("base_view", Value::View(view as u32));
+        fields.set("proposed_view", Value::View(base as u32));
+    } else if base == view {
+        fields.set("base_view", Value::View(0));
+    }
+    let proposed = get(fields, "proposed_view");
+    if let Some(Value::Group(mut of)) = fields.get("accepted").cloned() {
+        let least = Numbers(&of).get("view").min(proposed);
+        of.set("view", Value::View(least as u32));
+        fields.set("accepted", Value::Group(of));
+    }
+}
+
 /// Changes fields of a message so that they obey the rules between them. [`range`](crate::range) checks these rules.
 fn obey_rules<'f>(message: &str, fields: &mut Fields<'f>) {
     let get = |fields: &Fields<'f>, name: &str| Numbers(fields).get(name);
@@ -314,19 +332,12 @@ fn obey_rules<'f>(message: &str, fields: &mut Fields<'f>) {
             fields.set("votes", Value::Unsigned(votes as u64));
             proposal(fields);
         }
-        "Decision" => {
-            let (base, view) = (get(fields, "base_view"), get(fields, "proposed_view"));
-            if base > view {
-                fields.set("base_view", Value::View(view as u32));
-                fields.set("proposed_view", Value::View(base as u32));
-            } else if base == view {
-                fields.set("base_view", Value::View(0));
-            }
-            let proposed = get(fields, "proposed_view");
-            if let Some(Value::Group(mut of)) = fields.get("accepted").cloned() {
-                let least = Numbers(&of).get("view").min(proposed);
-                of.set("view", Value::View(least as u32));
-                fields.set("accepted", Value::Group(of));
+        "Decision" => decision(fields),
+        "Pulse" | "Pulsed" => {
+            if let Some(Value::Group(of)) = fields.get("nodes")
+                && of.0.iter().all(|(_, value)| *value == Value::Unsigned(0))
+            {
+                fields.set("nodes", Value::None);
             }
         }
         "Sense" | "Sensed" => {

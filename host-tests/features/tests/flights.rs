@@ -24,14 +24,14 @@ const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 ///
 /// With `departures` lease renewals say that all relays are in place; no other feature changes a byte.
 const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
-    0xd0cf_9e40
+    0x7b9b_6625
 } else {
-    0xa04a_5c03
+    0xcbd4_2c1c
 };
 const SAID_ON_A_CHANNEL: u32 = if cfg!(feature = "departures") {
-    0x609f_0216
+    0xe24b_e4a2
 } else {
-    0x6fac_687a
+    0xfb3a_1f20
 };
 
 const MINUTE: Duration = Duration::from_millis(60_000);

@@ -201,17 +201,13 @@ impl Body<'_, '_> {
     fn pulse(&mut self) {
         self.pulse_number();
         self.lease();
-        self.relay();
-        self.relay();
-        self.small(0, 1);
+        self.renewal_nodes();
     }
 
     fn pulsed(&mut self) {
         self.pulse_number();
-        self.small(0, 1);
-        self.relay();
         self.request_number();
-        self.relay();
+        self.renewal_nodes();
         self.small(0, 1);
     }
 

@@ -1,10 +1,10 @@
 //! Chains of one direction, compared with recorded bits.
 //!
-//! The recorded number was computed by the code before missions had a way back.
+//! The recorded numbers were computed by these tests with the code before missions had a way back.
 
 use host_tests::flights::settle;
 use host_tests::placing::{generator, places, setpoints, solve};
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use uav_relay::{Adjust, Band, Local, Method, Mission, MissionConfig};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link, of_stochastic_link};
 use uav_relay_oracle::random::{self, Chain, Style, in_noise};
@@ -70,26 +70,31 @@ fn add_flown(hash: &mut u64, setup: Setup) {
     add(hash, outcome.messages as u32);
 }
 
+/// Returns a random scene of `relays` relays with a band of altitudes; every third one has noise.
+fn scene(rng: &mut impl Rng, round: usize, relays: usize) -> MissionConfig {
+    let link = Link {
+        x_i: rng.random_range(-200.0..1200.0),
+        y_i: rng.random_range(20.0..400.0),
+        ..Link::paper(relays)
+    };
+    let (mission, _) = of_link(&as_relays_know_it(&link), 1e-4).unwrap();
+    MissionConfig {
+        band: Band {
+            least_m: 20.0,
+            most_m: 120.0,
+        },
+        noise_w: if round.is_multiple_of(3) { 1e-9 } else { 0.0 },
+        ..*mission.config()
+    }
+}
+
 #[test]
 fn turns_of_one_direction_are_equal_to_the_bit() {
-    const RECORDED: u64 = 0x9659_977e_434d_648a;
+    const RECORDED: u64 = 0xd4b6_b8c9_266c_43f1;
     let mut rng = generator(3311);
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for round in 0..100_usize {
-        let link = Link {
-            x_i: rng.random_range(-200.0..1200.0),
-            y_i: rng.random_range(20.0..400.0),
-            ..Link::paper(1 + round % 12)
-        };
-        let (mission, _) = of_link(&as_relays_know_it(&link), 1e-4).unwrap();
-        let config = MissionConfig {
-            band: Band {
-                least_m: 20.0,
-                most_m: 120.0,
-            },
-            noise_w: if round % 3 == 0 { 1e-9 } else { 0.0 },
-            ..*mission.config()
-        };
+    for round in 0..SCENARIOS as usize {
+        let config = scene(&mut rng, round, 1 + round % 12);
         let mut setup = Setup::new(Mission::try_new(config).unwrap());
         let local = if round % 2 == 0 {
             Local::Fine
@@ -105,6 +110,32 @@ fn turns_of_one_direction_are_equal_to_the_bit() {
             local,
         });
         add_flown(&mut hash, setup);
+    }
+    assert_eq!(hash, RECORDED, "{hash:#018x}");
+}
+
+/// Checks the joint method. In every second scene the relays also have room to the side.
+#[test]
+fn joint_places_of_one_direction_are_equal_to_the_bit() {
+    const RECORDED: u64 = 0xf047_a192_5366_f9f4;
+    let mut rng = generator(3313);
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for round in 0..SCENARIOS as usize {
+        let mut config = scene(&mut rng, round, 1 + round % 10);
+        if round % 2 == 0 {
+            config.lateral = Band {
+                least_m: -80.0,
+                most_m: 60.0,
+            };
+        }
+        let mut setup = Setup::new(Mission::try_new(config).unwrap());
+        setup.settings.method = Method::Joint;
+        let outcome = settle(setup);
+        for place in setpoints(&outcome) {
+            for part in [place.x_m, place.y_m, place.altitude_m] {
+                add(&mut hash, part.to_bits());
+            }
+        }
     }
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }

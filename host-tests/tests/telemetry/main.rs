@@ -276,7 +276,7 @@ fn runs(seeds: u64, span: [Instant; 2], end: Side, change: impl Fn(&mut Setup)) 
 #[test]
 fn radios_that_collide() {
     // With hidden nodes the aim, 2 s, is missed: more reports collide.
-    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 2.9)] {
+    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 2.6)] {
         let change = |setup: &mut Setup| setup.radio_reach = reach;
         let (figures, most) = runs(12, [s(40), s(280)], Side::Upstream, change);
         figures.print(&format!("8 relays, 57 600 baud, CSMA, {name}"), most);
@@ -288,12 +288,11 @@ fn radios_that_collide() {
 #[test]
 fn half_of_all_frames_lost() {
     let change = |setup: &mut Setup| setup.faults.loss = 0.5;
-    let (figures, most) = runs(5, [s(120), s(420)], Side::Upstream, change);
+    let (figures, most) = runs(20, [s(120), s(420)], Side::Upstream, change);
     figures.print("8 relays, 57 600 baud, 50 % lost", most);
     assert!(most <= 0.1 * RATE, "{most}");
-    // A lease renewal with the fields of departures is 12 bytes longer in a round trip, which leaves reports less room.
     // The aim, 5 s, is missed: a report needs two frames on average, one a second, and those of the far relays twice as many.
-    assert!(figures.age_s(0.95) <= 14.5, "{}", figures.age_s(0.95));
+    assert!(figures.age_s(0.95) <= 12.5, "{}", figures.age_s(0.95));
 }
 
 #[test]

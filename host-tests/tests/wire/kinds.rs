@@ -111,11 +111,11 @@ pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
         upload(2, mission),
         of(
             "Pulse",
-            json!({ "lease_ds": 150, "leaver": 0, "joiner": 0, "in_place": false }),
+            json!({ "lease_ds": 150, "in_place": false, "nodes": null }),
         ),
         of(
             "Pulsed",
-            json!({ "done": true, "leaver": 0, "endurance_s": 0, "spare": 0, "in_place": false }),
+            json!({ "endurance_s": 0, "in_place": false, "nodes": null, "done": true }),
         ),
         of("Sense", heard.clone()),
         of("Sensed", heard),

@@ -255,27 +255,29 @@ fn reports(of: &MessageFields<'_>) -> Reports {
 }
 
 fn pulse(of: &MessageFields<'_>) -> Pulse {
+    let nodes = of.group("nodes");
     Pulse {
         number: of.word("number"),
         view_digest: of.word("view_digest"),
         lease: of.word("lease_ds"),
         orders: Orders {
-            leaver: of.word("leaver"),
-            joiner: of.word("joiner"),
+            leaver: nodes.as_ref().map_or(0, |of| of.word("leaver")),
+            joiner: nodes.as_ref().map_or(0, |of| of.word("joiner")),
             in_place: of.flag("in_place", 0),
         },
     }
 }
 
 fn pulsed(of: &MessageFields<'_>) -> Pulsed {
+    let nodes = of.group("nodes");
     Pulsed {
         number: of.word("number"),
         view_digest: of.word("view_digest"),
         done: of.flag("done", 0),
         requests: Requests {
-            leaver: of.word("leaver"),
+            leaver: nodes.as_ref().map_or(0, |of| of.word("leaver")),
             endurance_s: of.word("endurance_s"),
-            spare: of.word("spare"),
+            spare: nodes.as_ref().map_or(0, |of| of.word("spare")),
             in_place: of.flag("in_place", 0),
         },
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
-use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
+use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, take, write};
 
 /// Proposal of a new view, an agreement on the chain's members. It goes from relay to relay and collects votes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -352,6 +352,43 @@ pub struct Pulsed {
     pub requests: Requests,
 }
 
+/// Common part of a lease renewal and of its acknowledgement. One decoder for both keeps the image small.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct RenewalBody {
+    pass: PassId,
+    number: Word,
+    in_place: bool,
+    /// Node that leaves (lower half) and node that joins, as a u32; `None` if both are 0.
+    nodes: Option<[u8; 4]>,
+}
+
+impl RenewalBody {
+    fn new(pass: PassId, number: u16, in_place: bool, [leaver, joiner]: [u16; 2]) -> Self {
+        let nodes = u32::from(joiner) << 16 | u32::from(leaver);
+        Self {
+            pass,
+            number: Word::new(number),
+            in_place,
+            nodes: (nodes != 0).then(|| nodes.to_le_bytes()),
+        }
+    }
+
+    /// Returns the nodes that leave and join, 0 for none.
+    ///
+    /// # Errors
+    /// [`MessageError::Value`] if a number is above 1000, or if both are there and are 0.
+    fn nodes(&self) -> Result<[u16; 2], MessageError> {
+        let Some([a, b, c, d]) = self.nodes else {
+            return Ok([0; 2]);
+        };
+        let nodes = [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
+        if nodes == [0; 2] || nodes.iter().any(|node| *node > MAX_RELAYS) {
+            return Err(MessageError::Value);
+        }
+        Ok(nodes)
+    }
+}
+
 impl Pulse {
     pub(super) fn encode(self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
@@ -360,24 +397,27 @@ impl Pulse {
             joiner,
             in_place,
         } = self.orders;
-        let numbers = [self.lease, leaver, joiner].map(Word::new);
-        write(&(tag::PULSE, pass, numbers, in_place), buffer)
+        let common = RenewalBody::new(pass, self.lease, in_place, [leaver, joiner]);
+        write(&(tag::PULSE, common), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, numbers, in_place): (PassId, [Word; 3], bool) = read(body)?;
-        let [lease, leaver, joiner] = numbers.map(Word::number);
-        if lease == 0 || leaver > MAX_RELAYS || joiner > MAX_RELAYS {
+        let (common, []) = take::<RenewalBody>(body)? else {
+            return Err(MessageError::Encoding);
+        };
+        let [leaver, joiner] = common.nodes()?;
+        let lease = common.number.number();
+        if lease == 0 {
             return Err(MessageError::Value);
         }
         Ok(Self {
-            number: pass.number(),
-            view_digest: pass.digest(),
+            number: common.pass.number(),
+            view_digest: common.pass.digest(),
             lease,
             orders: Orders {
                 leaver,
                 joiner,
-                in_place,
+                in_place: common.in_place,
             },
         })
     }
@@ -392,25 +432,27 @@ impl Pulsed {
             spare,
             in_place,
         } = self.requests;
-        let numbers = [leaver, endurance_s, spare].map(Word::new);
-        write(&(tag::PULSED, pass, self.done, numbers, in_place), buffer)
+        let common = RenewalBody::new(pass, endurance_s, in_place, [leaver, spare]);
+        write(&(tag::PULSED, common, self.done), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, done, numbers, in_place): (PassId, bool, [Word; 3], bool) = read(body)?;
-        let [leaver, endurance_s, spare] = numbers.map(Word::number);
-        if leaver > MAX_RELAYS || spare > MAX_RELAYS {
-            return Err(MessageError::Value);
-        }
+        let (common, done) = take::<RenewalBody>(body)?;
+        let done = match done {
+            [0] => false,
+            [1] => true,
+            _ => return Err(MessageError::Encoding),
+        };
+        let [leaver, spare] = common.nodes()?;
         Ok(Self {
-            number: pass.number(),
-            view_digest: pass.digest(),
+            number: common.pass.number(),
+            view_digest: common.pass.digest(),
             done,
             requests: Requests {
                 leaver,
-                endurance_s,
+                endurance_s: common.number.number(),
                 spare,
-                in_place,
+                in_place: common.in_place,
             },
         })
     }

@@ -119,6 +119,19 @@ impl Body<'_, '_> {
     }
 
     /// Appends a relay's index to the message: mostly that of a relay in a short chain, 0 to 5, else any.
+    /// Appends the end of a lease renewal: `in_place`, and the nodes that leave and join unless both are 0.
+    pub(super) fn renewal_nodes(&mut self) {
+        self.small(0, 1);
+        if self.small(0, 1) == 1 {
+            self.relay();
+            self.relay();
+            if self.bytes.ends_with(&[0; 4]) {
+                self.bytes.truncate(self.bytes.len() - 2);
+                self.word(1);
+            }
+        }
+    }
+
     pub(super) fn relay(&mut self) {
         let relay = match self.input.byte() {
             small @ 0..240 => u16::from(small % 6),
