@@ -516,7 +516,7 @@ impl Reporting {
     /// [`ChannelLoad`](crate::ChannelLoad): relays may also take a tenth of these, each in proportion to its load.
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
-        let hop = (settings.hop_time.as_micros() * 105 / 1_200).clamp(1, 1 << 24);
+        let hop = (settings.hop_time.as_micros() * 106 / 1_200).clamp(1, 1 << 24);
         let hop = u32::try_from(hop).unwrap_or(u32::MAX);
         let alone = match settings.wiring {
             Wiring::Pair => hop.into(),

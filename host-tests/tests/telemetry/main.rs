@@ -276,9 +276,9 @@ fn runs(seeds: u64, span: [Instant; 2], end: Side, change: impl Fn(&mut Setup)) 
 #[test]
 fn radios_that_collide() {
     // With hidden nodes the aim, 2 s, is missed: more reports collide.
-    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 2.6)] {
+    for (reach, name, limit_s) in [(8, "all in range", 2.0), (4, "hidden nodes", 2.9)] {
         let change = |setup: &mut Setup| setup.radio_reach = reach;
-        let (figures, most) = runs(12, [s(40), s(280)], Side::Upstream, change);
+        let (figures, most) = runs(30, [s(40), s(280)], Side::Upstream, change);
         figures.print(&format!("8 relays, 57 600 baud, CSMA, {name}"), most);
         assert!(figures.age_s(0.95) <= limit_s, "{}", figures.age_s(0.95));
         assert!(most <= 0.1 * RATE, "{most}");
