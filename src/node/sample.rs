@@ -10,8 +10,8 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
-/// True with the feature `field` (known distribution of interference along x). Without it `Settings::measure` is
-/// rejected, and the code is unreachable.
+/// True with the feature `field` (interference as a known distribution along x). If false, `Settings::measure` is
+/// rejected.
 const FIELD: bool = cfg!(feature = "field");
 
 /// Measurement of a relay or of a ground station, which the firmware gives to the relay.
@@ -115,7 +115,7 @@ impl Meter {
         used
     }
 
-    /// Discards the samples, because the relay moves.
+    /// Discards the samples averaged so far, because the relay moves.
     pub(crate) fn restart(&mut self) {
         if let Some((estimator, _)) = &mut self.estimator {
             estimator.clear();
