@@ -10,8 +10,7 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR on which the chain has agreed, with the list of targets (ladder) that contained it. The ladder is that
-/// of the last pass along the chain.
+/// Target SIR on which the chain has agreed, with the list of targets (ladder) of the last pass, which contained it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
@@ -28,8 +27,8 @@ pub struct Agreed {
     pub sweeps: u32,
 }
 
-/// Solver for a whole chain in one program, without messages. It computes a few hops per call. Its size does not
-/// depend on N.
+/// Solver for the positions of a whole chain in one program, without messages between relays. It computes a few hops
+/// per call. Its size does not depend on N, the number of relays.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
@@ -162,8 +161,8 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for `target`; `None` if some relay has none. `plain` is true if every relay
-/// must take the farthest x that meets the target.
+/// Returns the position of relay `index` for the target SIR `target`; `None` if some relay has no position. `plain`
+/// is true if every relay must take the farthest x that meets the target.
 fn placed(
     mission: &Mission,
     target: f32,

@@ -13,19 +13,17 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::{Sender, in_noise, square};
 
-/// Fraction of the squared maximum length of a hop that the joint method uses. The rest is a margin for rounding
-/// errors.
+/// Fraction of a hop's squared maximum length that the joint method uses; the rest is a margin for rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor by which the joint method increases the minimum separation. Its positions may violate the separation
-/// slightly, and the margin makes that harmless.
+/// Factor on the minimum separation in the joint method, so that rounding cannot violate the true separation.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Number of Newton steps in the computation of a hop with noise. Each step linearises the hop's condition at the end
-/// found so far (see [`Tangent`]).
+/// Number of Newton steps in the computation of a hop with noise. Each linearises the hop's condition at the latest
+/// result (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps by which [`Site::halved`] finds the farthest reachable point of a path.
+/// Number of bisection steps by which [`Site::halved`] finds the farthest point of a path that the hop reaches.
 const HALVINGS: u8 = 12;
 
 /// Relay whose position the joint method computes, with the sender of the hop to it.
@@ -71,7 +69,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns this relay without the minimum separation from its sender.
+    /// Returns this relay without the required minimum separation from its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -346,7 +344,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay. Each takes three bytes, as a fraction of its allowed range.
+/// Stored lateral offset and altitude of one relay: three bytes each, as a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -450,7 +448,7 @@ impl Room {
     }
 }
 
-/// Factor on the maximum SIR of the first or last hop, which gives the upper bound of the chain's SIR. The margin
+/// Factor that turns the maximum SIR of the first or last hop into the upper bound of the chain's SIR. The margin
 /// leaves the first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
