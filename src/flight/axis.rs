@@ -45,12 +45,12 @@ pub enum AxisError {
     Rx(Geodetic),
     /// The transmitter and the receiver are less than 10 m apart.
     TooShort {
-        /// Straight distance between transmitter and receiver, m.
+        /// Distance between transmitter and receiver along a straight line, m.
         distance_m: f64,
     },
     /// The transmitter and the receiver are more than 100 km apart.
     TooLong {
-        /// Straight distance between transmitter and receiver, m.
+        /// Distance between transmitter and receiver along a straight line, m.
         distance_m: f64,
     },
 }

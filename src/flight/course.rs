@@ -5,7 +5,7 @@ use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line on earth from Tx to Rx and speed limit with which a drone flies a mission.
+/// Line on earth from Tx to Rx, and the speed limit with which a drone flies along it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// Line on earth from transmitter to receiver.

@@ -6,7 +6,7 @@ use crate::root::sqrt;
 use crate::time::Duration;
 use crate::without_quorum::WithoutQuorum;
 
-/// Default of [`GuardConfig::lag`]: the time to stop from the default speed of the autopilot link.
+/// Default of [`GuardConfig::lag`]: the time to stop from the autopilot link's default speed limit, 9.8 s.
 const LAG: Duration = Duration::from_millis(9_800);
 
 /// Maximum distance from the geofence at which a relay may start, m in each coordinate.
@@ -39,7 +39,7 @@ impl Geofence {
     }
 }
 
-/// Configuration of a guard, set before flight.
+/// Configuration of a relay's guard (collision avoidance), set before flight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
@@ -50,7 +50,7 @@ pub struct GuardConfig {
     pub separation_m: f32,
     /// Number of relays of the mission, 1 to 1000; the same on all relays.
     pub relays: u16,
-    /// Maximum deviation of a hovering relay's reported position, 0 to 1e3 m per coordinate.
+    /// Maximum error of a hovering relay's reported position, 0 to 1e3 m per coordinate.
     ///
     /// It reduces the separation by this much at each of two relays.
     pub hover_m: f32,
@@ -98,8 +98,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the configuration with a geofence large enough for relays that leave the line. Relays leave the line
-    /// Tx to Rx while they have no quorum, if `without_quorum` says so.
+    /// Returns this configuration with a geofence enlarged for relays that leave the line Tx-Rx. They do so while
+    /// they have no quorum, if `without_quorum` says so.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -191,7 +191,7 @@ impl GuardConfig {
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position in the geofence, m: four units in the last place.
+    /// Returns the maximum rounding error of a coordinate in the geofence, m: four units in the last place.
     pub(super) fn rounding(&self) -> f32 {
         let fence = &self.geofence;
         4.0 * f32::EPSILON * fence.most_x_m.abs().max(fence.least_x_m.abs())

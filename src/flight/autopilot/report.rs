@@ -19,7 +19,7 @@ use crate::time::{Duration, Instant};
 /// Minimum time between two equal lines of text to the operator.
 const SPACING: Duration = Duration::from_millis(10_000);
 
-/// Maximum number of different lines of text sent within [`SPACING`].
+/// Maximum number of different lines of text to the operator that are sent within [`SPACING`].
 const RECENT: usize = 16;
 
 /// Maximum number of queued text lines to the operator that this link itself has written.
@@ -141,7 +141,7 @@ pub(super) struct Report {
     /// Last line sent on each topic. An equal line that would have to wait is dropped.
     newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
-    /// Number of values (SIR and position) already sent in the present second.
+    /// Number of values (SIR and position) sent to the operator in the present second.
     sent: usize,
     next_values_at: Option<Instant>,
 }
@@ -160,7 +160,7 @@ impl Report {
         let _ = self.lines.push(line);
     }
 
-    /// Queues a line of the firmware; returns true if it was queued or is already waiting.
+    /// Queues a text line of the firmware for the operator. Returns true if it was queued or is already waiting.
     pub(super) fn queue_text(&mut self, text: &str) -> bool {
         let mut line = String::new();
         for character in text.chars() {
@@ -288,11 +288,11 @@ pub(super) type RelayNumbers = [u16; MOST];
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum AutopilotEvent {
-    /// First message of an autopilot.
+    /// The first message of an autopilot of this kind has arrived.
     Found(Kind),
-    /// Restart of the autopilot.
+    /// The autopilot has restarted.
     Restarted,
-    /// Change of the control state to this one: see [`State`].
+    /// The control state has changed to this one: see [`State`].
     State(State),
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
@@ -300,7 +300,7 @@ pub enum AutopilotEvent {
     /// Reason for which the pilot cannot give the relay control of the drone, by OFFBOARD or GUIDED. Or the reason
     /// for which the relay does not use the mode that the pilot has chosen.
     Waits(WaitReason),
-    /// Readiness: the pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
+    /// The pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,
     /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
     ///

@@ -27,11 +27,11 @@ pub enum State {
     Silent,
     /// The drone is on the ground, or not armed.
     Grounded,
-    /// Drone in the air that is not controlled by the relay.
+    /// The drone is in the air, and the relay does not control it.
     Standby,
-    /// Controlled by the relay: the drone flies to the relay's setpoint.
+    /// The relay controls the drone, which flies to the relay's setpoint.
     Engaged,
-    /// Controlled by the relay, but the drone's position is unknown: the autopilot keeps the last target.
+    /// The relay controls the drone, but its position is unknown: the autopilot keeps the last target.
     Blind,
 }
 
@@ -202,7 +202,7 @@ impl Release {
 pub enum WaitReason {
     /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
     Failsafe,
-    /// Messages from the autopilot arrive late.
+    /// The link from the autopilot is late: its messages are old on arrival.
     Link,
     /// OFFBOARD or GUIDED was chosen before this link started. Another mode has to be chosen first.
     Found,

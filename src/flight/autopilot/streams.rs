@@ -8,8 +8,7 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time for which messages are counted before their rates are checked. Messages that come too rarely are requested
-/// again.
+/// Time window in which the autopilot's messages are counted. Messages that come too rarely are then requested again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.
@@ -21,7 +20,7 @@ const MAX_SILENT_WINDOWS: u8 = 4;
 /// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
 const SELDOM: u8 = 16;
 
-/// Number of unanswered requests after which the autopilot seems unable to receive the link's frames.
+/// Number of unanswered requests after which the autopilot counts as unable to receive the link's frames.
 const UNANSWERED: u8 = 2;
 
 /// Values of `MAV_RESULT` with which the autopilot denies a request for good.
@@ -152,7 +151,7 @@ impl Streams {
         self.since = now;
     }
 
-    /// Requests the autopilot's report of its target again, once the relay controls the drone.
+    /// Restarts the requests for the autopilot's report of its target, once the relay controls the drone.
     ///
     /// An ArduCopter sends that report only in GUIDED, so that earlier requests may have been given up.
     pub(super) fn renew(&mut self) {

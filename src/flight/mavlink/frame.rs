@@ -48,8 +48,8 @@ pub struct Address {
     pub component: u8,
 }
 
-/// Returns the checksum of a frame with the `covered` bytes between start byte and checksum. `known` has the CRC seed
-/// of the message.
+/// Returns the checksum of a frame from the bytes `covered`, those after the start byte. `known` has the CRC seed of
+/// the message.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -65,7 +65,7 @@ pub struct Known {
     pub id: u32,
     /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
     pub crc_extra: u8,
-    /// Length of the message's fields, without extensions of later dialects, bytes.
+    /// Length of the message's original fields, bytes, without extensions that later dialects may add.
     pub length: u8,
 }
 
@@ -104,7 +104,7 @@ pub mod id {
 const ADDED: u8 = 24;
 
 impl Known {
-    /// Maximum payload length of this message with extensions, bytes.
+    /// Maximum payload length of this message, bytes, with extensions that later dialects may add.
     pub const fn longest(self) -> u8 {
         self.length.saturating_add(ADDED)
     }

@@ -258,11 +258,11 @@ pub struct Parser {
 }
 
 enum First {
-    /// The first bytes are the start of an incomplete frame.
+    /// The received bytes are the start of an incomplete frame.
     Part,
-    /// The first bytes are no frame: the header is unknown or invalid.
+    /// The received bytes do not start a frame: the header is unknown or invalid.
     None,
-    /// The first bytes are a corrupted frame.
+    /// The received bytes start with a corrupted frame.
     Broken,
     Frame(Received, usize),
 }

@@ -36,7 +36,7 @@ pub enum Outgoing<'a> {
     Heartbeat,
     /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: requests that a message is sent at an interval.
     SetMessageInterval {
-        /// Id of the requested message.
+        /// MAVLink id of the requested message.
         id: u32,
         /// Interval requested between two of these messages, µs.
         interval_us: u32,
@@ -84,8 +84,8 @@ pub enum Outgoing<'a> {
     },
 }
 
-/// Bits of `type_mask` in a target, which mark values that the autopilot is to ignore. Position (bits 0 to 2),
-/// velocity (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
+/// Bits of `type_mask` in a target message: values that the autopilot must ignore. Position (bits 0 to 2), velocity
+/// (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
 mod mask {
     pub(super) const VELOCITY: u16 = 0b11_1000;
     pub(super) const ACCELERATION: u16 = 0b1_1100_0000;
