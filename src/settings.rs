@@ -11,7 +11,7 @@ use crate::time::Duration;
 use crate::wire::auth::Auth;
 use crate::without_quorum::WithoutQuorum;
 
-/// Time for the computation and the buffers of a link, which the preset settings include in `hop_time`.
+/// Time that the preset settings include in `hop_time` for computation and the link's buffers.
 const LATENCY: Duration = Duration::from_millis(10);
 
 /// Identity of a relay: its network's number, and its index in the chain.
@@ -125,8 +125,8 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first computes the chain's target SIR by itself, from the mission. If that target is right,
-    /// one round trip of messages along the chain is enough. For the bracketed schedule only.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one
+    /// round trip of messages along the chain is enough. For the bracketed schedule only.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
@@ -169,7 +169,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Returns the default settings, for two links of 57 600 baud or faster.
+    /// Returns the default settings, for a link of 57 600 baud or faster to each neighbour.
     ///
     /// The relays compute their positions by [`Method::Align`], the paper's Algorithm 1. The leader predicts the
     /// highest target SIR that the chain can meet, and searches by [`Schedule::Bracketed`] if the prediction is
@@ -274,8 +274,8 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with the minimum `hop_time` for a channel of `baud` bit/s with this `load`. A longer
-    /// `hop_time` is kept.
+    /// Returns the settings with a `hop_time` that is at least the minimum for a channel of `baud` bit/s with this
+    /// `load`.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {

@@ -24,7 +24,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Returns the side to which a relay forwards messages that travel along the chain in this direction.
+    /// Returns the side to which messages are forwarded that travel along the chain in the direction `heading`.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -32,7 +32,7 @@ impl Side {
         }
     }
 
-    /// Returns the side from which messages arrive that travel along the chain in this direction. Replies go back
+    /// Returns the side from which messages arrive that travel along the chain in the direction `heading`. Replies go
     /// there.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {

@@ -163,8 +163,7 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
     }
 }
 
-/// Defines the method `poll` for the ports of one kind of wiring. It is no trait method, because a firmware would
-/// have to import the trait as well.
+/// Defines the method `poll` for the ports of one kind of wiring.
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {

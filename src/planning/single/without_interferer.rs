@@ -69,8 +69,8 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
     }
 }
 
-/// Returns the position between `low` and `high`, x in m, with the largest SIR of the worse hop. The first hop's mean
-/// SIR must only rise or only fall there.
+/// Returns the position between the x `low` and `high`, m, at which the worse hop has its largest SIR. The first
+/// hop's mean SIR must only rise or only fall there.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {

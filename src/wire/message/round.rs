@@ -22,7 +22,7 @@ use crate::wire::message::parts::{
 /// in the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
@@ -40,7 +40,7 @@ pub struct Sweep {
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all kinds of sweep messages. The sender's farthest x for each target follows at the end.
+/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
@@ -139,7 +139,7 @@ pub struct SweepVerdict {
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
-    /// Slack (spare length of the chain) of each target, and the committed target, if any.
+    /// Verdict of the sweep: the chain's spare length for each target, and the committed target, if any.
     pub verdict: Verdict,
     /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
     /// x that it has reported for this target.
@@ -204,7 +204,7 @@ pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 /// sender, in the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
@@ -263,7 +263,7 @@ impl Roster {
 /// Token message of Algorithm 2, in which one relay after the other improves its own position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
@@ -316,16 +316,16 @@ impl Token {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// Token's action: stay, and store the neighbours' positions.
+    /// Stay, and store the neighbours' positions.
     Look,
-    /// Token's action: move if another position has a better SIR.
+    /// Move if another position has a better SIR.
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
         /// Method by which the relay searches for a better position.
         local: Local,
     },
-    /// Token's action: stay for good, because Algorithm 2 has ended.
+    /// Stay for good, because Algorithm 2 has ended.
     Stop,
 }
 
@@ -447,7 +447,7 @@ pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 /// the sender, in the reply those of the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
     /// Digest of the sender's mission and view.
     pub view_digest: u16,
