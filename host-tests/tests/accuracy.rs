@@ -9,9 +9,9 @@ use micromath::F32;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Error {
-    /// Kind of error: the difference from the exact value as a fraction of that value.
+    /// Relative error: the difference from the exact value as a fraction of that value.
     Relative,
-    /// Kind of error: the difference from the exact value, in the function's `unit`.
+    /// Absolute error: the difference from the exact value, in the function's `unit`.
     Absolute,
 }
 

@@ -190,7 +190,7 @@ impl Peer {
         writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
     }
 
-    /// Arms and takes off under the pilot's control.
+    /// Arms the simulated drone and takes off under its pilot's control.
     pub(crate) fn takes_off(&mut self) {
         self.order("arm");
         self.order("takeoff");

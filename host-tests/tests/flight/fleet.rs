@@ -108,7 +108,8 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns a flight's first violation, if any, its smallest distance of drones, m, and duration, s.
+/// Returns the first violated rule of a random flight, if any, the smallest distance of drones, m, and the duration,
+/// s.
 fn judged(seed: u64) -> (Option<String>, f64, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

@@ -21,7 +21,7 @@ pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
     dx.hypot(dy).hypot(dh)
 }
 
-/// Returns the point `at` + `share` * `way`.
+/// Returns the point at the fraction `share` of the vector `way` from `at`: `at` + `share` * `way`.
 pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
     [0, 1, 2].map(|part| at[part] + share * way[part])
 }
@@ -53,12 +53,13 @@ pub(crate) struct Drone {
     pub(crate) speaks: bool,
     /// True while the pilot flies the drone, so that the guard's setpoint is ignored.
     pub(crate) taken: bool,
-    /// True for each side whose neighbour knows that the pilot flies this drone.
+    /// True for each side whose neighbour has been informed that the pilot flies this drone.
     pub(crate) told: [bool; 2],
     /// Range of x that both neighbours keep clear, because they know that the pilot flies this drone.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
-    /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx.
+    /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx. A reply is valid only if
+    /// it repeats the number.
     ///
     /// A reply counts only if it repeats the number.
     pub(crate) said: [u16; 2],
@@ -169,7 +170,7 @@ impl Drone {
         }
     }
 
-    /// Tells the guard whether the drone follows setpoints or its pilot flies it.
+    /// Informs the guard whether the drone follows setpoints or its pilot flies it.
     pub(crate) fn is_flown(&mut self, now_s: f64) {
         if let Some(guard) = &mut self.guard {
             guard.control(instant(now_s), !self.taken);
@@ -203,7 +204,7 @@ impl Drone {
         }
     }
 
-    /// Asks the guard for the setpoint, and sends a changed one to the flight controller with a delay.
+    /// Gets the setpoint from the guard, and sends it, if changed, to the flight controller with a delay.
     pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, config: &GuardConfig, now_s: f64) {
         let Some(guard) = &mut self.guard else {
             return;

@@ -32,7 +32,7 @@ pub(crate) struct Ledger {
     ended: Ended,
     refused: u32,
     signs: [Signs; 2],
-    /// Longest lease granted to the relay; it is at least `dead_after`.
+    /// Longest lease granted to the relay so far; at least `dead_after`.
     longest: Duration,
     /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,

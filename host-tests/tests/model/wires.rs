@@ -39,9 +39,9 @@ struct Line {
 /// Numbers of complete frames that a receiver got.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ended {
-    /// Number of frames that arrived as they were sent.
+    /// Number of frames that arrived unchanged.
     pub(crate) intact: u32,
-    /// Number of frames that arrived changed or incomplete; empty ones do not count.
+    /// Number of frames that arrived changed or incomplete; empty frames do not count.
     pub(crate) broken: u32,
 }
 

@@ -20,7 +20,7 @@ fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     (setup, outcome)
 }
 
-/// Returns the number of membership views that relays accepted after the power failure.
+/// Returns the number of membership views (agreed members of the chain) that relays accepted after the power failure.
 fn views(outcome: &Outcome) -> usize {
     let moments = outcome
         .moments

@@ -144,7 +144,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     vec(step, 1..40)
 }
 
-/// State of a test in which a relay receives random messages.
+/// State of a random test, in which a relay receives random messages.
 struct Flight {
     bench: Bench,
     /// Messages of the test, one of each tag, in the order of the tags.

@@ -210,7 +210,7 @@ pub struct Listening {
 }
 
 impl Listening {
-    /// Rejects options about measurements if `--listen` is missing.
+    /// Rejects options about measurements if `--listen` (the relays locate the interferer) is missing.
     pub fn agree(&self) -> Result<(), Failure> {
         let velocity = self
             .move_interferer

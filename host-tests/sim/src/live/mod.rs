@@ -23,9 +23,9 @@ pub struct LiveView {
     axis: Option<Axis>,
     geofence: Option<Geofence>,
     alarms: Alarms,
-    /// Number of log entries of the run that earlier snapshots contain.
+    /// Number of log entries of the run that were in earlier snapshots.
     told: usize,
-    /// Last report of each relay.
+    /// Newest report of each relay, by its number.
     known: BTreeMap<u16, Report>,
 }
 

@@ -23,15 +23,15 @@ pub(crate) fn placement(at: Point) -> Placement {
     }
 }
 
-/// Random-number stream of the drones' position errors.
+/// Number of the random-number stream from which the drones' position errors are drawn.
 const ERRORS: u64 = 2;
 
 /// Parameters of simple drones, which fly to their setpoints without an autopilot.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FlightSpec {
-    /// Initial hover position of each drone: x, y and altitude, m.
+    /// Initial hover position of each drone: x, y and altitude, m; relay 1 first.
     pub start: Vec<Point>,
-    /// Largest speed of each drone per axis, m/s, above 0.
+    /// Maximum speed of each drone per axis, m/s, above 0; relay 1 first.
     pub speed_mps: Vec<f64>,
     /// Largest acceleration of each drone per axis, m/s^2, above 0. Infinite for instant changes of speed.
     pub acceleration_mps2: f64,

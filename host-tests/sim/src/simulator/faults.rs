@@ -43,7 +43,7 @@ pub struct Arrival {
 }
 
 impl Faults {
-    /// Probabilities of a bad link: 30 % lost, 15 % corrupted, 10 % duplicated and 10 % delayed.
+    /// Fault probabilities of a bad link: 30 % lost, 15 % corrupted, 10 % duplicated and 10 % delayed.
     pub const BAD_DAY: Self = Self {
         loss: 0.3,
         corrupt: 0.15,
@@ -56,7 +56,7 @@ impl Faults {
         *self == Self::default()
     }
 
-    /// Draws the faults of a frame, counts them in `injected`, and returns its arrivals: none, one or two.
+    /// Draws the faults of a frame, counts them in `injected`, and returns the frame's arrivals: none, one or two.
     pub fn inject(
         &self,
         frame: &[u8],

@@ -163,7 +163,7 @@ pub struct RelayEnd {
 /// Availability of the chain over a whole run.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Watched {
-    /// Time when all relays of a view first had agreed positions; `None` if they never had.
+    /// Time when all relays of a view (membership of the chain) first had agreed positions; `None` if they never had.
     pub first_agreement: Option<Instant>,
     /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
     ///
@@ -176,7 +176,7 @@ pub struct Watched {
     pub longest_wrong: Option<Duration>,
     /// Largest number of groups of relays that flew by separate agreements at the same time.
     pub most_flying: usize,
-    /// Smallest distance of two relays during the run, m: of drones if simulated, else of setpoints.
+    /// Minimum distance of two relays during the run, m: of their drones if simulated, else of their setpoints.
     pub least_separation_m: Option<f64>,
 }
 
@@ -213,7 +213,7 @@ pub struct Outcome {
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
     /// never two.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest margin, m: the distance of two drones minus the distance that they have to keep.
+    /// Smallest margin during the run, m: the distance of two drones minus the distance that they have to keep.
     ///
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
@@ -321,7 +321,7 @@ pub enum Link {
 pub struct OnAir {
     /// Time when the last bit of the frame was sent.
     pub at: Instant,
-    /// Number of the frame in the order of sending. It sorts frames that end at the same time.
+    /// Sequence number of the frame, which sorts frames that end at the same time.
     order: u64,
     /// Link on which the frame was sent.
     pub link: Link,

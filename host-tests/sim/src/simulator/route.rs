@@ -38,7 +38,7 @@ const MICRO: Ps = 1_000_000;
 /// Number of picoseconds in a second.
 pub const SECOND: f64 = 1e12;
 
-/// Longest time that a hop may need for one packet, 1000 s in ps. A slower hop counts as broken.
+/// Longest time that a hop may take for one packet, ps: 1000 s. A slower hop counts as broken.
 const SLOWEST: f64 = 1e15;
 
 /// Distance, m, that a drone has to move before its new position is recorded.
@@ -47,7 +47,7 @@ const MOVED_M: f64 = 0.1;
 /// Distance of a drone from its agreed position, m, below which it has arrived.
 const THERE_M: f64 = 5.0;
 
-/// Period for which the positions of moving interferers are taken as constant: 1 s in ps.
+/// Time for which the positions of moving interferers are taken as constant, ps: 1 s.
 const FIXED: Ps = 1_000_000 * MICRO;
 
 /// Converts a virtual time to picoseconds since the start of the run.
@@ -130,7 +130,7 @@ pub struct TrueHops {
     ///
     /// `None` in a random field and in a run with uploads.
     scene: Option<(Scene, [f64; 2])>,
-    /// Missions by version, for runs in which `scene` is `None`. Version 0 is the mission at the start of the run.
+    /// Missions by version, used if `scene` is `None`. Version 0 is the mission at the start of the run.
     missions: Vec<(u16, Mission)>,
     /// Altitude and power of each relay, from relay 1.
     profiles: Vec<Profile>,
@@ -265,7 +265,7 @@ pub struct Hop {
     pub from: usize,
     /// Number of the node that receives.
     pub to: usize,
-    /// Time that one packet takes at the present data rate of the hop, ps, above 0.
+    /// Time that one packet takes on this hop at its present data rate, ps, above 0.
     pub packet: Ps,
     /// Time slots in which the hop may send.
     pub window: Window,
@@ -302,7 +302,7 @@ pub struct Period {
     pub promised_bps: Vec<f64>,
 }
 
-/// Period in which no hop of the route changes.
+/// Period in which no hop of the data's route changes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Stage {
     /// Start of this stage of the route, ps.
@@ -321,7 +321,8 @@ pub struct Stage {
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
     pub stages: Vec<Stage>,
-    /// Periods with a constant view, state of the chain and promised data rate, in order of time. At least one.
+    /// Periods in which the chain's view, its state and the promised data rate are constant, in order of time. At
+    /// least one.
     pub periods: Vec<Period>,
     /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
     pub promised_bps: Vec<f64>,
@@ -415,7 +416,7 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. The slots are assigned anew at each agreement and for each new view.
+/// Time slots of all hops, for each direction: assigned anew at each agreement and for each new view (membership).
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,

@@ -98,14 +98,14 @@ pub struct Delivery {
     pub delays: Vec<Ps>,
 }
 
-/// Statistics of the queue of a node.
+/// Length of a node's packet queue over the time of the traffic.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct QueueLength {
     /// Number of the node: 0 is Tx, then the relays follow, the last one is Rx.
     pub node: usize,
     /// Mean length of the queue over the time of the traffic, packets.
     pub mean: f64,
-    /// Largest length of the queue, packets.
+    /// Largest length of the queue during the traffic, packets.
     pub most: usize,
 }
 
@@ -128,7 +128,7 @@ pub struct Flow {
     pub delays: Vec<Ps>,
     /// Queue statistics of every node that sends.
     pub queues: Vec<QueueLength>,
-    /// Packets and delays in each period of [`Traffic::periods`].
+    /// Packets and their delays in each period of [`Traffic::periods`].
     pub periods: Vec<Delivery>,
 }
 
@@ -139,7 +139,7 @@ pub struct Traffic {
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
-    /// Periods with a constant view, state of the chain and promised data rate, in order of time.
+    /// Periods in which the chain's view, its state and the promised data rate are constant, in order of time.
     pub periods: Vec<Period>,
     /// Traffic to Rx and, if data goes both ways, traffic back to Tx.
     pub flows: Vec<Flow>,
@@ -248,7 +248,7 @@ struct Queue {
     packets: VecDeque<Ps>,
     /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Slot time, ps, that the first packet still needs, counted from `since`. 0 before its transmission.
+    /// Slot time that the first packet still needs, ps, as of `since`; 0 before its transmission starts.
     rest: Ps,
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
@@ -300,7 +300,8 @@ impl Queue {
     }
 }
 
-/// End of a transmission, as an event in a queue: time, order, node, and number of the transmission.
+/// End of a packet's transmission: time, order, node, and number of the transmission. If several end at the same
+/// time, `order` puts the node first that is nearest to the destination of the packets.
 ///
 /// If several end at the same time, `order` puts the node first that is nearest to the destination of the packets.
 type End = Reverse<(Ps, usize, usize, u32)>;

@@ -22,7 +22,8 @@ pub struct TrueInterference {
     pub period: Duration,
     /// True if a relay measures only once at each of its positions.
     pub once: bool,
-    /// Samples that relays get in place of all measurements: the relay's number from 1, and the sample.
+    /// Samples that relays get instead of measurements: the relay's number from 1, and the sample. They get them at
+    /// the time of the first measurement.
     ///
     /// The relays get these samples at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
@@ -61,7 +62,7 @@ pub enum BrokenReading {
     Always(f64),
 }
 
-/// Edge of the cubes in which space is divided, m. All positions in a cube have the same shadowing.
+/// Edge length of the cubes of constant shadowing, m: all positions in one cube have the same random loss.
 const SHADOW_M: f64 = 5.0;
 
 impl TrueInterference {
@@ -150,7 +151,7 @@ impl TrueInterference {
         self.ends && now >= from && now < until
     }
 
-    /// Draws the random factor of a measured power: the mean of `samples` exponential variables of mean 1.
+    /// Draws the random factor of a measured power: the mean of `samples` exponential random variables of mean 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
