@@ -37,12 +37,12 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Reads two bytes as a little-endian number.
+    /// Reads two bytes as a little-endian number; missing bytes count as 0.
     pub const fn word(&mut self) -> u16 {
         u16::from_le_bytes([self.byte(), self.byte()])
     }
 
-    /// Reads four bytes as a little-endian number.
+    /// Reads four bytes as a little-endian number; missing bytes count as 0.
     pub const fn long(&mut self) -> u32 {
         u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])
     }

@@ -115,7 +115,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the profiles of up to eight relays to the message, as in a Gather. Their indices mostly rise.
+    /// Appends profiles (altitude and power) of up to eight relays to the message. Their indices mostly rise.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -164,7 +164,8 @@ impl Body<'_, '_> {
         self.small(0, 0xFE);
     }
 
-    /// Appends the first fields of a Proposal or Decision to the message.
+    /// Appends the fields with which a Proposal or Decision begins: the mission, the view, and a relay's index in the
+    /// view.
     ///
     /// They are the mission, the view and a relay's index in the view.
     fn call(&mut self) {

@@ -41,7 +41,7 @@ pub struct Sent {
     pub bytes: Vec<u8>,
 }
 
-/// Relay under test, and its state at the last check.
+/// Relay under test, with its state at the last check of its rules.
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,

@@ -40,7 +40,7 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// The key is required unless its table has at least one of these other keys.
+    /// Required unless the table has at least one of these other keys.
     Unless(&'static [&'static str]),
 }
 

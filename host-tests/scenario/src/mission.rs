@@ -28,7 +28,7 @@ pub enum Refusal {
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The scenario has fitted slots with a table of rate steps, which relays cannot fit.
+    /// The scenario combines fitted slots with a table of rate steps, to which relays cannot fit slots.
     Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
@@ -206,7 +206,7 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission as known before the first measurements: equal interference everywhere.
+/// Returns the mission as relays assume it before the first measurements: with equal interference everywhere.
 ///
 /// In a random field, the mean of the inverse interference is set everywhere to the value that it has at Rx. A
 /// mission without a random field is returned unchanged.

@@ -62,7 +62,8 @@ fn phase(member: &Member) -> Phase {
     member.watched.relay().phase()
 }
 
-/// Returns a relay's phase, view, index, number of relays and neighbours, for the message of a failure.
+/// Returns a relay's phase, view (membership of the chain), index, number of relays and neighbours, for a failure
+/// message.
 fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();

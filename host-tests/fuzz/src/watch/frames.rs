@@ -7,7 +7,7 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Range of radio messages on a shared channel: a relay sends to nodes at most this many numbers away.
+/// Largest difference of node numbers between sender and receiver of a frame on a shared channel.
 const NEAR: u16 = 4;
 
 /// Network number of every fuzzed relay.

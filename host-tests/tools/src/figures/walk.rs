@@ -21,7 +21,7 @@ pub struct Chain {
     pub sir: f64,
 }
 
-/// Places each relay as far along the chain as the target SIR `target` (linear, > 0) allows.
+/// Places each relay as far toward Rx as the target SIR `target` (linear, > 0) allows.
 ///
 /// `None` if a hop cannot meet the target. If the target is too high, the last relay is far from the end of the
 /// chain, and the last hop has a lower SIR. The cost is one search for a farthest position for each relay.
