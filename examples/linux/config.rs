@@ -131,8 +131,7 @@ impl FileOptions {
         }
     }
 
-    /// Returns an error if the file has settings for an autopilot, but no autopilot is named. Both the file and the
-    /// command line may name one.
+    /// Checks that an autopilot is named, by the file or the command line, if the file has settings for one.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {

@@ -88,9 +88,9 @@ pub struct Ladder {
 /// Test vector: a byte stream that is rejected or has no effect.
 #[derive(Deserialize, Debug)]
 pub struct Rejected {
-    /// Reason why the stream is rejected.
+    /// Reason why the stream is rejected or has no effect, in words.
     pub what: String,
-    /// Names of the counters that the stream increments at a receiver.
+    /// Names of the receive counters that the stream increments at a relay.
     pub counted: Vec<String>,
     /// Bytes of the stream, with the delimiter.
     #[serde(deserialize_with = "hex")]

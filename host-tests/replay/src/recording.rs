@@ -37,7 +37,7 @@ pub struct Recording {
     pub network: u16,
     /// Digest of the mission that the chain loaded before flight; `None` if no frame of the file has it.
     pub mission: Option<u16>,
-    /// Fault of the file, after its last readable frame.
+    /// Fault in the file after its last readable frame; `None` if it is intact.
     pub fault: Option<String>,
 }
 
@@ -127,7 +127,7 @@ fn loaded(message: &Message) -> Option<u16> {
     }
 }
 
-/// Returns the most frequent number.
+/// Returns the most frequent of the numbers; `None` without numbers.
 fn most(numbers: impl Iterator<Item = u16>) -> Option<u16> {
     let mut counts = BTreeMap::<u16, usize>::new();
     for number in numbers {

@@ -42,9 +42,9 @@ pub struct Ground<'a> {
 pub struct Node {
     /// Distance from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// Lateral position, m; positive to the right.
+    /// Lateral position of the antenna, m; positive to the right of the line.
     pub y_m: f64,
-    /// Height above the mean sea level, m.
+    /// Height of the antenna above the mean sea level, m.
     pub amsl_m: f64,
 }
 
@@ -78,7 +78,7 @@ pub struct Clearance {
     pub along_m: f64,
     /// Height of the line of sight above the obstacle, m; below 0 if the hop is blocked.
     pub clearance_m: f64,
-    /// Clearance that a clear hop has at this place, m.
+    /// Clearance that a clear hop needs at this obstacle, m.
     pub required_m: f64,
 }
 
