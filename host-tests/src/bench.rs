@@ -15,7 +15,7 @@ use uav_relay::{
 
 use crate::fixtures::NETWORK;
 
-/// Limit of the number of frames that the bench delivers at one instant; above it the relays seem to send without
+/// Limit of the number of frames that the bench delivers at one instant. Above it the relays seem to send without
 /// end, and the bench panics.
 const MOST_STEPS: u32 = 400_000;
 

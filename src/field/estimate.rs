@@ -37,7 +37,7 @@ const ONE: f32 = 2_147_483_648.0;
 /// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of the samples I / `I_max` for which an estimate is made; below it the rounding would falsify the
+/// Smallest mean of the samples I / `I_max` for which an estimate is made. Below it the rounding would falsify the
 /// estimate.
 const LEAST_MEAN: f32 = 1e-6;
 

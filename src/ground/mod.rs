@@ -646,7 +646,7 @@ impl Watching {
         }
     }
 
-    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays; the farthest comes first.
+    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The farthest comes first.
     fn request(&mut self, now: Instant, reach: u16, node: u64) {
         if self.repeat_at.is_some_and(|at| at <= now) {
             // Two stations do not request at the same time again and again.
@@ -688,7 +688,7 @@ impl Watching {
         true
     }
 
-    /// Merges the report entries that have arrived into the newest report of every relay; `now` is their arrival
+    /// Merges the report entries that have arrived into the newest report of every relay. `now` is their arrival
     /// time.
     fn apply(&mut self, now: Instant) {
         for (entry, detail) in &self.arrived {

@@ -220,7 +220,7 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the least possible distance along x to the upstream neighbour, m; infinity stands for the minimum
+    /// Returns the least possible distance along x to the upstream neighbour, m. Infinity stands for the minimum
     /// separation. It is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {

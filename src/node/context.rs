@@ -182,7 +182,7 @@ impl OtherLeases {
         earlier_lease_left: Some(Duration::from_micros(0)),
     };
 
-    /// Returns the time until all leases of views before `view` have ended, in tenths of a second; `u16::MAX` if
+    /// Returns the time until all leases of views before `view` have ended, in tenths of a second. `u16::MAX` if
     /// unknown. A lease permits a relay to use the agreed positions of its view.
     pub(crate) fn earlier_lease_tenths(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {

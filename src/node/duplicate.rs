@@ -319,7 +319,7 @@ impl IndexClaims {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns this relay's new claim number if all authentication sessions must be restarted with it; else `None`.
+    /// Returns this relay's new claim number if all authentication sessions must be restarted with it. Else `None`.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }

@@ -37,7 +37,7 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Random number (nonce) in this relay's hellos, with the times of its first and last use; 0 stands for none.
+/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0 stands for none.
 ///
 /// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
 #[derive(Clone, Copy, Debug)]

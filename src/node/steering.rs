@@ -268,7 +268,7 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
-    /// Returns the agreed position of the neighbour at `side`; `None` while it is unknown, and without a guard.
+    /// Returns the agreed position of the neighbour at `side`. `None` while it is unknown, and without a guard.
     pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
         self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
     }

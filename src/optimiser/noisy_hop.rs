@@ -42,7 +42,7 @@ use crate::sir::square;
 /// numbers finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
-/// Maximum number of Newton steps in the search for the maximum hop length with noise; four to eight are usual.
+/// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
 const STEPS: u8 = 32;
 
 /// Maximum number of steps of a search by bisection, each of which at least halves the interval.

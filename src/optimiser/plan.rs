@@ -161,7 +161,7 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for the target SIR `target`; `None` if some relay has no position. `plain`
+/// Returns the position of relay `index` for the target SIR `target`. `None` if some relay has no position. `plain`
 /// is true if every relay must take the farthest x that meets the target.
 fn placed(
     mission: &Mission,

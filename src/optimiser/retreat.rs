@@ -76,7 +76,7 @@ pub struct Retreat<'a> {
     /// Smallest x that the hop's sender may take, m.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from the receiver to the sender, and the interference at the sender; `None` for data in one
+    /// Backward hop from the receiver to the sender, and the interference at the sender. `None` for data in one
     /// direction. Its gain is for the field's largest Upsilon = E[1/I], divided by r, the required ratio of backward
     /// to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,

@@ -92,7 +92,7 @@ pub struct Search {
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,
-    /// Bisection for a target that all relays accept; `None` until a relay has refused a target, because it cannot
+    /// Bisection for a target that all relays accept. `None` until a relay has refused a target, because it cannot
     /// take its required position.
     trials: Option<StandTrials>,
     /// True for a mission with traffic in both directions.

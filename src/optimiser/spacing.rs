@@ -475,7 +475,7 @@ impl Hop {
 /// Relative rounding error by which a hop's SIR may be below its target when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns `from_m` + `d`, m, rounded toward `from_m`; `None` if that equals `from_m`, since two relays must not
+/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if that equals `from_m`, since two relays must not
 /// share an x.
 #[expect(
     clippy::inline_always,

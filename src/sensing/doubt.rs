@@ -77,7 +77,7 @@ const AGAIN: (f64, f64) = (25.0, 0.1);
 /// any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions ([`Sums::count`]; older ones count less) with which a faulty relay can be
+/// Minimum number of measured positions ([`Sums::count`]. Older ones count less) with which a faulty relay can be
 /// found.
 const ENOUGH: f32 = 3.5;
 

@@ -52,7 +52,7 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit determines all four unknowns; false if the last one is left out, which tells the source's side
+    /// True if the fit determines all four unknowns. False if the last one is left out, which tells the source's side
     /// of the line.
     full_rank: bool,
 }

@@ -75,7 +75,7 @@ pub(crate) fn is_level(power_w: f32) -> bool {
 /// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
-/// Returns the four terms of the position `at`; a source's inverse interference there is a linear combination of
+/// Returns the four terms of the position `at`. A source's inverse interference there is a linear combination of
 /// them. `distance_m` is the distance from Tx to Rx.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
@@ -90,7 +90,7 @@ pub(crate) const UNIT_W: f32 = 1e-12;
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
 const V: (f32, f32) = (1e-18, 1e18);
 
-/// Converts an expected v = 1e-12 W / I (I is the interference power) to f32; `None` outside of the measurable range.
+/// Converts an expected v = 1e-12 W / I (I is the interference power) to f32. `None` outside of the measurable range.
 pub(crate) fn expected_v(v: f64) -> Option<f32> {
     let (least, most) = (f64::from(V.0), f64::from(V.1));
     #[expect(

@@ -172,7 +172,7 @@ pub(super) trait FrameLink {
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
-    /// Returns the time by which this link must be polled again, later than `now`; `None` if it has nothing to do.
+    /// Returns the time by which this link must be polled again, later than `now`. `None` if it has nothing to do.
     fn wake(&self, now: Instant) -> Option<Instant>;
 }
 

@@ -52,7 +52,7 @@ struct StandTold {
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
-    /// New interference estimate of the relays at this time; `None` without a change, or if they measure nothing.
+    /// New interference estimate of the relays at this time. `None` without a change, or if they measure nothing.
     believed: Option<InterferenceEstimate>,
 }
 

@@ -15,7 +15,7 @@ use crate::recording::{Frame, Recording};
 /// Time window for which one clock offset is determined, s. Clocks drift by 100 ppm at most: 2 ms in it.
 const WINDOW: f64 = 20.0;
 
-/// Change of the clock offset between two consecutive frames that counts as a step of a clock, s; also a backward
+/// Change of the clock offset between two consecutive frames that counts as a step of a clock, s. Also a backward
 /// jump by as much.
 const STEP: f64 = 2.0;
 

@@ -109,7 +109,7 @@ pub fn largest(frames: &[Frame]) -> u16 {
     entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
 }
 
-/// Returns the report entries (states of relays) in a frame with their details; none for other messages.
+/// Returns the report entries (states of relays) in a frame with their details. None for other messages.
 fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
     let report = match &frame.message {
         Some(Message::Report(report)) => Some(report),

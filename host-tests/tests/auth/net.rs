@@ -348,7 +348,7 @@ impl Net {
         });
     }
 
-    /// Returns each relay's setpoint and target SIR as bits, for exact comparison; `None` for a relay without them.
+    /// Returns each relay's setpoint and target SIR as bits, for exact comparison. `None` for a relay without them.
     pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()

@@ -31,7 +31,7 @@ pub(crate) struct Chain {
 /// Number of equal intervals in the grid of the first search.
 const GRID: usize = 300;
 
-/// Number of grid points in a refinement around a relay's position; odd, so that the position is one of them.
+/// Number of grid points in a refinement around a relay's position. Odd, so that the position is one of them.
 const WINDOW: usize = 15;
 
 impl Chain {

@@ -25,7 +25,7 @@ fn times(outcome: &Outcome, relay: u16, what: impl Fn(TimelineEvent) -> bool) ->
         .collect()
 }
 
-/// Returns the time from the request of relay `relay` to its permission to leave, s; `None` if it got none.
+/// Returns the time from the request of relay `relay` to its permission to leave, s. `None` if it got none.
 fn freed(outcome: &Outcome, relay: u16) -> Option<f64> {
     let times = times(outcome, relay, |what| what == TimelineEvent::MayLeave);
     times.first().map(|at| at - AT_S as f64)

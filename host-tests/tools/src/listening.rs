@@ -213,7 +213,7 @@ pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     Ok(setup)
 }
 
-/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1 (0.5 is the median); NaN if there are none.
+/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1 (0.5 is the median). NaN if there are none.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -300,7 +300,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     }
 }
 
-/// Returns the arithmetic mean of `shares`, SIRs as fractions of the best possible ones; NaN if there are none.
+/// Returns the arithmetic mean of `shares`, SIRs as fractions of the best possible ones. NaN if there are none.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

@@ -99,7 +99,7 @@ pub struct Autopilot {
     release: Option<(Release, Instant)>,
     /// Reason why the pilot cannot give the relay control of the drone (`None`: he can), and the start of that state.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason why the pilot cannot give the relay control, and the time of the report; `None` before
+    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` before
     /// any. An inner `None` reports that he can.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the firmware reports the relay as ready to control the drone, once the pilot chooses OFFBOARD or
@@ -555,7 +555,7 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the present reason not to control the drone must be reported; `None` once it has
+    /// Returns the time at which the present reason not to control the drone must be reported. `None` once it has
     /// been.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;

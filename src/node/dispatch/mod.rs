@@ -70,7 +70,7 @@ pub(crate) struct Node {
     pub(crate) reporting: Reporting,
     pub(super) duplicate: IndexClaims,
     pub(super) no_quorum_timer: NoQuorumTimer,
-    /// Received claim to a node number that must be sent back to its sender as an echo; `None` if there is none.
+    /// Received claim to a node number that must be sent back to its sender as an echo. `None` if there is none.
     pub(super) echo: Option<Echo>,
     /// Side to which this relay sends the next claim to its node number.
     pub(super) claim_side: Side,
@@ -285,7 +285,7 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// Returns the current votes on views (acceptor state) if the firmware has not stored them yet; else `None`.
+    /// Returns the current votes on views (acceptor state) if the firmware has not stored them yet. Else `None`.
     pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
         let record = self.view_record();
         (record != self.persisted).then_some(record)

@@ -27,13 +27,13 @@ impl Node {
         self.reporting.handle_frame(now, from);
     }
 
-    /// Returns the next node to which a handshake is due because no report of it has arrived; `None` if there is
+    /// Returns the next node to which a handshake is due because no report of it has arrived. `None` if there is
     /// none.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         self.reporting.poll_greeting()
     }
 
-    /// Returns the next telemetry message (Watch or Report) with its side and its destination; `None` if none is
+    /// Returns the next telemetry message (Watch or Report) with its side and its destination. `None` if none is
     /// pending.
     pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let wait = self.telemetry_waits();

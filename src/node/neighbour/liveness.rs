@@ -85,7 +85,7 @@ const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Latest time at which the neighbour is known to have been alive; at first the time of this relay's start.
+    /// Latest time at which the neighbour is known to have been alive. At first the time of this relay's start.
     last_sign: Instant,
     lost: bool,
     /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.

@@ -62,7 +62,7 @@ pub(crate) struct Neighbour {
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped because there was no quorum; 0 if none since a neighbour was last selected.
+    /// Node whose link was dropped because there was no quorum. 0 if none since a neighbour was last selected.
     dropped: u16,
     /// Previous neighbour, which a nearer node has replaced; 0 for none.
     replaced: u16,
@@ -75,7 +75,7 @@ pub(crate) struct Neighbour {
     /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
     /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node that is not the selected neighbour; `None` before any.
+    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` before any.
     unselected_at: Option<Instant>,
     /// Nodes on this side that were received recently.
     pub(super) hearing: Hearing,
@@ -96,7 +96,7 @@ pub(crate) struct Neighbour {
     pub(super) heartbeat: PendingHeartbeat,
     /// Newest mission that the neighbour has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the search's next hellos; `None` if neither is
+    /// Time of the next check of the neighbour's silence, or of the search's next hellos. `None` if neither is
     /// needed.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
@@ -738,7 +738,7 @@ impl Neighbour {
         }
     }
 
-    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent; `None` if it is
+    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if it is
     /// too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)

@@ -347,7 +347,7 @@ pub(super) struct SensorState {
     pub(super) named: u16,
     /// State of the leader's search for a faulty sensor, which leaves out one relay's measurements after the other.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays; known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
     /// True if the last collected measurements contradict each other, and the faulty sensor was not found.
     pub(super) contradicted: bool,

@@ -546,7 +546,7 @@ pub(crate) struct ViewRequest {
     at: Option<Instant>,
     /// Number of consecutive refusals of view proposals, for want of a quorum.
     refusals: u8,
-    /// Earliest time to which a new reason can advance the next view request after a refusal; `None` if it cannot.
+    /// Earliest time to which a new reason can advance the next view request after a refusal. `None` if it cannot.
     not_before: Option<Instant>,
     jitter: Jitter,
 }

@@ -183,7 +183,7 @@ impl Ascent {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the limit of the target SIR, because the chain meets it but misses the upper bound; returns the next
+    /// Raises the limit of the target SIR, because the chain meets it but misses the upper bound. Returns the next
     /// action.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
@@ -324,7 +324,7 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR); returns the next action.
+    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR). Returns the next action.
     /// `slack` is the chain's spare length at Rx for it, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;

@@ -46,7 +46,7 @@ const AT_ONCE: u16 = 3;
 /// Number of relays that one call of the solver handles in all work but passes.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to each squared hop length, so that no hop time is 0; in units of the squared distance Tx to Rx.
+/// Amount added to each squared hop length, so that no hop time is 0. In units of the squared distance Tx to Rx.
 const SHORTEST: f32 = 1e-12;
 
 /// Initial chains: first and last x of the relays, and first step width of the moves. All are fractions of the
@@ -138,7 +138,7 @@ impl State {
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Minimum squared distance of the two relays, in units of the squared distance Tx to Rx; `None` if an end is Tx
+    /// Minimum squared distance of the two relays, in units of the squared distance Tx to Rx. `None` if an end is Tx
     /// or Rx.
     apart: Option<f32>,
 }

@@ -76,7 +76,7 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (chain's spare length) of a hop's receiver to that of its sender; returns the
+    /// Converts the value function (chain's spare length) of a hop's receiver to that of its sender. Returns the
     /// receiver's policy. The policy is a move of the receiver in two coordinates, within [`low`, `high`], m,
     /// relative to its current position. The third coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
@@ -173,7 +173,7 @@ pub(crate) struct Policy {
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature of the value function, relative to its largest; a smaller one would be rounding noise.
+/// Minimum curvature of the value function, relative to its largest. A smaller one would be rounding noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {

@@ -13,7 +13,7 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::{Sender, in_noise, square};
 
-/// Fraction of a hop's squared maximum length that the joint method uses; the rest is a margin for rounding.
+/// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
 const RIM: f32 = 0.999_99;
 
 /// Factor on the minimum separation in the joint method, so that rounding cannot violate the true separation.

@@ -129,7 +129,7 @@ impl Uploads {
         !self.no_store
     }
 
-    /// Returns the end of the chain whose ground station requests reports, and the start of the requests; `None` if
+    /// Returns the end of the chain whose ground station requests reports, and the start of the requests. `None` if
     /// none does.
     pub fn watches(&self) -> Option<(Side, Instant)> {
         self.watch

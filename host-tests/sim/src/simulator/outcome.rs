@@ -163,7 +163,7 @@ pub struct RelayEnd {
 /// Availability of the chain over a whole run.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Watched {
-    /// Time when all relays of a view (membership of the chain) first had agreed positions; `None` if they never had.
+    /// Time when all relays of a view (membership of the chain) first had agreed positions. `None` if they never had.
     pub first_agreement: Option<Instant>,
     /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
     ///

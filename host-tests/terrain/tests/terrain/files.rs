@@ -83,7 +83,7 @@ impl Raster {
     }
 }
 
-/// Writes an SRTM tile of 1201 x 1201 heights for a test; `height` returns the height at a longitude and latitude.
+/// Writes an SRTM tile of 1201 x 1201 heights for a test. `height` returns the height at a longitude and latitude.
 pub(crate) fn hgt(file: &PathBuf, [west, south]: [f64; 2], height: impl Fn(f64, f64) -> f64) {
     let mut bytes = Vec::new();
     for row in 0..1201 {

@@ -21,7 +21,7 @@ use super::super::chain::{Seat, SolverContext};
 use super::super::hop::{Triple, minus};
 use crate::sir::{Sender, transmitter_gain};
 
-/// Amount added to each squared hop length, so that its logarithm is finite; in units of the squared distance Tx to
+/// Amount added to each squared hop length, so that its logarithm is finite. In units of the squared distance Tx to
 /// Rx.
 const SHORTEST: f32 = 1e-8;
 

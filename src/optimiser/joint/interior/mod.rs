@@ -153,12 +153,12 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of all hops' levels (logarithms of their SIRs) at the tried positions; the field is the next hop.
+    /// Computation of all hops' levels (logarithms of their SIRs) at the tried positions. The field is the next hop.
     Levels(u16),
     /// Computation of the target T from all levels; the field is the number of Newton steps done. T is slightly below
     /// the worst SIR, in ln(SIR).
     Target(u8),
-    /// Summation of the merit (target plus barrier), which decides if a step is accepted; the field is the next hop.
+    /// Summation of the merit (target plus barrier), which decides if a step is accepted. The field is the next hop.
     Merit(u16),
     /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),

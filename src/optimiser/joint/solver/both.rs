@@ -447,7 +447,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Computes the farthest x at which the next relay toward Rx meets `target`; for the last relay its final x.
+    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay its final x.
     /// `None` if the target cannot be met.
     fn line_there(
         &mut self,

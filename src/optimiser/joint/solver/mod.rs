@@ -221,7 +221,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the stored state of the segment whose first relay is `index`; `None` if no segment begins there.
+    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins there.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
