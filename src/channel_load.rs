@@ -39,7 +39,7 @@ const BITS: u64 = 10;
 /// four on either side.
 const NEAR: u16 = 9;
 
-/// Maximum time assumed for one transmission with its wait for the channel, in multiples of a frame's duration.
+/// Maximum time assumed for one transmission with its wait for the channel. The unit is the duration of a frame.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
@@ -165,8 +165,8 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time assumed for one transmission with its wait for the channel, in multiples of a frame's
-    /// duration.
+    /// Returns the time assumed for one transmission with its wait for the channel. The unit is the duration of a
+    /// frame.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,

@@ -217,7 +217,7 @@ impl NodeEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u32,
-    /// Raised events that concern a node on the upstream [0] or downstream [1] side, as bits: bit i is
+    /// Raised events that concern a node on the upstream [0] or downstream [1] side. Bit i stands for
     /// `NodeEvent::ALL[i]`.
     kinds: [u16; 2],
     nodes: [[u16; NodeEvent::ALL.len()]; 2],

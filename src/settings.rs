@@ -274,8 +274,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with a `hop_time` that is at least the minimum for a channel of `baud` bit/s with this
-    /// `load`.
+    /// Returns the settings with at least the minimum `hop_time` for a channel of `baud` bit/s and `load`.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {

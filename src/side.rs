@@ -24,7 +24,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Returns the side to which messages are forwarded that travel along the chain in the direction `heading`.
+    /// Returns the side to which messages that travel along the chain in the direction `heading` go.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,

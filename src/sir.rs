@@ -132,7 +132,7 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns the factor K of the hop from a relay to Tx, m^2: the SIR at Tx is K over the squared length of the hop.
+/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K over the squared length of the hop.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"

@@ -13,7 +13,7 @@ pub struct Stats {
     /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
     /// example as stale.
     pub received: u32,
-    /// Received duplicates of view proposals and of messages along the chain, which this relay has answered again.
+    /// Received duplicates of view proposals and of messages along the chain. This relay has answered them again.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, received on a shared channel.
     pub overheard: u32,
@@ -38,10 +38,10 @@ pub struct Stats {
     pub malformed: u32,
     /// Received intact frames of another network.
     pub foreign: u32,
-    /// Received intact frames from a node that is no neighbour, or, on a point-to-point link, for another node.
+    /// Received intact frames from a node that is no neighbour. On a point-to-point link also those for another node.
     pub misaddressed: u32,
-    /// Received messages from the wrong neighbour: messages along the chain from the next relay, or replies from the
-    /// previous one.
+    /// Received messages from the wrong neighbour. They are messages along the chain from the next relay, or replies
+    /// from the previous one.
     pub misdirected: u32,
     /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and

@@ -24,12 +24,12 @@ pub struct Report {
     pub agreed: Option<Placement>,
     /// Phase of the relay in the agreement on positions.
     pub phase: Phase,
-    /// True while the relay has a lease, which permits it to rely on the agreed positions
-    /// ([`Relay::lease`](crate::Relay::lease)).
+    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). It permits the relay to rely on the
+    /// agreed positions.
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds its position, because of the neighbour toward Tx and of the one toward Rx.
+    /// Reasons why the drone holds its position, because of the neighbours toward Tx and toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],

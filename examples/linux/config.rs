@@ -131,7 +131,7 @@ impl FileOptions {
         }
     }
 
-    /// Checks that an autopilot is named, by the file or the command line, if the file has settings for one.
+    /// Checks that an autopilot is named if the file has settings for one. The file or the command line may name it.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {

@@ -40,8 +40,8 @@ const EVERY: Duration = Duration::from_millis(2_000);
 /// Minimum number of frames rejected for a reason between two checks before the reason is reported.
 const MANY: u32 = 3;
 
-/// Number of damaged frames between two checks from which on the log suggests that the baud rate is wrong, if no
-/// frame was intact.
+/// Number of damaged frames between two checks from which on the log suggests a wrong baud rate. It does so only if
+/// no frame was intact.
 ///
 /// It does so only if no intact frame was received between the two checks.
 const DAMAGED: u32 = 10;

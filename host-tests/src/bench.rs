@@ -127,7 +127,7 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Processes the next event of the bench: delivers an arrived frame, or advances the time to the next event.
+    /// Processes the next event of the bench. It delivers an arrived frame, or advances the time to the next event.
     ///
     /// Then all nodes handle their timers and send. Returns false if nothing is left to do up to `until`.
     pub fn step(&mut self, until: Instant) -> bool {

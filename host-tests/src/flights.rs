@@ -108,7 +108,7 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
     setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
 }
 
-/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, otherwise an empty list. Without a
+/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list. Without a
 /// profile of its own, a relay has the mission's common one.
 ///
 /// With an empty list, all relays have the common profile of the mission.

@@ -23,7 +23,7 @@ const NEAR: f64 = 1e-3;
 /// Relative error by which an upper bound may be too low: search tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
-/// Returns true if a chain meets the SIR `target` with every relay as far along the line as the target permits.
+/// Returns true if a chain meets the SIR `target` with every relay as far along as `target` permits.
 fn is_met_greedily(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {

@@ -49,7 +49,7 @@ fn flown(link: &Link, altitudes: &[f64]) -> Link {
     }
 }
 
-/// Returns the link of the paper's scenario with the interferer at (`x_i`, `y_i`), m, and a separation of 4 m.
+/// Returns the paper's link with the interferer at (`x_i`, `y_i`), m, and a separation of 4 m.
 fn paper(relays: usize, x_i: f64, y_i: f64) -> Link {
     Link {
         x_i,
@@ -221,7 +221,7 @@ fn best_common(link: &Link, room: Corridor) -> f64 {
     (0..=60).map(altitude).filter_map(level).fold(0.0, f64::max)
 }
 
-/// Returns the best SIR of a chain, by trying every way to give each relay one of the altitudes `levels`.
+/// Returns the best SIR over all ways to give each relay of a chain one of the altitudes `levels`.
 fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
     let relays = u32::try_from(link.len()).unwrap();
     let assignments = (0..levels.len().pow(relays)).map(|number| {

@@ -30,8 +30,8 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// relay's ports, as with [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal that wakes the future exchanging data with the relay: raised after received bytes and events of the
-    /// relay.
+    /// Signal that wakes the future exchanging data with the relay. It is raised after received bytes and events of
+    /// the relay.
     exchange_signal: Signal,
     /// Signal that wakes the future sending frames to the autopilot: raised when a frame may be pending.
     send_signal: Signal,

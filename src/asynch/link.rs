@@ -20,7 +20,7 @@ use crate::wire::frame::{FrameBuf, MAX_FRAME};
 /// Pause before a port that has failed or ended is used again, in byte times (11 ms at 115 200 baud).
 const PAUSE: u32 = 128;
 
-/// Time for which the driver-enable pin stays high after the computed end of the last byte, in byte times.
+/// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
 ///
 /// One byte time is for a byte that the port may still be sending, and one for the tolerance of its clock.
 const PIN_HOLD: u32 = 2;

@@ -9,7 +9,8 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W: for interference I of 1e9 W down to 1e-32 W, beyond all that is measured.
+/// Allowed range of Upsilon = E[1/I], 1/W. It is for interference I of 1e9 W down to 1e-32 W, beyond all that is
+/// measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power there.

@@ -664,7 +664,8 @@ impl Watching {
         }
     }
 
-    /// Schedules the request for reports again, to the relay at `distance`, which could not verify an earlier one.
+    /// Schedules the request for reports again for the relay at `distance`. That relay could not verify an earlier
+    /// one.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;
@@ -795,8 +796,7 @@ const REPORTS_PER_HANDSHAKE: u8 = 16;
 pub(super) struct PendingReports {
     /// Last measured interference power, W; 0 before the first measurement.
     power_w: f32,
-    /// Relays to which the last measured power must be reported, as a bit mask: bit d - 1 for the relay at distance
-    /// d.
+    /// Relays to which the last measured power must be reported, as a bit mask. Bit d - 1 is the relay at distance d.
     pending: u8,
     measurements: u8,
 }

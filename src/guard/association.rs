@@ -12,14 +12,14 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove that the neighbour has restarted. Fewer
-/// may be late messages from before.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer may be
+/// late messages from before.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of seconds after which a neighbour's halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of seconds after which a neighbour's last reported x is no longer used, unless a new message comes.
+/// Number of seconds after which a neighbour's last reported x expires, unless a new message comes.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Notice that tells a neighbour that this relay has left the association (session) with it. The relay leaves it
@@ -321,8 +321,8 @@ impl Association {
     }
 }
 
-/// Obstacles that limit this relay's x on one side: a lost relay that may still hover, and a drone that does not fly
-/// to setpoints.
+/// Obstacles that limit this relay's x on one side. They are a lost relay that may still hover, and a drone that does
+/// not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
@@ -459,8 +459,8 @@ impl KeepOut {
         }
     }
 
-    /// Records that the relay lost last may be closer than the minimum separation, until this relay is at x =
-    /// `near_m`.
+    /// Records that the relay lost last may be closer than the minimum separation. This ends when this relay is at x
+    /// = `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
@@ -476,8 +476,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay is the minimum separation away from the lost relay, which is
-    /// at x = `near_m`. `is_beyond` returns true if this relay has passed the x that is its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay is the minimum separation from the lost relay. This is so at x
+    /// = `near_m`. `is_beyond` returns true if this relay has passed the x that is its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -608,8 +608,8 @@ pub enum HoldReason {
     Unheard,
     /// The neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
     Order,
-    /// The agreed positions of this relay and the neighbour are too close along x, and their lateral offsets and
-    /// altitudes do not separate the two.
+    /// The agreed positions of this relay and the neighbour are too close. Neither their x nor their lateral offsets
+    /// and altitudes separate them.
     Close,
     /// A lost relay may still hover between this relay and its agreed position.
     Lost,
@@ -617,6 +617,6 @@ pub enum HoldReason {
     NotFlown,
     /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
     Pending,
-    /// All relays hold their positions, because a relay is, or may be, on the wrong side of a neighbour.
+    /// The chain halts, because a relay is, or may be, on the wrong side of a neighbour.
     Halted,
 }

@@ -6,7 +6,7 @@ use crate::root::sqrt;
 use crate::time::Duration;
 use crate::without_quorum::WithoutQuorum;
 
-/// Default of [`GuardConfig::lag`]: the time to stop from the autopilot link's default speed limit, 9.8 s.
+/// Default of [`GuardConfig::lag`]: time to stop from the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);
 
 /// Maximum distance from the geofence at which a relay may start, m in each coordinate.

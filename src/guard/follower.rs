@@ -11,8 +11,7 @@ use crate::time::Jitter;
 /// modulo 2^16, is above 0 and below the limit.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence toward Tx: a plane x = constant that the upstream neighbour sets, and that this relay stays
-/// beyond.
+/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
@@ -184,7 +183,7 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if nothing on the upstream side forbids this relay to change its lateral offset and altitude.
+    /// Returns true if nothing on the upstream side forbids a change of lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
@@ -197,14 +196,14 @@ impl FenceFollower {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true while this relay and its upstream neighbour may be as close as at the start, even below the
-    /// separation. The neighbour has announced a fence (limit of x), but this relay is not known to be beyond it yet.
+    /// Returns true while this relay and its upstream neighbour may be as close as at the start. That may be below
+    /// the separation. The neighbour has announced a fence (limit of x), but this relay is not known to be beyond it
+    /// yet.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and of its upstream neighbour are closer than the minimum
-    /// separation.
+    /// Returns true if the agreed x of this relay and its upstream neighbour violate the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }

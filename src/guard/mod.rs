@@ -491,8 +491,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position (limited to the geofence), and the relay was reported
-    /// there since.
+    /// Returns true if the setpoint is the agreed position, and the relay was reported there since. The agreed
+    /// position is limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {

@@ -47,7 +47,7 @@ pub(super) struct ReachableInterval {
     /// way to one of them.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report shows the effect of the first setpoint, because it was measured late enough.
+    /// True once a position report was measured late enough to show the effect of the first setpoint.
     known: bool,
 }
 
@@ -206,8 +206,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for five seconds, and `side` may be the cause: the agreed position
-    /// is farther toward `side`, or this side forbids a change of lateral offset or altitude (`clear` is false).
+    /// Returns true if the setpoint has not moved for five seconds, and `side` may be the cause. Then the agreed
+    /// position is farther toward `side`, or this side forbids a change of lateral offset or altitude (`clear` is
+    /// false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -274,8 +275,7 @@ impl Own {
         }
     }
 
-    /// Returns true if two pairs of lateral offset and altitude are equal within the position error of a hovering
-    /// relay.
+    /// Returns true if two lateral offsets and altitudes agree, within a hovering relay's position error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
@@ -300,8 +300,8 @@ impl Own {
         self.goal_of(self.node, self.target_m())
     }
 
-    /// Returns the x to which relay `node` should fly now, m: `target_m`, or its x in an open chain (all relays the
-    /// minimum separation apart along x).
+    /// Returns the x to which relay `node` should fly now, m: `target_m`, or its x in an open chain. In an open chain
+    /// all relays are at least the minimum separation apart along x.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
             self.config.open_chain_x(node, target_m)

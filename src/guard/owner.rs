@@ -7,8 +7,7 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx: a plane x = constant that this relay sets, and that the downstream neighbour stays
-/// beyond.
+/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
@@ -21,20 +20,20 @@ pub(super) struct FenceOwner {
     fence_m: f32,
     /// Distance along x that this relay asks to keep before its fence, m; infinite before any request.
     requested_m: f32,
-    /// Distance along x that must be kept to the downstream neighbour now, m: the agreed one, or a larger one
+    /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed one, or a larger one
     /// requested since. Infinity stands for the minimum separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
     /// Agreed x of the neighbour downstream, m.
     target_m: f32,
-    /// Lateral offset and altitude of the downstream neighbour's setpoint, and true (`arrived`) once the neighbour is
+    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
     /// there.
     across: CrossSection,
     arrived: bool,
     /// True if the neighbour downstream has received the newest fence (limit of x).
     is_acknowledged: bool,
-    /// True once the downstream neighbour has reported that it is past a fence of this relay, at a larger x.
+    /// True once the downstream neighbour has reported that it is past a fence, at a larger x.
     clear: bool,
 }
 
@@ -192,9 +191,9 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if this relay has requested or agreed to less than the minimum separation along x to the
-    /// downstream neighbour. It must then not change its lateral offset or altitude, which may be all that separates
-    /// the two.
+    /// Returns true if less than the minimum separation along x is requested or agreed to. The distance is that to
+    /// the downstream neighbour. It must then not change its lateral offset or altitude, which may be all that
+    /// separates the two.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -269,34 +268,32 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if nothing on the downstream side forbids this relay to change its lateral offset and altitude.
+    /// Returns true if nothing on the downstream side forbids a change of lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true while this relay and its downstream neighbour may be as close as at the start, even below the
-    /// separation. The neighbour has answered, but has not reported yet that it is past a fence (limit of x).
+    /// Returns true while this relay and its downstream neighbour may be as close as at the start. That may be below
+    /// the separation. The neighbour has answered, but has not reported yet that it is past a fence (limit of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and of its downstream neighbour are closer than the minimum
-    /// separation.
+    /// Returns true if the agreed x of this relay and its downstream neighbour violate the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the downstream neighbour has received the newest fence (limit of x), and is known to be beyond
-    /// it.
+    /// Returns true if the downstream neighbour is known to be beyond the newest fence (limit of x).
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x to the downstream neighbour that both agreed positions need, m. It is
-    /// below the minimum separation only if these are that close, and both relays have arrived at their lateral
-    /// offsets and altitudes.
+    /// Returns the smallest distance along x to the downstream neighbour for both agreed positions, m. It is below
+    /// the minimum separation only if these are that close, and both relays have arrived at their lateral offsets and
+    /// altitudes.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();

@@ -20,7 +20,7 @@ pub(crate) const MAX_RELAYS: u16 = 1000;
 /// f32 even near Rx, so that positions stay distinct.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// Maximum rounding error of a step in x between two relays, as a fraction of the distance from Tx to Rx.
+/// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
@@ -46,7 +46,8 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: one transmitter at a known or unknown position, or a distribution along x (field).
+    /// Interference on the hops: one transmitter at a known or unknown position, or a field. A field is a
+    /// distribution along x.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
@@ -227,7 +228,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Lateral range that allows y = 0 only, as in the paper: relays stay in the vertical plane through Tx and Rx.
+    /// Lateral range that allows y = 0 only. As in the paper, relays stay in the vertical plane through Tx and Rx.
     pub const NONE: Self = Self::at(0.0);
 
     /// Returns the range that contains only the value `at_m`, m.
@@ -547,7 +548,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field (distribution along x), or `None` if the interference is a single transmitter.
+    /// Returns the interference field (distribution along x), or `None` for a single transmitter.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
             Interference::Field(field) if cfg!(feature = "field") => Some(field),
@@ -607,8 +608,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay that computes its position first and starts messages along the chain: 1, or N in an
-    /// interference field.
+    /// Returns the leader, which computes its position first. It is 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -723,8 +723,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, if the relays computed after it need no separation.
-    /// Farthest means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, if relays computed after it need no separation. Farthest
+    /// means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
@@ -737,7 +737,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays between it and Rx their minimum separation.
+    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -819,8 +819,8 @@ impl Mission {
     }
 }
 
-/// Substitute for an interferer at an unknown position: so far away that all receivers have the same interference, to
-/// 1e-7.
+/// Substitute for an interferer at an unknown position. It is so far away that all receivers have the same
+/// interference, to 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,

@@ -121,7 +121,7 @@ impl Circulation {
         }
     }
 
-    /// Returns the state of a message at `stage` with all times zero, for model checks that do not model time.
+    /// Returns the state of a message at `stage` with all times zero, for model checks without time.
     #[cfg(test)]
     pub(crate) const fn at_stage(stage: Stage) -> Self {
         Self {
@@ -298,7 +298,7 @@ impl Circulation {
     }
 }
 
-/// Number of consecutive messages with old sequence numbers after which the leader is taken for restarted.
+/// Number of consecutive messages with old sequence numbers that show that the leader has restarted.
 pub(crate) const SUSPICIOUS: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]

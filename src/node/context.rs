@@ -46,8 +46,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank in the mission as loaded before flight, and that mission's number of relays. Rank 1
-    /// is at the leader's end. View changes (of the chain's members) alter neither number.
+    /// Returns this relay's rank and the number of relays in the mission as loaded before flight. Rank 1 is at the
+    /// leader's end. View changes (of the chain's members) alter neither number.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -103,7 +103,8 @@ impl<'a> Context<'a> {
         cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
     }
 
-    /// Returns the maximum duration of a lease (permission to use the agreed positions), in tenths of a second.
+    /// Returns the maximum duration of a lease, in tenths of a second. A lease permits the use of the agreed
+    /// positions.
     pub(crate) fn longest_lease(&self) -> u16 {
         tenths(longest_lease(self.settings()))
     }
@@ -309,7 +310,7 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// Effects of a message of a view (membership) to which this relay does not belong: the message is ignored, and a
+    /// Effects of a message of a view (membership) to which this relay does not belong. The message is ignored, and a
     /// new view is requested.
     pub(crate) const FOREIGN: Self = Self {
         view_needed: true,

@@ -91,8 +91,8 @@ pub(crate) struct IndexClaims {
     rival: u32,
     /// Last claim number received from another node with the same node number; 0 before any.
     last_rival: u32,
-    /// Last contact with another node of this node number: its time, and true if this relay already had a position at
-    /// the first contact. `None` before any.
+    /// Last contact with another node of this node number: its time, and a flag. `None` before any. The flag is true
+    /// if this relay already had a position at the first contact. `None` before any.
     contest: Option<(Instant, bool)>,
     /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
     observed: [Option<Instant>; 2],
@@ -276,7 +276,7 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim to this relay's node number, unless the last one is less than [`least_interval`] ago.
+    /// Schedules a claim to this relay's node number, unless one was sent just before ([`least_interval`]).
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);

@@ -117,7 +117,8 @@ struct Uploads {
     sites: Option<Sites>,
     /// Distance from Tx to Rx of the mission loaded before flight, m.
     loaded_m: f32,
-    /// Range of the altitudes in the mission loaded before flight, m: its permitted range and the common altitude.
+    /// Range of altitudes in the mission loaded before flight, m. It includes the permitted range and the common
+    /// altitude.
     loaded_band: Band,
     /// Identifier of the last mission that a relay has refused; `None` if there is none. It was refused by this
     /// relay, a neighbour, or a relay that is farther away.
@@ -196,8 +197,8 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if the nonce `answer` of an offer was in one of this relay's hellos within the last two
-    /// `dead_after`.
+    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. Recent is within the last
+    /// two `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -284,8 +285,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules replies to the ground station at `side`: a hello if `reports` is true, and the stored upload if
-    /// `asks` has a request's number.
+    /// Schedules replies to the ground station at `side`. It is sent a hello if `reports` is true, and the stored
+    /// upload if `asks` has a request's number.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;

@@ -41,7 +41,7 @@ struct Motion {
     at: Instant,
 }
 
-/// Stepwise motion of the setpoint to a new agreed position, so that all relays of a chain arrive at the same time.
+/// Stepwise motion of the setpoint to a new agreed position. All relays of a chain thus arrive at the same time.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     /// Agreed position at the last call, and the present place to fly to, which approaches it in steps.
@@ -255,9 +255,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint, because they are no longer in the air.
-    /// `others` is true if other relays of the view at that side are not lost. If none of these was received, the
-    /// guard does not move toward that side.
+    /// Removes the limits that lost relays at `side` put on the setpoint. They are no longer in the air. `others` is
+    /// true if other relays of the view at that side are not lost. If none of these was received, the guard does not
+    /// move toward that side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);

@@ -98,8 +98,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay is placed farther from Rx if it receives Rx too weakly where it would be otherwise.
-    /// At x = 650 m, where the search begins, a strong interferer at x = 700 m prevents that. Rx is at x = 1000 m.
+    /// Checks that the last relay is placed farther from Rx if it otherwise receives Rx too weakly. At x = 650 m,
+    /// where the search begins, a strong interferer at x = 700 m prevents that. Rx is at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -14,8 +14,8 @@ pub const TARGETS: usize = 16;
 /// Number of gaps between targets in half of a full ladder (list of targets), including the middle gap.
 const HALF: usize = TARGETS / 2;
 
-/// Ladder: rising list of target SIRs, linear, that the relays try in one pass along the chain (a sweep). Encoded as
-/// one target and two one-byte codes.
+/// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
+/// one-byte codes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
@@ -44,8 +44,8 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets, marked for a plain pass if `plain`: every relay then takes the farthest x that meets
-    /// the target.
+    /// Returns the same targets, for a plain pass if `plain` is true. In it every relay takes the farthest x that
+    /// meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
@@ -187,8 +187,8 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative width of the gap between two targets from its one-byte `code`: (1 + m / 8) 2^(e - 25). m are
-/// the low three bits, e the other five.
+/// Returns the relative width of the gap between two targets. It is (1 + m / 8) 2^(e - 25), encoded by the byte
+/// `code`. m are the low three bits, e the other five.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }

@@ -38,8 +38,8 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Coarse-to-fine search over altitudes: at most 1080 evaluations of both hops, 8730 with traffic in both
-    /// directions.
+    /// Coarse-to-fine search over altitudes. It takes at most 1080 evaluations of both hops, 8730 with traffic in
+    /// both directions.
     #[default]
     Fine,
     /// Search on the paper's grid of positions, with `columns` times `rows` evaluations of both hops.

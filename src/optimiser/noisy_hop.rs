@@ -118,8 +118,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes its sign. `None`
-    /// if g is concave everywhere. g, the hop's margin, is 0 or above where the target is met.
+    /// Returns the distance from the interferer, m, at which the margin g changes its curvature's sign. `None` if g
+    /// is concave everywhere. g, the hop's margin, is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {

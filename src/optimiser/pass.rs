@@ -23,11 +23,11 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough, for data in both
+/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only for data in both
 /// directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of points of an interference field that one call evaluates, unless one target needs more.
+/// Maximum number of points of an interference field that one call evaluates. One target may need more.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay of a pass along the chain, as its message describes it.
@@ -42,7 +42,7 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// Returns a previous relay with this altitude and power, above the line Tx-Rx, without measured interference.
+    /// Returns a previous relay with this altitude and power, above the line, without a measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -429,9 +429,9 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of a sweep (one pass of target SIRs along the chain): slacks, and the target that the chain commits to, if
-/// any. The slack for a target is the maximum length of a chain that meets it, less the distance from Tx to Rx. It is
-/// below 0 if the target is missed.
+/// Result of a sweep: slacks, and the target that the chain commits to, if any. A sweep is one pass of target SIRs
+/// along the chain. The slack for a target is the maximum length of a chain that meets it, less the distance from Tx
+/// to Rx. It is below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index, in the pass's list of targets, of the target that the relays commit to. They then take their positions

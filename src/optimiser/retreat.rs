@@ -59,7 +59,7 @@ use crate::sir::{Sender, square};
 /// Relative rounding error by which the squared length of a backward hop may exceed its maximum.
 const ROUNDING: f32 = 4e-6;
 
-/// Maximum number of units in the last place (of f32) by which a computed hop is shortened until it meets its target.
+/// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.
 const ULPS: u8 = 8;
 
 /// Hop toward Rx in an interference field, from which a pass toward Tx computes the sender's x. It is prepared for
@@ -473,7 +473,8 @@ struct Piece {
     start_m: f32,
     /// Largest x of this part, m.
     end_m: f32,
-    /// Upsilon (mean inverse interference power) at the part's smallest x, as a fraction of the field's largest.
+    /// Upsilon at the part's smallest x, as a fraction of the field's largest. Upsilon is the mean inverse
+    /// interference power.
     level: f32,
     /// Change of `level` per metre of x.
     slope: f32,

@@ -26,8 +26,8 @@ use crate::sir::{self, Sender};
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets per pass along the chain, around the interpolated optimum, until it is known to the mission's
-    /// tolerance.
+    /// Sixteen targets per pass along the chain, around the interpolated optimum. The search ends once it is known to
+    /// the mission's tolerance.
     #[default]
     Bracketed,
     /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the
@@ -57,8 +57,8 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation, as a fraction of the gap between two targets, up to which
-/// the cubic one is used. Both yield the target at which the chain has no spare length.
+/// Maximum difference of cubic and linear interpolation up to which the cubic one is used. It is a fraction of the
+/// gap between two targets. Both yield the target at which the chain has no spare length.
 const BEND: f32 = 0.25;
 
 /// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. The bracket is the

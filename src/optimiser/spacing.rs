@@ -84,7 +84,7 @@ pub struct Hop {
     from_tx: bool,
     /// Maximum x that the hop's receiver may take, m.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m, which leave the relays from there to Rx their minimum
+    /// Maximum x of the receiver and of the sender, m. They leave the relays from there to Rx their minimum
     /// separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
@@ -492,7 +492,7 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the paper's `d_max`, m: the maximum distance along x from which a relay meets `target` at Rx.
+/// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
 ///
 /// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared
 /// distance), gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above

@@ -45,16 +45,16 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of the measurements' errors, as a multiple of the variance that the operator expects. Above it
-/// the search for a faulty relay starts.
+/// Maximum variance of the measurements' errors, over the variance that the operator expects. Above it the search for
+/// a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
 /// Squared deviation, in variances, from which on a measurement shows a faulty relay. The exclusion of that relay
 /// must reduce the fit's residual by as much.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual (sum of squared relative errors) of the fit to all measurements for which a faulty relay is
-/// searched. A measurement that is wrong by some 15 % causes it.
+/// Minimum residual of the fit to all measurements for which a faulty relay is searched. The residual is the sum of
+/// squared relative errors. A measurement that is wrong by some 15 % causes it.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the second smallest variance to the smallest that singles out one faulty relay. Each is the
@@ -109,7 +109,7 @@ pub(crate) struct Trial {
     seen: f32,
     /// Residual of the fit without the node `best`: sum of the squared relative errors.
     seen_best: f32,
-    /// Smallest variance of relative errors among the fits that each leave out one node: that without the node
+    /// Smallest variance of relative errors among the fits that each leave out one node. It is that without the node
     /// `best`.
     least: f32,
     /// Second smallest variance of relative errors among the fits that each leave out one node.

@@ -99,22 +99,22 @@ pub struct NumberedEstimate {
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference below which a new estimate is not worth its adoption.
+/// Mean square relative change of the interference below which a new estimate is not adopted.
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
 /// may mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to the change expected by chance, for a stationary source. Below
-/// it the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to that by chance, for a stationary source. Below it the new
+/// estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to the change expected by chance, for a moving source. Below it
-/// the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to that by chance, for a moving source. Below it the new
+/// estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to the change expected by chance that shows another interferer,
-/// in a chain that has settled (after [`REFINED`] refinements).
+/// Minimum ratio of an estimate's mean square change to that by chance that shows another interferer. It is for a
+/// chain that has settled (after [`REFINED`] refinements).
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -135,19 +135,18 @@ const REFINED: u8 = 4;
 /// far ahead, plus half the interval between two collections of measurements.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Minimum mean square relative error of the measurements at which they contradict the estimated source. The relays
-/// then treat the interference as unknown.
+/// Minimum mean square relative error of measurements that contradicts the estimated source. The relays then treat
+/// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Minimum mean square error of the measurements at which they contradict the mission's interference, as a multiple
-/// of the variance that the operator expects. The relays then treat it as unknown.
+/// Minimum mean square error of measurements that contradicts the mission's interference. It is a multiple of the
+/// variance that the operator expects. The relays then treat it as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information in the measurements: number of measured positions over the variance of one position's relative
-    /// error.
+    /// Information in the measurements: number of positions over the variance of one position's error.
     information: f64,
     /// Expected mean square relative error of the current estimate.
     chance: f64,

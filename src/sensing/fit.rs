@@ -28,7 +28,7 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the operator's expected measurement error in the estimated variance, as a number of measured positions.
+/// Weight of the operator's expected error in the estimated variance, in measured positions.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. Below it they do not
@@ -112,14 +112,14 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the fit's last unknown; its inverse is that unknown's variance, for measurements of variance 1.
+    /// Pivot of the fit's last unknown. Its inverse is that unknown's variance, for measurements of variance 1.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// Returns the variance of the fitted value at a position with these `terms`, for measurements of variance 1: r^T
-    /// G^-1 r, with the terms r and the fit's matrix G.
+    /// Returns the variance of the fitted value at a position, for measurements of variance 1. It is r^T G^-1 r, with
+    /// the position's `terms` r and the fit's matrix G.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -246,8 +246,7 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Returns the information in the measurements: number of measured positions over the variance of one position's
-    /// relative error.
+    /// Returns the information in the measurements: positions over the variance of one position's error.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }

@@ -242,7 +242,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Returns true if a relay can have sent these sums: all are finite, and sums of squares are not negative.
+    /// Returns true if a relay can have sent these sums. All are finite, and sums of squares are not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
@@ -267,7 +267,7 @@ pub(crate) struct Listener {
     heard: Average,
 }
 
-/// Terms of a relay's current position for the fit, and v = 1e-12 W / I for the interference I measured there.
+/// Terms of a relay's current position for the fit, and v = 1e-12 W / I measured there. I is the interference power.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,

@@ -168,7 +168,7 @@ pub(super) trait FrameLink {
     fn has_room(&self) -> bool;
     /// Queues a frame for sending. If the frame does not fit, it is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame that was dropped because the relay addresses it to a port that this driver does not have.
+    /// Counts a frame that was dropped because it is for a port that this driver does not have.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
@@ -275,7 +275,8 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads that failed for another reason.
     pub other: u32,
-    /// Number of failed writes to the port, which are repeated, and of failed checks if all bytes have left the port.
+    /// Number of failed writes to the port, plus failed checks if all bytes have left the port. Failed writes are
+    /// repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,

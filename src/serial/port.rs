@@ -94,7 +94,7 @@ where
     }
 }
 
-/// Converts the result of an `nb` call: `None` stands for `WouldBlock`, which means that the call would have to wait.
+/// Converts the result of an `nb` call. `None` stands for `WouldBlock`, which means that the call would have to wait.
 fn ready<S, T>(result: nb::Result<T, S::Error>) -> Result<Option<T>, Fault>
 where
     S: embedded_hal_nb::serial::ErrorType,

@@ -8,7 +8,7 @@
 
 const BLOCK: usize = 64;
 
-/// Initial state of BLAKE2s: the first 32 fractional bits of the square roots of the first eight primes.
+/// Initial state of BLAKE2s: 32 fractional bits of the square roots of the first eight primes.
 const START: [u32; 8] = [
     0x6A09_E667,
     0xBB67_AE85,
@@ -35,7 +35,8 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
     [[10, 2, 8, 4, 7, 6, 1, 5], [15, 11, 9, 14, 3, 12, 13, 0]],
 ];
 
-/// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`, together below 2^32 bytes.
+/// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`. Together they have fewer than 2^32
+/// bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;

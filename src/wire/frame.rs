@@ -102,7 +102,7 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer `out` into which a frame's body is written, after the COBS code byte and the
+/// Returns the part of the buffer `out` into which a frame's body is written. It is after the COBS code byte and the
 /// header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)

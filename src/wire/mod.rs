@@ -29,5 +29,6 @@ pub const MAX_NODE: u16 = 4094;
 /// Number of nearest nodes on one side that may become the neighbour and are sent hellos.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Maximum length on the wire of a sweep message (pass of up to sixteen target SIRs) with its frame, bytes.
+/// Maximum length on the wire of a sweep message with its frame, bytes. A sweep is a pass of up to sixteen target
+/// SIRs.
 pub const MAX_SWEEP: usize = 100 + auth::TAG_ROOM;

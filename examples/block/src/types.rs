@@ -152,15 +152,16 @@ pub enum ConfigError {
     Method,
     /// The parameters of the method adjust are out of range, or not 0 with another method.
     Adjust,
-    /// The settings for measuring the interference are out of range, or have a maximum power but no number of
+    /// The settings for measuring the interference are out of range. Or they have a maximum power, but no number of
     /// samples.
     Measure,
-    /// The settings for estimating an unknown interferer are out of range, or given although the block has the
-    /// interference as a distribution along x.
+    /// The settings for estimating an unknown interferer are out of range. Or the block has them although it gives
+    /// the interference as a distribution along x.
     Listen,
-    /// The block asks for the joint method with an unknown interferer and traffic from receiver to transmitter.
+    /// The block has the joint method with an unknown interferer and traffic from receiver to transmitter.
     Reverse,
-    /// The block has fitted slots (as long as each hop needs) without the joint method or without a known interferer.
+    /// The block has fitted slots without the joint method or without a known interferer. Fitted slots are as long as
+    /// each hop needs.
     Fitted,
     /// The block has both an interferer and the interference as a distribution along x.
     Interferer,

@@ -20,7 +20,7 @@ pub const BLANK: u32 = u32::MAX;
 /// Number of words of a record in addition to its payload: its sequence number and its CRC.
 pub const OVERHEAD: usize = 2;
 
-/// Maximum number of attempts to write one journal record, each at another place, because flash cells may be worn.
+/// Maximum number of attempts to write one journal record. Each is at another place, because flash cells may be worn.
 const TRIES: usize = 4;
 
 /// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
@@ -190,7 +190,8 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Returns the CRC of the record that begins at word `first`: over all words but the last, and the journal's key.
+    /// Returns the CRC of the record that begins at word `first`. It covers all words but the last, and then the
+    /// journal's key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();

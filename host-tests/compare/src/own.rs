@@ -74,7 +74,8 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// Computes the relays' positions from the mission alone by the joint method, from all of its initial chains.
+/// Computes the relays' positions from the mission alone by the joint method. It uses all of the method's initial
+/// chains.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));

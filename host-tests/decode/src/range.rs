@@ -101,7 +101,7 @@ impl<'f> Numbers<'_, 'f> {
         }
     }
 
-    /// Returns true if the number of the field `name` is exactly 0: an integer 0, or an f32 with all bits 0.
+    /// Returns true if the number of the field `name` is exactly 0. It is an integer 0, or an f32 with all bits 0.
     fn is_zero(&self, name: &str) -> bool {
         let number = self.get(name);
         number == 0.0 && number.is_sign_positive()

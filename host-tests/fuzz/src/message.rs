@@ -164,8 +164,7 @@ impl Body<'_, '_> {
         self.small(0, 0xFE);
     }
 
-    /// Appends the fields with which a Proposal or Decision begins: the mission, the view, and a relay's index in the
-    /// view.
+    /// Appends the first fields of a Proposal or Decision: mission, view, and a relay's index in the view.
     ///
     /// They are the mission, the view and a relay's index in the view.
     fn call(&mut self) {

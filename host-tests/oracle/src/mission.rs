@@ -129,7 +129,7 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
     Mission::try_new(config).ok()
 }
 
-/// Carrier frequency at which the free-space factor (4 pi f / c)^2 is 1, Hz: excess losses then equal path-loss
+/// Carrier frequency at which the free-space factor (4 pi f / c)^2 is 1, Hz. Excess losses then equal path-loss
 /// factors.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 

@@ -38,7 +38,7 @@ pub struct Optimum {
 /// Recorded placement problem with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Name of the test that draws this problem, with the test's random stream, such as `joint_method own 7`.
+    /// Name of the test that draws this problem, with its random stream, such as `joint_method own 7`.
     pub set: String,
     /// Link, and the corridor in which its relays choose positions. In the link the relays are at the lowest
     /// altitude.

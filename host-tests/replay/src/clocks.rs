@@ -33,7 +33,8 @@ pub struct Alignment {
     pub offset_s: [f64; 2],
 }
 
-/// Part of a file from one frame on, with the offsets of the file's clock there, s: each at a time of that clock.
+/// Part of a file, from one frame on, in which the offset of the file's clock is known. Each offset, s, is at a time
+/// of that clock.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -51,7 +52,8 @@ impl Segment {
     }
 }
 
-/// Bounds of the clock offset in one time window, s, and its values by frames that were received in both files.
+/// Bounds of the clock offset in one time window, s. It also has the offsets by frames that were received in both
+/// files.
 #[derive(Default)]
 struct Window {
     times: Vec<f64>,
@@ -253,7 +255,7 @@ fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
     }
 }
 
-/// Checks that a file without common frames is from the time `span` of the other files, by its own clock.
+/// Checks that a file without common frames is from the time `span` of the others, by its own clock.
 fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     let times = file.frames.iter().map(|frame| frame.at);
     let [first, last] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {

@@ -48,7 +48,8 @@ pub struct Loss {
 }
 
 impl Loss {
-    /// Returns true if the relay was silent only in `all`, an outage of all relays, or up to 5 s before or after.
+    /// Returns true if the relay was silent only because all relays were. `all` is that outage; up to 5 s before or
+    /// after it count, too.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -88,8 +89,8 @@ pub struct Flight {
     pub alarms: Vec<Alarm>,
     /// Number of relays in the flight.
     pub relays: u16,
-    /// Time of the first agreement of all relays, s, and the shares of the time since then in which all relays, and
-    /// all members of the last agreed view, had agreed.
+    /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first all relays
+    /// had agreed, in the second as many as the last agreed view had.
     ///
     /// The first share is that of all relays, the second that of as many as the last agreed view had then.
     pub available: Option<(f64, [f64; 2])>,
@@ -263,8 +264,8 @@ struct Recorder<'a> {
     open: BTreeMap<u16, Loss>,
     /// Last time when no relay reported.
     silent_at: Instant,
-    /// Time of the first agreement, s, and numbers of snapshots since: in all, with all relays agreed, with all
-    /// members agreed.
+    /// Time of the first agreement, s, and three numbers of snapshots since then. They count all snapshots, those
+    /// with all relays agreed, and those with all members agreed.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -431,7 +432,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Updates the closest approach by the distances of all relays at a time, or of relay `only` from all others.
+    /// Updates the closest approach by the distances of all relays at a time. With `only`, only this relay's
+    /// distances are new.
     fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places

@@ -21,7 +21,7 @@ use uav_relay_scenario::mission::{mission, with_access};
 use flight::{Flight, Loaded};
 use recording::Recording;
 
-/// Relative tolerance of the SIR in missions: that of the Linux programs, and the default of the simulator.
+/// Relative tolerance of the SIR in missions, as in the Linux programs and the simulator.
 const TOLERANCE: f64 = 1e-4;
 
 /// Replay of a flight: its page, and lines that describe it.

@@ -180,7 +180,7 @@ impl Check<'_> {
     }
 }
 
-/// Least Jaro-Winkler similarity, 0 to 1, at which an error message suggests a known key for an unknown one.
+/// Least similarity (Jaro-Winkler, 0 to 1) at which an error message suggests a known key.
 const ALIKE: f64 = 0.8;
 
 /// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if none is similar.

@@ -18,10 +18,11 @@ const COARSE: usize = 400;
 /// Approximate number of points at which the final search evaluates the error of a fitted interferer.
 const FINE: usize = 4_000;
 
-/// Number of steps from Tx to Rx in the grid of positions at which [`Hypothetical::sided`] compares both sides of the
-/// line.
+/// Number of steps from Tx to Rx in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both
+/// sides of the line at these positions.
 const ALONG: u32 = 64;
-/// Number of lateral steps in the grid of positions at which [`Hypothetical::sided`] compares both sides of the line.
+/// Number of lateral steps in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both sides
+/// of the line at these positions.
 const ASIDE: u32 = 8;
 
 /// Approximate number of points at which the reported error of the fitted interferer is evaluated.

@@ -206,7 +206,7 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission as relays assume it before the first measurements: with equal interference everywhere.
+/// Returns the mission before the first measurements, with equal interference everywhere.
 ///
 /// In a random field, the mean of the inverse interference is set everywhere to the value that it has at Rx. A
 /// mission without a random field is returned unchanged.

@@ -31,7 +31,7 @@ pub struct Corridor {
 }
 
 impl Corridor {
-    /// Creates limits that allow only lateral offset 0: the vertical plane from Tx to Rx, between two altitudes, m.
+    /// Creates limits without lateral offsets: the vertical plane from Tx to Rx, between two altitudes, m.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,

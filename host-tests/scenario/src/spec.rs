@@ -200,8 +200,8 @@ impl Noise {
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the antenna gains of relays and Rx differ, so that the mission's noise power is too high for
-    /// some receivers.
+    /// Returns true if the mission's noise power is too high for some receivers. This is so if the antenna gains of
+    /// relays and Rx differ.
     ///
     /// A mission has a single noise power for all receivers, which is right for the lowest antenna gain.
     pub fn is_uneven(&self) -> bool {

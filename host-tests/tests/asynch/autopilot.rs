@@ -199,8 +199,8 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// Creates relay 1 of `relays` relays with a motion guard (collision avoidance), between surveyed positions of Tx and
-/// Rx.
+/// Creates relay 1 of `relays` relays, between surveyed positions of Tx and Rx. It has a motion guard (collision
+/// avoidance).
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;

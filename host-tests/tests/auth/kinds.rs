@@ -79,7 +79,7 @@ impl Kind {
     }
 }
 
-/// Frame that the attacker sends: its receiver, its bytes, and the receiver's counter that it must increment.
+/// Frame that the attacker sends, with its receiver and the receiver's counter that it must increment.
 pub(crate) struct Attack {
     pub(crate) to: u16,
     pub(crate) port: Port,
@@ -119,7 +119,7 @@ pub(crate) fn raised(before: &Stats, after: &Stats) -> Option<&'static str> {
     name.filter(|_| ups == 1)
 }
 
-/// Returns the name of the counter that relay `to` increments for a frame with a wrong tag and a right CRC.
+/// Returns the name of the counter that a frame with a wrong tag increments at relay `to`. The frame's CRC is right.
 fn refused(frame: &Plain, to: u16, port: Port, relays: u16) -> &'static str {
     let flags = frame.flags();
     if frame.version() != 1 || ![0, SIGNED, SIGNED | HANDSHAKE].contains(&flags) {

@@ -28,8 +28,8 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// Returns results and recipients of the companion's answers to `MAV_CMD_USER_1`, by which an operator reports lost
-/// drones as gone.
+/// Returns results and recipients of the companion's answers to `MAV_CMD_USER_1`. By this command an operator reports
+/// lost drones as gone.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.received.iter();
     said.filter_map(|(_, said)| match said {

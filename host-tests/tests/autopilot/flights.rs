@@ -19,7 +19,7 @@ const STEP: Duration = Duration::from_millis(20);
 /// Duration of a flight, s.
 const FLIGHT_S: u64 = 240;
 
-/// Longest time until the autopilot link must know the vehicle's mode: heartbeats come each second, at most 2 s late.
+/// Longest time until the autopilot link must know the vehicle's mode. Heartbeats come each second, at most 2 s late.
 const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 
 #[derive(Clone, Copy, PartialEq, Debug)]

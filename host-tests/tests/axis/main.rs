@@ -249,8 +249,8 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Largest permitted relative error of a point's distance from a line: pairs (d, e) for points up to d metres from
-/// the line's middle.
+/// Largest permitted relative errors of a point's distance from a line, as pairs (d, e). The error e is for points up
+/// to d metres from the line's middle.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]

@@ -53,8 +53,8 @@ fn with_separation(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     chain
 }
 
-/// Counts of scenes: all, those with an SIR within 1e-4 of the reference search's, and those within 5 %. `worst` is
-/// the smallest ratio to it.
+/// Counts of scenes: all, and those with an SIR within 1e-4 and within 5 % of the reference search's. `worst` is the
+/// smallest ratio to it.
 #[derive(Debug, Default)]
 struct Tally {
     all: usize,
@@ -105,8 +105,8 @@ impl Tally {
     }
 }
 
-/// Compares Algorithm 1 with the reference search (the judge) in random scenes, for both directions and for one.
-/// `change` modifies each scene; `what` names the change in the output. The judge is an independent search.
+/// Compares Algorithm 1 with the reference search (the judge) in random scenes. Scenes are for both directions and
+/// for one. `change` modifies each scene; `what` names the change in the output. The judge is an independent search.
 ///
 /// For both directions the scenes must be within 1e-4 of the judge's SIR if `is_exact`, else at least 80 % of them
 /// within 5 %.

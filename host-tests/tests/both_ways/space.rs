@@ -126,8 +126,8 @@ fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     }
 }
 
-/// Returns the joint method's SIR divided by that of an independent reference search, for random scenes, worst first.
-/// The interferer is near the line Tx-Rx if `wild`.
+/// Returns the joint method's SIR over that of a reference search, for random scenes, worst first. The interferer is
+/// near the line Tx-Rx if `wild`.
 fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut seeds = generator(seed);
@@ -169,9 +169,9 @@ fn the_joint_method_is_near_the_best_places_next_to_an_interferer() {
     near_the_best_places(3311, 12, true);
 }
 
-/// Checks that the joint method finds the better of relay 1's two local optima, above the interferer and beyond it.
-/// The judge found the SIR of each; without an initial chain that keeps relay 1 above the interferer the method
-/// misses it by up to 10 %.
+/// Checks that the joint method finds the better of two local optima of relay 1. They are above the interferer and
+/// beyond it. The judge found the SIR of each; without an initial chain that keeps relay 1 above the interferer the
+/// method misses it by up to 10 %.
 #[test]
 fn the_joint_method_finds_the_chain_above_the_interferer() {
     type Scene = (u16, f64, f64, f64, [f64; 3], f64);

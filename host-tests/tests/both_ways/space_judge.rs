@@ -23,12 +23,12 @@ pub(crate) struct Space {
     pub(crate) band_m: [f64; 2],
 }
 
-/// Numbers of grid points along x, y and h in the first search: for relays that may leave the line sideways, and for
-/// relays above the line.
+/// Numbers of grid points along x, y and h in the first search. The first row is for relays that may leave the line
+/// sideways, the second one for relays above it.
 const GRID: [[usize; 3]; 2] = [[36, 9, 5], [64, 1, 10]];
 
-/// Numbers of grid points along x, y and h in a refinement: for relays that may leave the line sideways, and for
-/// relays above the line.
+/// Numbers of grid points along x, y and h in a refinement. The first row is for relays that may leave the line
+/// sideways, the second one for relays above it.
 const WINDOW: [[usize; 3]; 2] = [[5, 5, 5], [7, 1, 7]];
 
 impl Space {
@@ -123,7 +123,7 @@ impl Space {
         points
     }
 
-    /// Returns the positions to try around `at`: a randomly shifted grid, about `width` metres to each side.
+    /// Returns positions to try around `at`: a randomly shifted grid, about `width` metres to each side.
     fn window(&self, at: Place, width: f64, rng: &mut impl Rng) -> Vec<Place> {
         let counts = WINDOW[usize::from(self.is_flat())];
         let jitter: [f64; 3] = std::array::from_fn(|_| rng.random_range(-0.2..0.2));

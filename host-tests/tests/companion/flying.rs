@@ -90,7 +90,8 @@ impl Flight {
         assert_eq!(there.mode(), "companion");
     }
 
-    /// Changes the flight mode, as the pilot or a failsafe does, and waits until the relay has released the drone.
+    /// Changes the flight mode, and waits until the relay has released the drone. The change is the pilot's or a
+    /// failsafe's.
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay

@@ -15,7 +15,7 @@ use crate::peer::{RX, text};
 use crate::process::{LIMIT, Relay};
 use crate::web::{address, snapshots};
 
-/// Maximum time from a relay's failure to its alarm on the page: 15 s in which the chain notices it, and 2 s.
+/// Maximum time from a relay's failure to its alarm on the page. The chain notices the failure within 15 s.
 const LOST: Duration = Duration::from_secs(17);
 
 /// Maximum time from a change of a drone's control state until the page shows the change or its alarm. The control

@@ -13,7 +13,7 @@ use super::off;
 /// I is the interference power. With this value, a relay straight above Rx at 20 m has an expected SIR of 0.8 at Rx.
 const UPSILON: f64 = 2_301_379.773_574_951;
 
-/// Returns the chain of the paper's multi-hop scenario with constant interference along the line and `n` relays.
+/// Returns the paper's multi-hop chain of `n` relays, with constant interference along the line.
 fn paper(n: usize) -> StochasticLink {
     let link = Link::paper(n);
     StochasticLink {

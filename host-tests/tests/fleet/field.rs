@@ -25,8 +25,8 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
     }
 }
 
-/// Draws a chain of identical relays in a field: Upsilon = E[1/I], given at one to twelve points, differs by a factor
-/// of up to 300.
+/// Draws a chain of identical relays in a field of interference. Upsilon = E[1/I], given at one to twelve points,
+/// differs by a factor of up to 300.
 fn random_field(rng: &mut impl Rng) -> StochasticLink {
     let d = round(log_uniform(rng, 10.0, 1e5));
     let points = rng.random_range(1..=12);

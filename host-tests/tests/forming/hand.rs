@@ -69,7 +69,7 @@ impl Chain {
         Some(took.as_micros().div_ceil(1000))
     }
 
-    /// Returns by which fraction the chain's SIR exceeds its target, and the smallest distance of relays, m.
+    /// Returns the fraction by which the chain's SIR exceeds its target, and the relays' least distance, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self

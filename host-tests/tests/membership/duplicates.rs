@@ -14,8 +14,8 @@ use super::*;
 /// Latency of a frame, and interval at which the setpoints are observed, ms.
 const STEP_MS: u64 = 10;
 
-/// Longest time for which one of two relays with the same index may keep its setpoint after it could receive the
-/// other, ms.
+/// Longest time for which one of two relays with the same index may keep its setpoint, ms. It counts from the first
+/// frame between the two.
 const LIMIT_MS: u64 = 2_000;
 
 /// Longest permitted time in which both duplicate relays have setpoints, ms. The two receive each other, but few

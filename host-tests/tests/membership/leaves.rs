@@ -406,8 +406,8 @@ fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
 
 /// Result of the replacement of one relay in one scene.
 struct Replaced {
-    /// Worst SIR as a share of the optimum of eight relays: with an announced replacement, and with a loss without a
-    /// spare.
+    /// Worst SIRs as shares of the optimum of eight relays. The first is with an announced replacement, the second
+    /// with a loss without a spare.
     shares: [f64; 2],
     free: Option<f64>,
     text: String,
@@ -461,8 +461,8 @@ fn replaced(link: &Link, rng: &mut ChaCha8Rng, seed: u64) -> Replaced {
     }
 }
 
-/// Replaces a relay in each of 50 scenes, and prints the worst and the median SIR as shares of the optimum. Returns
-/// the results.
+/// Replaces a relay in each of 50 scenes. Prints the worst and the median SIR as shares of the optimum. Returns the
+/// results.
 fn replaced_in(name: &str, scene: fn(&mut ChaCha8Rng) -> Link) -> Vec<Replaced> {
     let all: Vec<Replaced> = (1..=50)
         .map(|seed| {

@@ -52,7 +52,7 @@ fn count() -> u32 {
     std::env::var("COUNT").map_or(2_000, |text| text.parse().unwrap())
 }
 
-/// Runs one sequence of operations, from power-on until the chain has agreed again after the last fault.
+/// Runs one sequence of operations, from power-on to the agreement after the last fault.
 fn flown(scenario: &Scenario, seed: u32, sequence: &[Operation], tally: &mut Tally) -> Checked {
     let mut world = World::new(scenario, seed)?;
     for operation in sequence {

@@ -14,7 +14,7 @@ const CANDIDATES: usize = 4;
 /// Number of grid positions of each relay in a refinement, on either side of its present position.
 const BESIDE: i32 = 40;
 
-/// Half width of the first refinement's grid around a relay, as a fraction of the distance from Tx to Rx.
+/// Half width of the first refinement's grid around a relay. It is a fraction of the distance from Tx to Rx.
 const WINDOW: f64 = 0.06;
 
 /// Number of refinements of a candidate chain, each with a narrower grid.

@@ -102,7 +102,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// Returns the fraction by which a plan's SIR is below that of the positions on which simulated relays agree.
+/// Returns the fraction by which a plan's SIR is below that of the simulated relays' positions.
 ///
 /// The result is -inf without an agreement.
 fn short(scenario: &Scenario, relays: u16) -> f64 {

@@ -19,7 +19,7 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of the relay's refusals of setpoint control, in the first drone's log, to which the pilot has reacted.
+    /// Number of the first relay's refusals of setpoint control to which its pilot has reacted.
     found: usize,
     /// True while the pilot has left OFFBOARD because of a refusal, and will choose it again.
     chooses: bool,

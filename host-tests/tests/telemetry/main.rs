@@ -61,7 +61,7 @@ fn flown(mut setup: Setup) -> Setup {
     setup
 }
 
-/// Figures of a telemetry run: ages of each relay's reports, errors of positions, and bytes on the links.
+/// Figures of a telemetry run: ages of the relays' reports, position errors, and bytes on the links.
 #[derive(Default)]
 struct Figures {
     ages_s: Vec<Vec<f64>>,
@@ -106,7 +106,7 @@ impl Figures {
         }
     }
 
-    /// Returns the age that reports do not exceed for the fraction `share` of the time, s, for the worst relay.
+    /// Returns the age that the worst relay's reports do not exceed for the fraction `share` of the time.
     fn age_s(&self, share: f64) -> f64 {
         let all = self.ages_s.iter().map(|ages| quantile(ages, share));
         all.fold(0.0, f64::max)

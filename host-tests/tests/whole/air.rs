@@ -56,12 +56,12 @@ pub(crate) enum ScheduledEvent {
         from: usize,
         to: usize,
     },
-    /// One cut of the link from `from` to `to` ends. The link works again if no other cut is left.
+    /// A cut of the link from `from` to `to` ends. The link works again if no other cut is left.
     Mend {
         from: usize,
         to: usize,
     },
-    /// From now on, this fraction of frames is lost on every link.
+    /// Frames are lost with this probability on every link from now on.
     Loss(f64),
     /// A mission is uploaded to the relay.
     Upload(usize, Box<Upload>),
@@ -137,7 +137,7 @@ pub(crate) struct Air {
     /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
     /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that may lack an agreed position while the chain still counts as flying (`flown_us`).
+    /// Number of relays that may lack an agreed position while the chain counts as flying (`flown_us`).
     pub(crate) spare: usize,
     /// Total time in which all relays but at most `spare` have had positions of one agreement, µs.
     pub(crate) flown_us: u64,
@@ -512,8 +512,7 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the number of members of the largest membership view whose members all have positions of one
-    /// agreement.
+    /// Returns the size of the largest membership view whose members all have positions of one agreement.
     fn flying(&self) -> usize {
         let holds = |seen: &&ObservedState| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding

@@ -42,8 +42,8 @@ fn flown(seed: u64, schedule: &Schedule) -> Measured {
     ended(seed, schedule, schedule.begun())
 }
 
-/// Simulates the chain `air` to the end of its schedule of faults, and on until all relays have agreed positions, for
-/// at most 15 minutes.
+/// Simulates the chain `air` to the end of its faults, and on until all relays have agreed positions. Gives up after
+/// 15 minutes.
 fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Measured {
     let end = schedule.faults_end_us;
     air.run(end);

@@ -112,7 +112,7 @@ impl Case {
         }
     }
 
-    /// Returns the planner's data rates toward Rx and toward Tx, bit/s, if both directions have half of the time.
+    /// Returns the planner's data rates toward Rx and toward Tx, bit/s, if both share the time equally.
     fn both_bps(&self, plan: &Plan) -> [f64; 2] {
         let relays = u16::try_from(plan.places.len()).unwrap();
         let scene = Scene::new(&self.scenario, relays).unwrap();
@@ -210,7 +210,7 @@ impl Case {
     }
 }
 
-/// Checks the data rate that a flow has delivered, and returns it as a fraction of the planner's rate `promised_bps`.
+/// Checks the data rate that a flow has delivered. Returns it as a fraction of the planner's rate `promised_bps`.
 ///
 /// No packet may be unaccounted for, and the rate at the agreed positions is never exceeded. The planner's rate may
 /// be exceeded by the fraction `most`, because the agreed positions differ slightly from the planned ones.

@@ -17,13 +17,13 @@ use crate::time::{Duration, Instant};
 /// Distance to the setpoint, m, below which the moving target for the autopilot counts as arrived.
 const ARRIVED_M: f32 = 0.01;
 
-/// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s: speed = k times distance.
+/// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
 
 /// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Assumed gain of an autopilot's position control, 1/s: a drone d metres behind its target flies 1.25 d m/s faster
+/// Assumed gain of an autopilot's position control, 1/s. A drone d metres behind its target flies 1.25 d m/s faster
 /// than the target.
 const CATCH_UP_PER_S: f32 = 1.25;
 
@@ -56,8 +56,8 @@ const SETTLED_M: f32 = 0.25;
 /// the drone's lag.
 const BEHIND_MS: u64 = 1_200;
 
-/// Time in which the speed of the moving target near the setpoint halves, ms: ln 2 / k, with the speed = k times the
-/// remaining distance and k = 0.5 /s.
+/// Time in which the speed of the moving target near the setpoint halves, ms. It is ln 2 / k: the speed is k times
+/// the remaining distance, with k = 0.5 /s.
 const HALVES_MS: u64 = 1_387;
 
 /// Maximum number of half-lives of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining
@@ -92,7 +92,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s: 0.1 to 20, or 0 for the default.
+    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. It is 0.1 to 20, or 0 for the default.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {
@@ -304,7 +304,7 @@ fn length(a: [f32; 3]) -> f32 {
 
 /// Interval at which the position of a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
-/// Interval at which a standing target is sent again to a PX4, which leaves OFFBOARD after a second without a target.
+/// Interval at which a standing target is sent again to a PX4. A PX4 leaves OFFBOARD after a second without a target.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
@@ -323,7 +323,7 @@ const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
 
-/// Number of times that a standing target is repeated to an autopilot that never reports which target it follows.
+/// Number of times that a standing target is repeated to an autopilot that never reports its target.
 const UNCONFIRMED: u8 = 10;
 
 /// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation.
@@ -443,7 +443,7 @@ mod tests {
     use crate::place::Placement;
     use crate::time::{Duration, Instant};
 
-    /// Simulates a flight: returns the positions and speeds of the moving target, every 100 ms, until it stands.
+    /// Simulates a flight. Returns the positions and speeds of the moving target, every 100 ms, until it stands.
     fn fly(from: Placement, to: Placement, pace: Pace) -> Vec<(Placement, f32), 512> {
         let mut carrot = Carrot::at(from, Instant::ZERO);
         let mut way = Vec::new();

@@ -57,7 +57,8 @@ const SETTLED: Duration = Duration::from_millis(1_000);
 /// Minimum time between two reports to the operator of reasons not to control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard (collision avoidance) must hold the drone back before the operator is told the reason.
+/// Time for which the guard must hold the drone back before the operator is told the reason. The guard is the
+/// collision avoidance.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
@@ -97,13 +98,12 @@ pub struct Autopilot {
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone (`None`: he can), and the start of that state.
+    /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if he can.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` before
     /// any. An inner `None` reports that he can.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
-    /// True while the firmware reports the relay as ready to control the drone, once the pilot chooses OFFBOARD or
-    /// GUIDED.
+    /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
     /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
     /// because of the upstream neighbour, the second because of the downstream one.

@@ -20,7 +20,7 @@ const MAX_SILENT_WINDOWS: u8 = 4;
 /// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
 const SELDOM: u8 = 16;
 
-/// Number of unanswered requests after which the autopilot counts as unable to receive the link's frames.
+/// Number of unanswered requests after which the autopilot seems unable to receive the link's frames.
 const UNANSWERED: u8 = 2;
 
 /// Values of `MAV_RESULT` with which the autopilot denies a request for good.

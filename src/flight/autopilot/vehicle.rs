@@ -91,7 +91,7 @@ pub(super) struct Vehicle {
     granted: bool,
     /// Value of `MAV_STATE` in the last heartbeat.
     status: u8,
-    /// True if the present or next mode OFFBOARD or GUIDED counts as chosen by the pilot ([`Self::review_choice`]).
+    /// True if OFFBOARD or GUIDED, now or once entered, counts as the pilot's choice. See [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,

@@ -333,7 +333,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Checks rules 3, 4 and 6 for moves toward Rx: relay 1 advances only as far as relay 2 has moved ahead.
+/// Checks rules 3, 4 and 6 for moves toward Rx. Relay 1 advances only as far as relay 2 has moved ahead.
 #[test]
 fn the_owner_follows_the_follower() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -357,7 +357,7 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Checks rules 1 and 5 for moves toward Tx: relay 1 moves first, then the fence (limit of x), and then relay 2.
+/// Checks rules 1 and 5 for moves toward Tx. Relay 1 moves first, then the fence (limit of x), and then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);

@@ -284,8 +284,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// Checks that the notice of a relay that leaves its association (session) is repeated until the neighbour has
-/// started a new one. That holds even if the pilot has given the drone back.
+/// Checks that the notice of a relay that leaves its association (session) is repeated. This ends when the neighbour
+/// has started a new one. That holds even if the pilot has given the drone back.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();

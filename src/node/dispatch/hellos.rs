@@ -11,7 +11,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 use crate::wire::upload::UPLOAD;
 
-/// Mission fields of a hello: newest stored mission, and flags that tell if it is active and if it was refused.
+/// Mission fields of a hello: the newest stored mission, and flags for active and refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -131,8 +131,8 @@ impl Node {
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay: this one and those at `far`, its
-    /// other side.
+    /// Returns the number of relays that a neighbour reaches through this relay. They are this one and those at
+    /// `far`, its other side.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
@@ -143,7 +143,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays that are connected to this relay on `side`, as counted by the last view proposal.
+    /// Returns the number of relays connected to this relay on `side`, by the last view proposal.
     pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;

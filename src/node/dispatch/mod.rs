@@ -362,9 +362,9 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` is early and would leave out relays that are about to be linked.
-    /// Assumed for a short time after the sender became the neighbour, if the proposal has visited fewer relays than
-    /// the last one.
+    /// Returns true if a view proposal from `side` is early, and would leave out relays about to be linked. Assumed
+    /// for a short time after the sender became the neighbour, if the proposal has visited fewer relays than the last
+    /// one.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
@@ -390,10 +390,10 @@ pub(super) struct Telemetry {
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum after which relays first drop their links to neighbours, in units of `dead_after`.
+/// Time without a quorum after which relays drop their neighbour links first, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time without a quorum after which relays drop their links to neighbours again, in units of `dead_after`.
+/// Time without a quorum after which relays drop their links again, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which relays without a quorum drop the links to their neighbours and search for others.

@@ -49,7 +49,7 @@ impl Node {
         self.reporting.poll(now, member, neighbours, wait, own)
     }
 
-    /// Returns the time for which telemetry reports wait, so that an agreement can use the shared channel first.
+    /// Returns the time for which telemetry reports wait. An agreement can use the shared channel first.
     pub(super) fn telemetry_waits(&self) -> Duration {
         let is_idle = matches!(
             self.phase(),

@@ -439,7 +439,8 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
     }
 }
 
-/// Checks that a spare relay (outside of the chain) requests no view, whatever else happens, until it is called in.
+/// Checks that a spare relay requests no view, whatever else happens, until it is called in. A spare waits outside of
+/// the chain.
 #[test]
 #[cfg(feature = "departures")]
 fn a_relay_outside_proposes_nothing() {

@@ -135,8 +135,8 @@ impl Node {
         }
     }
 
-    /// Returns true until this relay has received its first pass (message along the chain), or requested a view
-    /// (membership).
+    /// Returns true until this relay's first pass or view request. A pass is a message along the chain, a view its
+    /// agreed membership.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }

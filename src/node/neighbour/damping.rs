@@ -32,10 +32,10 @@ const MAX_HOLD_DOWN: u32 = 6;
 /// Maximum number of recent losses of a link that is not flapping yet.
 const MAX_FORGIVEN: u8 = 2;
 
-/// Minimum time between two losses of a link for its flapping to count as slow, in units of `dead_after`.
+/// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
 const SLOW_INTERVAL: u32 = 10;
 
-/// Time without a loss after which the earlier losses of a link are forgotten, in units of `dead_after`.
+/// Time without a loss after which a link's earlier losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
 /// Node that is received without gaps: its distance, and the times of its first and last frame.
@@ -250,8 +250,8 @@ impl Damping {
         self.links.iter().any(is_slow)
     }
 
-    /// Returns true if the last loss of the link to the node `distance` relays away was an outage: more than
-    /// `dead_after` without a frame.
+    /// Returns true if the last loss of the link to the node `distance` relays away was an outage. An outage is more
+    /// than `dead_after` without a frame.
     pub(super) fn was_down(&self, distance: u16) -> bool {
         self.link(distance).is_some_and(|link| link.was_down)
     }
@@ -305,8 +305,7 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns the initial state of a test: link records of one side without losses, the time 1 000 s, and default
-    /// settings.
+    /// Returns the initial state of a test: links without losses, the time 1 000 s, and default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())

@@ -44,8 +44,8 @@ pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
 
-/// Returns the time from the first heartbeat request to the loss of a silent neighbour: `dead_after` - `probe_after`,
-/// in µs.
+/// Returns the time from the first heartbeat request to the loss of a neighbour, in µs. It is `dead_after` -
+/// `probe_after`.
 const fn waiting(settings: &Settings) -> u64 {
     let dead = settings.dead_after.as_micros();
     dead.saturating_sub(settings.probe_after.as_micros())
@@ -96,7 +96,7 @@ pub(crate) struct Liveness {
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests before a reply: a measure of the channel's losses. It
+    /// Longest recent run of unanswered heartbeat requests before a reply. It measures the channel's losses. It
     /// starts at [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
 }

@@ -39,7 +39,7 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Linked: this relay and the node have selected each other as neighbours, according to the node's last report.
+    /// Linked: this relay and the node have selected each other, by the node's last report.
     Linked,
     /// Pairing: this relay has selected a node that has not, or no longer, selected this relay.
     Pairing {
@@ -133,8 +133,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts the neighbour state of this side at `now`, with `node`, the neighbour that the mission configures; 0
-    /// for none.
+    /// Starts the neighbour state of this side at `now`. The mission configures `node` as the neighbour; 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -179,8 +178,8 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true for a short time after a neighbour was selected, in which its selection causes no request for a
-    /// new view.
+    /// Returns true for a short time after a neighbour was selected. Its selection then causes no request for a new
+    /// view.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -397,7 +396,7 @@ impl Neighbour {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the selected neighbour and searches again, because the reachable relays are too few for a quorum.
+    /// Drops the selected neighbour and searches again. The reachable relays are too few for a quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -519,7 +518,7 @@ impl Neighbour {
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the selected neighbour is also the neighbour in the agreed view (membership of the chain).
+    /// Returns true if the selected neighbour is also the one in the agreed view (membership of the chain).
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
@@ -553,7 +552,8 @@ impl Neighbour {
     }
 }
 
-/// Neighbour on one side according to the last decisions on views (memberships): node numbers, 0 for none.
+/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is a membership
+/// of the chain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view (agreed members of the chain).

@@ -23,8 +23,8 @@ use crate::settings::{Adjust, Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
 
-/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2 (search by single relays). The
-/// first value is for traffic from Tx to Rx only, the second for both directions.
+/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. The first value is for
+/// traffic from Tx to Rx only, the second for both directions.
 ///
 /// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
 pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
@@ -80,7 +80,8 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True from the start of a pass (message along the chain) by this relay until the statistics have counted it.
+    /// True from the start of a pass by this relay until the statistics count it. A pass is a message along the
+    /// chain.
     pub(super) began: bool,
     /// Altitude and power that this relay is configured with.
     pub(super) profile: Profile,
@@ -136,8 +137,8 @@ impl Computation {
         }
     }
 
-    /// Returns true until this relay starts a task, takes part in a pass (message along the chain), or agrees on a
-    /// position.
+    /// Returns true until this relay starts a task, takes part in a pass, or agrees on a position. A pass is a
+    /// message along the chain.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
@@ -327,8 +328,8 @@ impl Computation {
         }
     }
 
-    /// Returns the lateral offset, altitude and power with which this relay computes in a sweep (pass that tries
-    /// target SIRs). Offset and altitude are the joint method's if `chosen` is true, else the configured ones.
+    /// Returns this relay's lateral offset, altitude and power for a sweep. A sweep is a pass along the chain that
+    /// tries target SIRs. Offset and altitude are the joint method's if `chosen` is true, else the configured ones.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -375,8 +376,7 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if the method of the settings ends with this search, and no other algorithm follows.
         last: bool,
-        /// True for a search at the configured altitudes, because the joint method's altitudes gave no feasible
-        /// target.
+        /// True for a search at the configured altitudes. Those of the joint method gave no feasible target.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.

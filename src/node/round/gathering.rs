@@ -186,14 +186,14 @@ impl Seats {
 }
 
 impl Computation {
-    /// Returns true while this relay has yet to compute its position by the joint method (all positions at once).
+    /// Returns true while this relay has yet to compute its position by the joint method.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues this relay's joint solution of the chain in advance, while it waits for a pass (message along the
-    /// chain).
+    /// Continues this relay's joint solution of the chain in advance. Called while it waits for a pass (message along
+    /// the chain).
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);

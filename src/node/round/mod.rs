@@ -287,7 +287,8 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until this relay has taken part in a pass (message along the chain) or in a view (membership).
+    /// Returns true until this relay has taken part in a pass or a view. A pass is a message along the chain, a view
+    /// its membership.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }

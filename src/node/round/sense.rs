@@ -28,7 +28,7 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// Maximum interval between two passes that collect measurements along the chain, as a multiple of [`Listen::every`].
+/// Maximum interval between collections of measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
 /// Number of sensing passes without a change of the estimate after which their interval doubles. A sensing pass is a
@@ -39,7 +39,7 @@ const PATIENCE: u8 = 4;
 /// message along the chain that collects measurements.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Number of consecutive measurements at or below the noise after which a relay's sensor counts as possibly faulty.
+/// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
@@ -321,7 +321,7 @@ impl Computation {
 /// True with the feature `sensing` (estimate of an unknown interferer). If false, the compiler drops that code.
 pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
-/// Maximum distance of a measurement from Tx in each coordinate, as a multiple of the distance Tx to Rx.
+/// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
 const FARTHEST: f32 = 100.0;
 
 /// Sensing state of a relay; the array is empty without the feature `sensing`.
@@ -345,7 +345,7 @@ pub(super) struct SensorState {
     pub(super) left_out: u16,
     /// Node whose sensor was found faulty, by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
-    /// State of the leader's search for a faulty sensor, which leaves out one relay's measurements after the other.
+    /// State of the leader's search for a faulty sensor. It leaves out one relay's measurements after the other.
     pub(super) trial: Trial,
     /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
@@ -365,8 +365,8 @@ pub(super) struct SensorState {
     pub(super) unfit: Option<Unfit>,
     /// Interval between two collections of measurements along the chain, as a multiple of `Listen::every`.
     pub(super) wait: u32,
-    /// Number of consecutive sensing passes (collections of measurements) that did not change the estimate, modulo
-    /// [`PATIENCE`].
+    /// Number of consecutive sensing passes that did not change the estimate, modulo [`PATIENCE`]. A sensing pass
+    /// collects measurements.
     pub(super) kept: u8,
     /// Time of the next sensing pass, which collects measurements; `None` if none is scheduled.
     pub(super) at: Option<Instant>,
@@ -495,8 +495,8 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the interference level at a ground station at `now`, from `average`, the average of its reports. Older
-    /// reports have less weight in an estimate.
+    /// Returns the interference level at a ground station at `now`, from the `average` of its reports. Older reports
+    /// have less weight in an estimate.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -547,8 +547,7 @@ pub(super) struct Sense {
     /// Sums of measurements over all earlier relays of the pass, as received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the current estimate is the one with which the positions were agreed on, so that no new agreement is
-    /// needed.
+    /// True if the positions were agreed on with the current estimate. No new agreement is needed then.
     pub(super) holds: bool,
 }
 

@@ -63,7 +63,7 @@ pub(crate) enum Action {
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view (membership), because this relay cannot take part in the leader's pass along the chain.
+    /// Request a new view (membership). This relay cannot take part in the leader's pass along the chain.
     Foreign,
 }
 
@@ -89,8 +89,8 @@ impl Arrival {
     }
 }
 
-/// Maximum number of passes by which a late message may be behind the current pass (message along the chain). One
-/// farther behind is foreign: its leader has restarted.
+/// Maximum number of passes by which a late message may be behind the current pass. A pass is a message along the
+/// chain. One farther behind is foreign: its leader has restarted.
 const STRAGGLERS: u16 = 32;
 
 /// Divisor of the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of 64
@@ -224,8 +224,8 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass has started since the earlier state `before`, in which the result of the last pass
-    /// was known.
+    /// Returns true if a new pass has started since the earlier state `before`. In that state the result of the last
+    /// pass was known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

@@ -183,13 +183,13 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay of this pass has a power or fixed altitude of its own, other than the common ones.
+    /// True if a later relay of this pass has a power or fixed altitude other than the common ones.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
     from: PerTarget,
-    /// Reach of this relay: for each target SIR the farthest x in the direction of the pass at which it meets the
-    /// target, m.
+    /// Reaches of this relay, one for each target SIR, m. A reach is the farthest x in the direction of the pass at
+    /// which the relay meets the target.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
@@ -282,8 +282,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores this relay's x for the committed target SIR (`place`, m), and computes from it the x that the previous
-    /// relay must take. If that relay has no such x, the commitment is revoked.
+    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from it the x that the previous relay
+    /// must take. If that relay has no such x, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;

@@ -28,7 +28,8 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum amount by which one message may raise the latest known view number, so that it cannot use up all numbers.
+/// Maximum amount by which one message may raise the latest known view number. One message thus cannot use up all
+/// numbers.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of one relay in view changes, by which the relays agree on the members of the chain.
@@ -61,8 +62,8 @@ impl ViewChange {
         }
     }
 
-    /// Returns the votes on views (acceptor state) for storage, marked with `base`, the digest of the mission loaded
-    /// before flight.
+    /// Returns the votes on views (acceptor state) for storage. `base` is the digest of the mission loaded before
+    /// flight.
     pub(crate) const fn record(&self, base: u16) -> ViewRecord {
         ViewRecord::new(base, self.electorate)
     }
@@ -599,7 +600,7 @@ impl ViewRequest {
         }
     }
 
-    /// Requests a view (membership) again after about `wait`, which consecutive refusals double up to three times.
+    /// Requests a view (membership) after about `wait`. Consecutive refusals double the wait up to three times.
     ///
     /// [`request_now`](Self::request_now) ends the doubling.
     pub(super) fn request_after_refusal(&mut self, now: Instant, wait: Duration) {

@@ -709,7 +709,7 @@ impl Check {
         None
     }
 
-    /// Returns true if every set of relays that is a quorum can still agree on a view once its links are restored.
+    /// Returns true if every quorum of relays can still agree on a view once its links are restored.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
         let all = ((1_u16 << chain.relays.len()) - 1) as u8;
         (1..=all).all(|there| {

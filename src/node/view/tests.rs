@@ -377,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores a decision on a view proposal if it has stored a newer mission than the proposed one.
+/// Checks that a relay ignores a decision on a view if it has stored a newer mission than the view's.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();

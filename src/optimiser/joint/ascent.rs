@@ -10,8 +10,8 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// Initial limit of a relay's move in one iteration of the joint method, as a fraction of its distance from the
-/// interferer. The same number limits the change of ln(target SIR).
+/// Initial limit of a relay's move in one iteration of the joint method. It is a fraction of the relay's distance
+/// from the interferer. The same number limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
 /// Minimum limit of a relay's move at which the final target SIR of a chain's improvement is predicted. A smaller
@@ -22,8 +22,8 @@ const RESTRAINED: f32 = 0.05;
 /// relay's distance from the interferer.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising target SIR is assumed to shorten the chain, in units of the distance Tx to Rx per
-/// ln(SIR). The computed rate is a divisor, so it must not be near 0; it is usually 0.5.
+/// Minimum rate at which a rising target SIR is assumed to shorten the chain. It is in units of the distance Tx to Rx
+/// per ln(SIR). The computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
 /// First amount by which a chain's limit of the target SIR is raised, in ln(SIR). It is raised when the chain reaches
@@ -47,15 +47,15 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which the final target of a chain's improvement is predicted.
+/// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which the improvement of a chain is checked for divergence: the chain must not fall far
-/// short of Rx.
+/// Number of iterations after which a chain's improvement is checked for divergence. It diverges if the chain falls
+/// far short of Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum fraction of the distance Tx to Rx by which an improved chain may fall short of Rx to be improved again.
+/// Largest shortfall from Rx with which a chain is improved again. It is a fraction of the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -112,7 +112,7 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain that has the spare length `slack` at Rx, m, for the target `sigma`. Targets
+    /// Starts the improvement of a chain. It has the spare length `slack` at Rx, m, for the target `sigma`. Targets
     /// are in ln(SIR), and never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
@@ -134,7 +134,7 @@ impl Ascent {
         }
     }
 
-    /// Returns this state with `limit`: the target, as ln(SIR), at which the chain is checked against the upper
+    /// Returns this state with another `limit`, in ln(SIR). At this target the chain is checked against the upper
     /// bound.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
@@ -177,8 +177,7 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the chain meets the limit of its target SIR, so that it must be checked against the upper
-    /// bound.
+    /// Returns true if the chain meets the limit of its target SIR. It must then be checked against the upper bound.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
@@ -196,8 +195,8 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain: the expected
-    /// gains of the relays' moves, and the change of spare length with the target.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the
+    /// expected gains of the relays' moves, and the change of spare length with the target.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -225,13 +224,13 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) is expected to change by less than `by` through spare length and further moves.
+    /// Returns true if ln(target SIR) is expected to change by less than `by`, by spare length and moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the improvement diverges: after some iterations the chain still falls far short of Rx.
+    /// Returns true if the improvement diverges. The chain then still falls far short of Rx after some iterations.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
@@ -242,8 +241,8 @@ impl Ascent {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if the improvement of this chain is predicted to end no higher than the target `sigma`, in
-    /// ln(SIR). It can then be dropped. `turn` is its next action. False if no prediction is possible.
+    /// Returns true if this chain's improvement is predicted to end no higher than `sigma`, in ln(SIR). It can then
+    /// be dropped. `turn` is its next action. False if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -254,8 +253,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target, as ln(SIR), that the chain is expected to just meet after the fraction `share` of the
-    /// computed moves.
+    /// Returns the target that the chain is expected to just meet, in ln(SIR). `share` is the fraction of the
+    /// computed moves that it makes.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -290,8 +289,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the action after a trial that did not improve the chain: a smaller fraction of the moves, or a smaller
-    /// limit of them.
+    /// Returns the action after a trial that did not improve the chain. It is a smaller fraction of the moves, or a
+    /// smaller limit of them.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();

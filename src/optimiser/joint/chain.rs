@@ -153,16 +153,17 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of one segment (ten relays) of the chain: x before it, and derivatives of the chain's spare length at
-/// its last relay.
+/// Stored state of one segment (ten relays) of the chain. It has the x before it, and derivatives of the chain's
+/// spare length at its last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's spare length at Rx by the position of the segment's last relay, m/m.
+    /// First derivatives of the chain's spare length at Rx, m/m. They are by the position of the segment's last
+    /// relay.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's spare length at Rx by the position of the segment's last relay, 1/m. The
-    /// order is xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's spare length at Rx, 1/m. They are by the position of the segment's last
+    /// relay. The order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 
@@ -207,7 +208,7 @@ pub(super) fn last_of(mission: &Mission) -> u8 {
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// Returns the relays of a segment: for each its number within the segment, from 0, and its index in the chain.
+/// Returns the relays of a segment: each with its number in the segment, from 0, and in the chain.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
     // Counted in u16 at both ends, since zipping two ranges backward may panic.

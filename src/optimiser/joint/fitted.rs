@@ -26,15 +26,14 @@ use crate::sir::{Sender, in_noise, square, transmitter_gain};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions per relay that a pass of the dynamic programming combines: the current one and two on either
-/// side.
+/// Number of positions per relay that a pass combines: the current one and two on either side.
 const STATES: usize = 5;
 /// Moves of a relay that a pass tries, in units of the current step width. The first one is preferred among equals.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
 /// Number of bits in which a relay's choice among the states of the relay before it is stored.
 const BITS: usize = 3;
 
-/// Step width at which the search from one initial chain ends, as a fraction of the distance from Tx to Rx.
+/// Step width at which the search from one initial chain ends. It is a fraction of the distance from Tx to Rx.
 const NARROWEST: f32 = 1.0 / 131_072.0;
 /// Relative gain of a round of passes below which the step width of the moves is halved.
 const LITTLE: f32 = 1e-3;
@@ -64,10 +63,10 @@ const STARTS: [[f32; 3]; 8] = [
 /// Number of the initial chain that starts from the best one along the line. Used only if relays may leave the common
 /// altitude.
 const BEST: u8 = 8;
-/// First step width of the moves from the best chain along the line, as a fraction of the distance from Tx to Rx.
+/// First step width of the moves from the best chain along the line. It is a fraction of the distance from Tx to Rx.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as two fractions: of the largest lateral offset away from
-/// the interferer, and of the altitude range above the common altitude.
+/// Lateral offset and altitude of further initial chains, as two fractions. The first is of the largest lateral
+/// offset away from the interferer, the second of the altitude range above the common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
@@ -132,8 +131,8 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its forward and backward gain over the SNR gap, r (share of data back), and the minimum
-/// separation.
+/// Hop between two nodes: its gains over the SNR gap, r (share of data back), and minimum separation. The gains are
+/// forward and backward.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -496,8 +495,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns two bounds, as shares of the frame: the end of hop `hop`'s slot toward Rx, and the begin of its slot
-    /// back. For hop 0 these are 0 and 1; `hop` is at most N + 1.
+    /// Returns two bounds of slots of hop `hop`, as shares of the frame. They are the end of its slot toward Rx, and
+    /// the begin of its slot back. For hop 0 these are 0 and 1; `hop` is at most N + 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
@@ -543,7 +542,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains, which is larger if relays may choose lateral offsets or altitudes.
+/// Returns the number of initial chains. It is larger if relays may choose lateral offsets or altitudes.
 fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {

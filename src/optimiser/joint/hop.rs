@@ -66,8 +66,8 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Derivatives of a hop's end that cannot move: at the x of Rx, or at the limit of what the hop reaches. All are
-    /// 0.
+    /// Derivatives of a hop's end that cannot move. It is at the x of Rx, or at the limit of what the hop reaches.
+    /// All are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],

@@ -11,8 +11,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's spare length at Rx as a quadratic function of one relay's
-/// position. It assumes that the relays after it react optimally.
+/// Value function of the joint method: the chain's spare length at Rx by one relay's position. It is a quadratic
+/// model. It assumes that the relays after it react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
@@ -60,9 +60,8 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts from the value function the penalty `weight` `near`^2 / 2 for a relay too close to the interferer.
-    /// `near` is the missing squared distance, m^2; `slope` and `by_target` are its derivatives by position and
-    /// ln(target SIR).
+    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the missing
+    /// squared distance, m^2; `slope` and `by_target` are its derivatives by position and ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -164,12 +163,13 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True to select the larger of two solutions for the relay's third coordinate, at which the hop has its maximum
+    /// True to select the larger of two solutions for the relay's third coordinate. At both the hop has its maximum
     /// length.
     pub(super) rising: bool,
     /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
-    /// Additional move of the relay in each free coordinate per metre that the sending relay moves in x, y and h.
+    /// Additional move of the relay in each free coordinate per metre of the sending relay's move. That is in x, y
+    /// and h.
     pub(super) follow: [Triple; 2],
 }
 
@@ -283,7 +283,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// Compressed [`Policy`] (a relay's move): three digits of each derivative are stored, which is sufficient.
+/// Compressed [`Policy`] (a relay's move). Three digits of each derivative are stored, which is sufficient.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,

@@ -16,14 +16,14 @@ use crate::sir::{Sender, in_noise, square};
 /// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor on the minimum separation in the joint method, so that rounding cannot violate the true separation.
+/// Factor on the minimum separation in the joint method. Rounding then cannot violate the true separation.
 pub(super) const MARGIN: f32 = 1.0005;
 
 /// Number of Newton steps in the computation of a hop with noise. Each linearises the hop's condition at the latest
 /// result (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps by which [`Site::halved`] finds the farthest point of a path that the hop reaches.
+/// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
 const HALVINGS: u8 = 12;
 
 /// Relay whose position the joint method computes, with the sender of the hop to it.
@@ -344,7 +344,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay: three bytes each, as a fraction of the allowed range.
+/// Stored lateral offset and altitude of one relay. Each has three bytes, as a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 

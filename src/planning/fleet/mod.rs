@@ -48,7 +48,7 @@ pub struct Most {
     pub relays: u16,
 }
 
-/// Lowest target SIR that [`Most::of`] searches, as a fraction of the highest possible SIR of the first hop.
+/// Lowest target SIR of [`Most::of`], as a fraction of the highest possible SIR of the first hop.
 const DEPTH: f32 = 1e-20;
 
 /// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
@@ -262,7 +262,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     }
 }
 
-/// Maximum number of relays that are added to the minimum number if their minimum separation makes it fail.
+/// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
 const MORE: u16 = 32;
 
 #[cfg(feature = "internals")]

@@ -84,10 +84,9 @@ const HALVINGS: u8 = 48;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
-    /// Optimum at the lowest altitude, where the circles of constant SIR of the first and the second hop touch.
+    /// Optimum at the lowest altitude, where the circles of constant SIR of both hops touch.
     Touching,
-    /// Optimum at the lowest altitude and at the maximum of the first hop's SIR, which is below the second hop's SIR
-    /// there.
+    /// Optimum at the lowest altitude, at the maximum of the first hop's SIR. It is below the second hop's SIR there.
     Hilltop,
     /// Optimum above Rx, at the lowest altitude: the first hop's SIR is the higher one there.
     AboveRx,
@@ -218,7 +217,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// Returns the optimal position of a single relay at `altitude_m`, without limits of x and y, and its case.
+/// Returns the optimal position of a single relay at `altitude_m`, without limits of x and y.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -242,8 +241,8 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs in it: D (distance Tx-Rx),
-/// interferer (X, Y), h^2, ratio G = K / A of the hops' gains, and noise nu; in m and m^2.
+/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs in it. They are D (distance
+/// Tx-Rx), interferer (X, Y), h^2, ratio G = K / A of the hops' gains, and noise nu, in m and m^2.
 struct Plane {
     d: f64,
     x: f64,

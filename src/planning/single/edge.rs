@@ -411,8 +411,8 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts the line of constant y `new` into the list of the best lines, best first, if it is better than one of
-/// them. Each entry has the best SIR on the line, and the y of the lines on either side.
+/// Inserts the line of constant y `new` into the list of the best lines if it is better than one. Each entry has the
+/// best SIR on the line, and the y of the lines on either side.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
@@ -464,8 +464,8 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0, with the numbers that determine both hops' SIRs in it: D (distance Tx-Rx), interferer's X,
-/// (y0 - Y)^2, y0^2, noise nu, ratio G = K / A of the hops' gains; in m and m^2.
+/// Vertical plane y = y0, with the numbers that determine both hops' SIRs in it. They are D (distance Tx-Rx),
+/// interferer's X, (y0 - Y)^2, y0^2, noise nu, and ratio G = K / A of the hops' gains, in m and m^2.
 struct Face {
     d: f64,
     x: f64,

@@ -72,8 +72,8 @@ impl Two<'_> {
         }
     }
 
-    /// Returns the position between the x `low` and `high`, m, at which the first hop's SIR falls below the second's.
-    /// Of the two adjacent f32 values of x it is the better one.
+    /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's. Of the
+    /// two adjacent f32 values of x it is the better one.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -281,8 +281,8 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Location of the optimum in the rectangle of allowed x and altitudes: one of its edges, with its case, or its
-/// inside. An optimum on a corner is on the first of its edges.
+/// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or its inside. An optimum on a
+/// corner is on the first of its edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {

@@ -50,7 +50,7 @@ pub const MAX_BODY: usize = LONG;
 /// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// To the next relay: target SIRs, and the farthest x at which the sender meets each.
+    /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each.
     Sweep(Sweep),
     /// Reply to a sweep of target SIRs: its verdict, the result for each target.
     Verdict(SweepVerdict),
@@ -68,25 +68,25 @@ pub enum Message {
         /// Number of the destination's heartbeat request that is answered, 0 for none.
         reply: u16,
     },
-    /// To the next relay: profiles (altitude and power) of all relays so far.
+    /// Message to the next relay: profiles (altitude and power) of all relays so far.
     Gather(Roster),
     /// Reply to `Gather`: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// To the next relay: interference estimate, and all relays' measurements so far.
+    /// Message to the next relay: interference estimate, and all relays' measurements so far.
     Sense(Heard),
     /// Reply to `Sense`: measurements of the sender and of all later relays.
     Sensed(Heard),
-    /// To the next relay: token of Algorithm 2, whose receiver may move.
+    /// Message to the next relay: token of Algorithm 2, whose receiver may move.
     Token(Token),
     /// Reply to a token of Algorithm 2: position of the sender, and SIR of the worst hop after the sender.
     Moved(Moved),
-    /// To the next relay: lease renewal by the view's leader.
+    /// Message to the next relay: lease renewal by the view's leader.
     Pulse(Pulse),
     /// Reply to a lease renewal: its acknowledgement.
     Pulsed(Pulsed),
     /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// To the next relay: proposal of a new view (membership of the chain), with the votes so far.
+    /// Message to the next relay: proposal of a new view (membership of the chain), with the votes so far.
     Proposal(Proposal),
     /// Reply to a proposal of a view: the decision on it.
     Decision(Decision),

@@ -33,8 +33,7 @@ pub struct Poll {
     /// True if the proposer of the view `agreed` was polled; for the initial view, its leader. The votes of exactly
     /// half of the view's members are then enough for a quorum.
     pub proposer: bool,
-    /// Upper bound of the remaining lease times of members of the view `agreed` that were not polled, in tenths of a
-    /// second.
+    /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
     /// Time until leases of views before `agreed` have expired, in tenths of a second; 65535 if unknown. Positions of
     /// the new view may be used only after that time.
@@ -296,7 +295,8 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by relays that need to leave or would join, collected from the last relay to the sender.
+/// Requests to the leader by relays that need to leave or would join. They are of the relays from the last one to the
+/// sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
@@ -318,7 +318,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain: the more urgent departure, and the spare with the lower number.
+    /// Merges the requests of two parts of the chain. The more urgent departure counts, and the spare with the lower
+    /// number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {

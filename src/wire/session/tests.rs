@@ -33,7 +33,7 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// Returns a frame from the session `from` for the tests: a handshake, or a `Busy` message if `handshake` is false.
+/// Returns a frame from the session `from`. It is a handshake, or a `Busy` message if `handshake` is false.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {

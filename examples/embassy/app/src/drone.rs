@@ -58,7 +58,7 @@ pub enum Refused {
     NoAutopilot,
     /// The positions of Tx and Rx form no valid line, or their distance differs from the mission's.
     Course(CourseError),
-    /// The relay rejects the settings: they need a feature that this build lacks, or the joint method for more than
+    /// The relay rejects the settings. They need a feature that this build lacks, or the joint method for more than
     /// 100 relays.
     Setup(SetupError),
 }

@@ -86,7 +86,7 @@ impl<const IN: usize> Buffers<IN> {
 /// Interval at which the watchdog is fed, unless the relay's timers are late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Feeds the watchdog every [`TURN`] by calling `feed`, forever, for a drone that does not join the chain.
+/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. For a drone that does not join the chain.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -94,7 +94,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Feeds the watchdog every [`TURN`], forever, unless the relay's timers are late: see [`watchdog::may_feed`].
+/// Feeds the watchdog every [`TURN`], forever, unless the relay's timers are late. See [`watchdog::may_feed`].
 ///
 /// It runs in the same task as the ports and timers. If that task hangs, panics or faults, the watchdog is not fed
 /// any more.
@@ -200,7 +200,7 @@ async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
-/// Serves the tasks beside the relay's ports, forever: the log of events, and the autopilot's port, if any.
+/// Serves the tasks beside the relay's ports, forever. They are the log of events, and the autopilot's port, if any.
 async fn beside<R: Read, W: Write>(
     relay: &AsyncRelay<'_>,
     link: Option<&AsyncAutopilot>,

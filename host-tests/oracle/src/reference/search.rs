@@ -61,8 +61,7 @@ impl Link {
     }
 }
 
-/// Returns the largest value of `f`, by samples at the sorted points `x` and refinements around the best local
-/// maxima.
+/// Returns the largest value of `f`. It is sampled at the sorted points `x` and refined around the best local maxima.
 fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<(f64, f64)> = x.iter().map(|&x| (x, f(x))).collect();
     let place = |i: Option<usize>| i.and_then(|i| samples.get(i)).copied();

@@ -70,7 +70,7 @@ pub struct ChainReport {
     /// Target SIR that the relays agreed on, linear; absent without an agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True if `target` is proven optimal: no chain of equal relays can exceed it by more than the tolerance.
+    /// True if `target` is proven optimal. No chain of equal relays can exceed it by more than the tolerance.
     ///
     /// The leader computes an upper bound on the SIR in a random field. False if this bound is higher than `target`,
     /// so that the optimum is unknown. Absent without a random field or a bound.
@@ -113,7 +113,7 @@ pub struct ChainReport {
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Availability of the chain over the whole run: the part of the time in which it had the best positions.
+    /// Availability of the chain: the part of the run in which it had the best positions.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
     /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
@@ -388,7 +388,7 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` is one complete view (membership of the chain): all its relays, ordered by index.
+/// Returns true if `part` is a complete view: all its relays, ordered by index. A view is a membership of the chain.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)

@@ -256,7 +256,7 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Handles all outputs of relay `index` (from 0): sends its frames, logs its events, and schedules its next
+    /// Handles all outputs of relay `index` (from 0). It sends frames, logs events, and schedules the relay's next
     /// timer.
     fn drain(&mut self, index: usize) {
         let now = self.now;

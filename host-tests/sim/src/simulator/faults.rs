@@ -56,7 +56,7 @@ impl Faults {
         *self == Self::default()
     }
 
-    /// Draws the faults of a frame, counts them in `injected`, and returns the frame's arrivals: none, one or two.
+    /// Draws the faults of a frame, and counts them in `injected`. Returns the frame's arrivals: none, one or two.
     pub fn inject(
         &self,
         frame: &[u8],

@@ -176,7 +176,8 @@ pub struct Watched {
     pub longest_wrong: Option<Duration>,
     /// Largest number of groups of relays that flew by separate agreements at the same time.
     pub most_flying: usize,
-    /// Minimum distance of two relays during the run, m: of their drones if simulated, else of their setpoints.
+    /// Minimum distance of two relays during the run, m. It is that of their drones if simulated, else of their
+    /// setpoints.
     pub least_separation_m: Option<f64>,
 }
 
@@ -213,7 +214,8 @@ pub struct Outcome {
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
     /// never two.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest margin during the run, m: the distance of two drones minus the distance that they have to keep.
+    /// Smallest margin during the run, m. The margin is the distance of two drones minus the distance that they have
+    /// to keep.
     ///
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.

@@ -321,8 +321,8 @@ pub struct Stage {
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
     pub stages: Vec<Stage>,
-    /// Periods in which the chain's view, its state and the promised data rate are constant, in order of time. At
-    /// least one.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time. A view is a
+    /// membership of the chain. At least one.
     pub periods: Vec<Period>,
     /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
     pub promised_bps: Vec<f64>,
@@ -416,7 +416,8 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction: assigned anew at each agreement and for each new view (membership).
+/// Time slots of all hops, for each direction. They are assigned anew at each agreement and for each new view
+/// (membership).
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,

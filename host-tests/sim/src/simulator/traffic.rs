@@ -139,7 +139,8 @@ pub struct Traffic {
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
-    /// Periods in which the chain's view, its state and the promised data rate are constant, in order of time.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time. A view is a
+    /// membership of the chain.
     pub periods: Vec<Period>,
     /// Traffic to Rx and, if data goes both ways, traffic back to Tx.
     pub flows: Vec<Flow>,

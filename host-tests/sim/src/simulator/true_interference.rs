@@ -62,7 +62,7 @@ pub enum BrokenReading {
     Always(f64),
 }
 
-/// Edge length of the cubes of constant shadowing, m: all positions in one cube have the same random loss.
+/// Edge length of the cubes of constant shadowing, m. All positions in one cube have the same random loss.
 const SHADOW_M: f64 = 5.0;
 
 impl TrueInterference {
@@ -151,7 +151,8 @@ impl TrueInterference {
         self.ends && now >= from && now < until
     }
 
-    /// Draws the random factor of a measured power: the mean of `samples` exponential random variables of mean 1.
+    /// Draws the random factor of a measured power. It is the mean of `samples` exponential random variables of mean
+    /// 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))

@@ -71,7 +71,8 @@ fn profiles_are_within_a_metre_of_the_hills_along_geodesics() {
     println!("largest error of a profile: {worst:.3} m");
 }
 
-/// Returns the height of a wall of 100 m on a plain of 500 m, 2 km from Tx on a line of 5 km to the east.
+/// Returns the height of a wall of 100 m on a plain of 500 m. The wall is 2 km from Tx, on a line of 5 km to the
+/// east.
 fn wall(lon: f64, _: f64) -> f64 {
     500.0 + (100.0 - 0.3 * (lon - 8.035_f64).abs() * 76_000.0).max(0.0)
 }

@@ -21,7 +21,7 @@ pub const EXPLORE_M: f32 = 10.0;
 /// Numbers of rounds of Algorithm 2 after which the figure shows the relays' positions.
 pub const ROUNDS: [u16; 4] = [0, 10, 50, 500];
 
-/// Search on a grid by which a relay finds its best position, for comparison with the coarse-to-fine search.
+/// Search on a grid for a relay's best position, for comparison with the coarse-to-fine search.
 pub const GRID: Local = Local::Grid {
     columns: 41,
     rows: 21,

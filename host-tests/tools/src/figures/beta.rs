@@ -18,7 +18,7 @@ pub const STEPS: u32 = 100;
 struct Row {
     alpha: f64,
     beta: f64,
-    /// Largest interference power `I_max` times Upsilon = E[1/I], the inverse of the effective power that relays use.
+    /// Largest interference power `I_max` times Upsilon = E[1/I]. 1 / Upsilon is the effective power that relays use.
     upsilon_times_i_max: f64,
     /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,

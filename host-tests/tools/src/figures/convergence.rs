@@ -10,8 +10,8 @@ use super::{paper, walk};
 /// Numbers of relays in the chains of the figure, one chain for each curve.
 pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 
-/// Decrease of the target SIR from one pass (messages along the chain) to the next, linear, as in the paper's
-/// Algorithm 1.
+/// Decrease of the target SIR from one pass to the next, linear, as in the paper's Algorithm 1. A pass is a series of
+/// messages along the chain.
 pub const STEP: f64 = 0.1;
 
 /// Table row: SIR of a chain after one pass of messages along the chain (a sweep).

@@ -183,7 +183,7 @@ const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     }
 }
 
-/// Returns the entries of the legend: the name of each curve once, with the style of the first curve of that name.
+/// Returns the entries of the legend: the name of each curve once, with the style of its first curve.
 fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     let mut entries: Vec<(&str, Look)> = Vec::new();
     for line in chart.panels.iter().flat_map(|panel| &panel.lines) {

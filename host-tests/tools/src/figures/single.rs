@@ -126,7 +126,7 @@ pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
-/// Largest difference of a computed average gain from the printed one that counts as equal, percentage points.
+/// Largest difference of a computed and a printed average gain that count as equal, percentage points.
 const NEAR: f64 = 0.5;
 
 /// Interpretation of the paper's "average gain": the quantity that is averaged over the altitudes.
@@ -211,7 +211,7 @@ fn gains(
         .collect())
 }
 
-/// Returns the averaged quantity of `reading` (SIR, dB or rate) for four positions of the relay at one altitude.
+/// Returns what `reading` averages (SIR, dB or rate) for four positions of the relay at one altitude.
 ///
 /// The positions are the best one, a random one, the one that ignores interference, and the middle.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {

@@ -39,7 +39,7 @@ pub(crate) struct Chain {
 /// Number of grid points along the whole line. There are more, dense ones near Tx, Rx and the interferer.
 const EVEN: usize = 171;
 
-/// Number of equal cells of the line whose edges the search tries in addition, for a radio with rate steps.
+/// Number of equal cells of the line whose edges the search tries, too, for a radio with rate steps.
 const CELLS: usize = 400;
 
 /// Maximum number of chains that each cell keeps in the search for a radio with rate steps.

@@ -34,24 +34,24 @@ use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight mu of the interior-point method, divided among all hops and directions, for a start far from
-/// the result.
+/// First barrier weight mu of the interior-point method for a start far from the result. It is divided among all hops
+/// and directions.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight mu of the interior-point method, divided among all hops and directions, for a start near the
-/// result.
+/// First barrier weight mu of the interior-point method for a start near the result. It is divided among all hops and
+/// directions.
 const CLOSE_MU: f32 = 3e-3;
 /// Last barrier weight mu of the interior-point method, divided among all hops and directions. The result is within
 /// this of a local optimum, in ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight mu of the interior-point method falls once the positions have settled.
+/// Factor by which the interior-point method's barrier weight mu falls once positions have settled.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit (target plus barrier), in units of mu times the number of levels, below which positions count as
-/// settled. For steps of more than half a Newton step.
+/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
+/// number of levels. For steps of more than half a Newton step.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit (target plus barrier), in units of mu times the number of levels, below which positions count as
-/// settled. For Newton steps shortened by any factor.
+/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
+/// number of levels. For Newton steps shortened by any factor.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
@@ -80,8 +80,8 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Both levels of a hop, ln(forward SIR) and ln(backward SIR / r), and their Lagrange multipliers `lambda`. r is the
-/// required ratio of backward to forward SIR. A multiplier is the upper half of an f32.
+/// Both levels of a hop, and their Lagrange multipliers `lambda`. The levels are ln(forward SIR) and ln(backward SIR
+/// / r). r is the required ratio of backward to forward SIR. A multiplier is the upper half of an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: [f32; 2],
@@ -107,13 +107,13 @@ type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
-    /// Equations of the segment's first relay, after the elimination of all relays before it from the Newton system.
+    /// Equations of the segment's first relay, after all earlier relays are eliminated.
     Front(Front),
     /// Newton steps of the segment's relays: of its first six and of its last four.
     Steps([Step; FIRST], [Step; SECOND]),
 }
 
-/// Position (x, y, h) of a node and the limits of its coordinates, in units of the distance from Tx to Rx.
+/// Position (x, y, h) of a node and its limits, in units of the distance from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -169,15 +169,15 @@ enum Work {
     Substitute(u16, bool),
 }
 
-/// State of the interior-point method, which maximises the worst SIR of both directions: all positions and the Newton
-/// step.
+/// State of the interior-point method: all positions and the Newton step. It maximises the worst SIR of both
+/// directions.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: Gains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Lengths of the line Tx-Rx that are closed to two relays: next to Rx to relay 1, and next to Tx to the last
-    /// relay. In units of the distance from Tx to Rx.
+    /// Lengths of the line Tx-Rx that are closed to two relays. They are next to Rx for relay 1, and next to Tx for
+    /// the last relay. In units of the distance from Tx to Rx.
     pub(super) closed: [f32; 2],
     nodes: [Node; RELAYS],
     last: Hop,
@@ -426,8 +426,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds their ends' barrier: the sum of ln(distance to a
-    /// limit). A level is ln(forward SIR) or ln(backward SIR / r); r is the required ratio of both.
+    /// Computes the levels of ten hops from hop `k` on, and adds their ends' barrier. The barrier is the sum of
+    /// ln(distance to a limit). A level is ln(forward SIR) or ln(backward SIR / r); r is the required ratio of both.
     fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -485,8 +485,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the data of hop `k` for the Newton system: Lagrange multipliers, slacks and the barrier weight mu. A
-    /// slack is ln(SIR) in one direction minus the target.
+    /// Returns the Lagrange multipliers of hop `k`, the slacks of its levels, and the barrier weight mu. A slack is
+    /// ln(SIR) in one direction minus the target.
     fn weights(&mut self, relays: u16, k: u16) -> Weights {
         let (target, mu) = (self.target, self.mu);
         let Hop { level, lambda } = *self.hop(relays, k);
@@ -583,8 +583,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives of both levels of hop `k` by the positions `ends`, its multipliers and its slacks. A
-    /// level is ln(SIR) in one direction, a slack its excess over the target.
+    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, its multipliers and slacks. A level is
+    /// ln(SIR) in one direction, a slack its excess over the target.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);

@@ -82,14 +82,14 @@ impl Weights {
         [a / s, b / t]
     }
 
-    /// Returns the barrier weight mu over the slack for each direction of the hop: the Lagrange multipliers at the
-    /// optimum. The slack is ln(SIR) in that direction minus the target.
+    /// Returns the barrier weight mu over the slack for each direction of the hop. These are the Lagrange multipliers
+    /// at the optimum. The slack is ln(SIR) in that direction minus the target.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the Lagrange multipliers of both directions after a Newton step that changes their slacks by a and b.
-    /// A slack is ln(SIR) in one direction minus the target.
+    /// Returns the hop's Lagrange multipliers after a Newton step that changes its slacks by a and b. A slack is
+    /// ln(SIR) in one direction minus the target.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -225,8 +225,9 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of one coordinate's barrier mu (ln a + ln b) to `slope` and, negated, to `bend`. a and b are
-/// the distances to the lower and the upper limit, mu is the barrier weight.
+/// Adds the derivatives of one coordinate's barrier to `slope` and `bend`. The barrier is mu (ln a + ln b); the
+/// second derivative is negated. a and b are the distances to the lower and the upper limit, mu is the barrier
+/// weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -258,8 +259,7 @@ fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     }
 }
 
-/// Returns the solution z of L' z = v, with the transpose L' of the Cholesky factor (first argument) and the vector
-/// v.
+/// Returns the solution z of L' z = v. L' is the transpose of the Cholesky factor, the first argument.
 fn backward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
     let z = z * f;
     let y = (y - e * z) * d;

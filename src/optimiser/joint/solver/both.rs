@@ -26,13 +26,13 @@ use crate::root::sqrt;
 use crate::sir::square;
 use core::task::Poll;
 
-/// Number of relays for which one call of the solver continues Algorithm 1, which computes the x of all relays for
-/// one target.
+/// Number of relays for which one call of the solver continues Algorithm 1. The algorithm computes the x of all
+/// relays for one target.
 const LINE: u16 = 2;
 /// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
-/// Fraction by which relays move toward even spacing before the interior-point method starts, which separates relays
+/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays
 /// at the same x. The first value is for its first run, the second for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
@@ -42,7 +42,7 @@ struct Start {
     /// Lateral offsets away from the interferer, as fractions of the largest permitted one. The values are for the
     /// first, the middle and the last relay.
     aside: [f32; 3],
-    /// Altitudes of the first and the last relay, as fractions: 0 is the lowest permitted altitude, 1 the highest.
+    /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
     along: Along,
 }
@@ -138,10 +138,9 @@ impl Start {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search finds the highest target at the lateral offsets and altitudes that the interior-point method has
-    /// found.
+    /// The search finds the highest target at the interior-point method's lateral offsets and altitudes.
     Result,
-    /// The search finds the highest target of the best chain more exactly, at the end of the whole solution.
+    /// The search finds the best chain's highest target more exactly, at the end of the whole solution.
     Last,
 }
 
@@ -161,7 +160,7 @@ enum Work {
     Interior,
 }
 
-/// Progress of Algorithm 1 for one target: in its pass over the relays to Rx, or in the pass back to Tx.
+/// Progress of Algorithm 1 for one target. It has a pass over the relays to Rx, and a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
     /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
@@ -169,7 +168,8 @@ struct Pass {
     index: u16,
     /// True during the pass back to Tx.
     is_back: bool,
-    /// x of relay `index`, m: in the pass to Rx the farthest that meets the target, in the pass back the final one.
+    /// x of relay `index`, m. In the pass to Rx it is the farthest that meets the target, in the pass back the final
+    /// one.
     x_m: f32,
     /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
     end_m: f32,
@@ -196,7 +196,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pass: Pass,
     /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
-    /// Number of repeated runs of the interior-point method for the current initial chain, from x of Algorithm 1.
+    /// Number of repeated runs of the interior-point method for the current initial chain.
     again: u8,
     /// Number of the current initial chain. In chain 0 all relays are at the common altitude.
     number: u8,
@@ -561,9 +561,9 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
 /// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
 /// meets at the last run's lateral offsets and altitudes, less the target of that run.
 const NEW: f32 = 3e-4;
-/// Maximum number of runs of the interior-point method per initial chain that start from x of Algorithm 1.
+/// Maximum number of the interior-point method's runs per initial chain that start from Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Excess of the first target to try over the result of the interior-point method, in ln(SIR): the method's possible
+/// Excess of the first target to try over the interior-point method's result, in ln(SIR). It is the method's possible
 /// error.
 const ABOVE: f32 = 1e-4;

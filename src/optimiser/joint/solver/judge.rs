@@ -254,9 +254,9 @@ pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the current trial move: index of the relay, kind of move, and number of halvings of its length. Kinds
-    /// 0 to 3 move it down, up, left or right. Kinds 4 and 5 copy the offset and altitude of the relay two places on
-    /// or back.
+    /// Returns the current trial move: the relay's index, the kind of move, and how often it was halved. Kinds 0 to 3
+    /// move it down, up, left or right. Kinds 4 and 5 copy the offset and altitude of the relay two places on or
+    /// back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -388,8 +388,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`: for [`Purpose::Start`] in a new initial chain, else
-    /// as stored.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they are those of a new
+    /// initial chain, else the stored ones.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -84,8 +84,8 @@ enum Purpose {
     Raise,
     /// The work computes the chain's spare length at Rx again, because its cap was lowered.
     Tighten,
-    /// The search finds the highest target of an improved chain, with the margins of the improvement, and not as the
-    /// relays compute their hops.
+    /// The search finds the highest target of an improved chain, with the improvement's margins. It does not compute
+    /// hops as the relays do.
     Judge,
     /// The search finds the highest target of an improved chain. Hops are computed exactly as the relays compute them
     /// from their messages. Some relays may then stay short of their farthest position.
@@ -125,11 +125,11 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// highest target starts there, so that the improvement is not repeated. `None` if a repetition would give
     /// another chain.
     best_judged: Option<f32>,
-    /// Target at which the improvement of the current chain ended, in ln(SIR), where the final search starts. `None`
+    /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
     /// before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
-    /// True unless the improvement of the current chain was cut short, because it is not expected to become the best.
-    /// If true, a repetition gives the same chain, so it can be omitted.
+    /// True unless the current chain's improvement was cut short. It is if the chain is not expected to become the
+    /// best. If true, a repetition gives the same chain, so it can be omitted.
     is_whole: bool,
     /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
     /// relays try other positions.
@@ -312,7 +312,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         cells.map_or(0.0, |cells| cells.end_m(mission, seat_of, index))
     }
 
-    /// Returns true if some relays have to stay short of their farthest x, so that the chain meets the target found.
+    /// Returns true if some relays have to stay short of their farthest x to meet the target found.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,

@@ -193,8 +193,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 /// Number of relays that one call handles in a pass that computes only their x.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty for relays near the interferer at which an improved chain counts as feasible, as a fraction of the
-/// distance from Tx to Rx.
+/// Maximum penalty at which an improved chain counts as feasible. It is for relays near the interferer, as a fraction
+/// of the distance from Tx to Rx.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {

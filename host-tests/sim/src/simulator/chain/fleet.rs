@@ -29,7 +29,7 @@ const TRAFFIC_M: f64 = 30.0;
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
-    /// Creates the setup's drones with autopilots, if any, on the ground, and schedules their first time step.
+    /// Creates the setup's drones with autopilots, if any, on the ground. Schedules their first time step.
     pub(super) fn line_up(&mut self) {
         if let Some(spec) = &self.setup.fleet {
             let all = 0..self.members.len();
@@ -243,8 +243,8 @@ impl Chain {
 }
 
 impl Chain {
-    /// Creates the setup's drones, if any, in the air or with autopilots on the ground, and schedules their first
-    /// time step.
+    /// Creates the setup's drones, if any, and schedules their first time step. Drones without autopilots start in
+    /// the air.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));

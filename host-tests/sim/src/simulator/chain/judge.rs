@@ -249,7 +249,7 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` is one complete view (membership of the chain): all its relays, ordered by index.
+/// Returns true if `part` is a complete view: all its relays, ordered by index. A view is a membership of the chain.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()

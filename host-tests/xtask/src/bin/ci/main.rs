@@ -124,7 +124,7 @@ const LAST_LINES: usize = 20;
 /// Largest number of lines repeated from each list of failures: panics, or names of failed tests.
 const LINES_OF_FAILURES: usize = 100;
 
-/// Relevant part of a failed step's output: the `failures:` of each test binary, or else the last lines.
+/// Relevant part of a failed step's output: the `failures:` of each test binary, or the last lines.
 #[derive(Default)]
 pub(crate) struct Evidence {
     failures: Vec<String>,
