@@ -31,7 +31,7 @@ pub enum Event {
     NeighbourLost {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the lost neighbour.
+        /// Index of the lost neighbour in the chain, 1 to N.
         node: u16,
     },
     /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from

@@ -24,7 +24,7 @@ impl PowerRatio {
         }
     }
 
-    /// Returns this ratio as a single f32, rounded.
+    /// Returns this power ratio as a single f32, rounded.
     pub const fn value(&self) -> f32 {
         self.hi
     }

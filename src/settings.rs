@@ -26,9 +26,9 @@ const LATENCY: Duration = Duration::from_millis(10);
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity {
-    /// Network number; frames of other networks are ignored.
+    /// Number of the network; frames of other networks are ignored.
     pub network: u16,
-    /// Index in the chain, 1 (next to the transmitter) to N.
+    /// Index of this relay in the chain, from 1 (next to the transmitter) to N.
     pub index: u16,
 }
 

@@ -17,9 +17,9 @@ pub enum Heading {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Side toward the transmitter Tx.
+    /// Side of a relay toward the transmitter Tx.
     Upstream,
-    /// Side toward the receiver Rx.
+    /// Side of a relay toward the receiver Rx.
     Downstream,
 }
 

@@ -19,7 +19,7 @@ pub struct Stats {
     pub overheard: u32,
     /// Received frames that are longer than the format allows.
     pub oversized: u32,
-    /// Received frames that were cut short.
+    /// Received frames that were cut short, so that their end is missing.
     pub truncated: u32,
     /// Received frames with a wrong CRC.
     pub crc: u32,

@@ -12,13 +12,13 @@ use crate::wire::message::{Coarse, Detail, Entry};
 /// Pairs have the neighbour toward Tx first, then the one toward Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
-    /// Number of the relay in the mission, 1..=N.
+    /// Number of the relay in the mission, from 1 (next to Tx) to N.
     pub relay: u16,
     /// Time at which the relay was in this state, on the station's clock.
     pub at: Instant,
     /// Position of the drone by its autopilot; `None` if it has none.
     pub position: Option<Placement>,
-    /// Setpoint of the drone; `None` if it has none.
+    /// Setpoint of the drone; `None` if the drone has none.
     pub setpoint: Option<Placement>,
     /// Position on which the chain has agreed for this relay; `None` before an agreement.
     pub agreed: Option<Placement>,

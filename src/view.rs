@@ -73,9 +73,9 @@ impl ViewId {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {
-    /// Identifier of the view.
+    /// Identifier of the view, an agreed set of members of the chain.
     pub id: ViewId,
-    /// Number of relays in the view, 1 to 1000.
+    /// Number of relays that are members of the view, 1 to 1000.
     pub relays: u16,
 }
 

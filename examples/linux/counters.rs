@@ -41,9 +41,7 @@ const EVERY: Duration = Duration::from_millis(2_000);
 const MANY: u32 = 3;
 
 /// Number of damaged frames between two checks from which on the log suggests a wrong baud rate. It does so only if
-/// no frame was intact.
-///
-/// It does so only if no intact frame was received between the two checks.
+/// no intact frame was received between the two checks.
 const DAMAGED: u32 = 10;
 
 /// Detects reasons why frames are rejected, from the growth of counters. It has the counters at the last check, and

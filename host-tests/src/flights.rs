@@ -110,8 +110,6 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
 
 /// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list. Without a
 /// profile of its own, a relay has the mission's common one.
-///
-/// With an empty list, all relays have the common profile of the mission.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();

@@ -183,11 +183,11 @@ impl Estimator {
 
 /// Beta distribution that has the mean and the variance of the samples.
 struct Fit {
-    /// Mean m of the samples I / `I_max`.
+    /// Mean m of the accepted samples, each the interference power I divided by `I_max`.
     m: f32,
     /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without cancellation.
     rest: f32,
-    /// Standard deviation of the samples I / `I_max`.
+    /// Standard deviation s of the accepted samples, each the interference power I divided by `I_max`.
     s: f32,
     /// Sum alpha + beta of the two shape parameters of the fitted Beta distribution.
     w: f32,

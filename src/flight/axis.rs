@@ -89,9 +89,9 @@ pub struct Axis {
     middle: Vector,
     /// Unit vector toward the receiver, at the middle of the line.
     along: Vector,
-    /// Unit vector to the right of the line, at its middle.
+    /// Unit vector to the right of the line from Tx to Rx, at the middle of the line.
     right: Vector,
-    /// Unit vector upward, at the middle of the line.
+    /// Unit vector upward, at the middle of the line from Tx to Rx.
     up: Vector,
     /// Half the length of the chord from transmitter to receiver, m.
     half_chord_m: f64,

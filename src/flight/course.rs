@@ -19,7 +19,7 @@ pub struct Course {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CourseError {
-    /// The positions of Tx and Rx do not define a line.
+    /// The positions of the transmitter and the receiver do not define a line.
     Axis(AxisError),
     /// The distance of Tx and Rx along the ground is not the mission's distance. The value is the distance along the
     /// ground, m.

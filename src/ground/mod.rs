@@ -233,7 +233,7 @@ impl Ground {
         true
     }
 
-    /// Returns the progress of the upload.
+    /// Returns the progress of the mission upload.
     pub const fn progress(&self) -> Progress {
         self.progress
     }
@@ -601,7 +601,7 @@ impl Ground {
 #[cfg(feature = "telemetry")]
 #[derive(Clone, Debug)]
 struct Watching {
-    /// Number of relays in the mission.
+    /// Number of relays in the mission that the relays fly.
     all: u16,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
@@ -612,7 +612,7 @@ struct Watching {
     is_due: bool,
     /// Report entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
-    /// Newest state of every relay, by rising number.
+    /// Newest known state of every relay that has reported, in the order of their node numbers.
     known: heapless::Vec<KnownState, REPORTED>,
 }
 
@@ -724,7 +724,7 @@ const fn is_under_way(progress: Progress) -> bool {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FlownMission {
-    /// Node number of the relay that answered.
+    /// Node number of the relay that answered the query.
     pub by: u16,
     /// Version of the mission; 0 for the one that was loaded before flight.
     pub version: u16,
@@ -743,11 +743,11 @@ impl FlownMission {
     }
 }
 
-/// Progress of an upload.
+/// Progress of the upload of a new mission from the ground station to the relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Progress {
-    /// No upload is in progress.
+    /// No mission upload is in progress.
     #[default]
     Idle,
     /// The mission is being offered; no relay has reported yet that it has stored it.
@@ -782,7 +782,7 @@ pub enum Progress {
     },
     /// The upload is outdated: a relay has stored a newer mission, or another with its version.
     Outdated {
-        /// Version of the stored mission.
+        /// Version of the newer mission that the relay has stored.
         version: u16,
     },
 }

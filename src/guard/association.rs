@@ -40,7 +40,7 @@ struct LeaveNotice {
 )]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Association {
-    /// Node number of the neighbour, 0 for none.
+    /// Node number of the neighbour in this association; 0 if there is no neighbour.
     pub(super) node: u16,
     /// Random number by which this relay identifies the association (session) with the neighbour.
     pub(super) own_number: u16,
@@ -48,7 +48,7 @@ pub(super) struct Association {
     pub(super) peer_number: u16,
     /// Number of consecutive messages that belong to another association (session) of the neighbour.
     foreign_messages: u8,
-    /// True if a message to the neighbour is pending.
+    /// True if a message to the neighbour about the minimum separation must be sent.
     pub(super) due: bool,
     /// True while the neighbour requests an open chain. In an open chain all relays are at least the minimum separation
     /// apart along x.
@@ -105,9 +105,6 @@ impl Association {
 
     /// Returns by how much this relay is on the correct side of its neighbour along x, m. The neighbour is at `side`;
     /// its last received x counts. Negative on the wrong side; NaN if a position is unknown.
-    ///
-    /// The neighbour is at `side`; its last received x counts. Negative on the wrong side; NaN if a position is
-    /// unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -533,11 +530,8 @@ pub struct Fence {
     pub number: u16,
     /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx sends the x of the fence, or before the
     /// first fence its highest possible x. The relay toward Rx sends its lowest possible x.
-    ///
-    /// The relay upstream sends the x of the fence; before the first fence, its highest possible x. The relay
-    /// downstream sends its lowest possible x.
     pub x_m: f32,
-    /// Agreed x of the sender, m, -1e7 to 1e7.
+    /// x of the position that the chain has agreed on for the sender, m: -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, they are those of its reported position.

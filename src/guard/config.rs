@@ -16,9 +16,9 @@ pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geofence {
-    /// Smallest x, m from Tx toward Rx: -1e7 to `most_x_m`.
+    /// Lower limit of the geofence along x, m from Tx toward Rx: -1e7 to `most_x_m`.
     pub least_x_m: f32,
-    /// Largest x, m from Tx toward Rx: `least_x_m` to 1e7.
+    /// Upper limit of the geofence along x, m from Tx toward Rx: `least_x_m` to 1e7.
     pub most_x_m: f32,
     /// Smallest y, m to the right of the line (negative to its left): -1e7 to `most_y_m`.
     pub least_y_m: f32,
@@ -31,7 +31,7 @@ pub struct Geofence {
 }
 
 impl Geofence {
-    /// Returns true if `place` is inside the geofence.
+    /// Returns true if the position `place` is inside the geofence.
     pub fn contains(&self, place: Placement) -> bool {
         (self.least_x_m..=self.most_x_m).contains(&place.x_m)
             && (self.least_y_m..=self.most_y_m).contains(&place.y_m)
@@ -110,7 +110,7 @@ impl GuardConfig {
         self
     }
 
-    /// Returns true if every number is within its range.
+    /// Returns true if every number of this configuration is within its range.
     pub fn is_valid(&self) -> bool {
         let fence = &self.geofence;
         is_coordinate(fence.least_x_m)

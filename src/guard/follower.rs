@@ -26,7 +26,7 @@ pub(super) struct FenceFollower {
     /// Distance along x to the upstream neighbour to which this relay has agreed, m. Infinity stands for the minimum
     /// separation, and is the value before any agreement.
     agreed_m: f32,
-    /// Agreed x of the neighbour upstream, m.
+    /// x of the position that the chain has agreed on for the neighbour toward Tx, m.
     target_m: f32,
     /// Lateral offset and altitude of the setpoint of the neighbour upstream.
     across: CrossSection,

@@ -38,7 +38,7 @@ pub(super) struct ReachableInterval {
     pub(super) setpoint_m: f32,
     pub(super) low_m: f32,
     pub(super) high_m: f32,
-    /// Time at which the setpoint's x changed last.
+    /// Time at which the x of the drone's setpoint last changed.
     changed_at: Instant,
     /// Interval that contains the x of all setpoints since the time `recent_since`, m.
     recent_span: Span,

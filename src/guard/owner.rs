@@ -25,7 +25,7 @@ pub(super) struct FenceOwner {
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
-    /// Agreed x of the neighbour downstream, m.
+    /// x of the position that the chain has agreed on for the neighbour toward Rx, m.
     target_m: f32,
     /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
     /// there.

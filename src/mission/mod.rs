@@ -221,7 +221,7 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {
-    /// Lower limit of the altitudes or lateral offsets, m.
+    /// Smallest allowed altitude, or smallest allowed lateral offset, of the relays, m.
     pub least_m: f32,
     /// Upper limit of the altitudes or lateral offsets, m: at least `least_m`.
     pub most_m: f32,
@@ -271,7 +271,7 @@ impl Band {
     }
 }
 
-/// Altitude and transmit power of one relay.
+/// Altitude and transmit power that the mission gives to one relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Profile {
@@ -528,12 +528,12 @@ impl Mission {
         &self.config
     }
 
-    /// Number of relays N.
+    /// Returns the number N of relays of the mission.
     pub const fn relays(&self) -> u16 {
         self.config.relays
     }
 
-    /// Returns the kind of interference on the hops.
+    /// Returns the kind of interference that the relays suffer in this mission.
     pub const fn interference(&self) -> &Interference {
         &self.config.interference
     }

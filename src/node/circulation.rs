@@ -52,7 +52,7 @@ pub(crate) enum Stage {
     Idle,
     /// The message has been forwarded, or is about to be; the reply with its result has not arrived yet.
     Outstanding,
-    /// The result of the message is known.
+    /// The message has circulated through the chain, and its result is known.
     Completed,
     /// The message was cancelled after it was sent. Duplicates of it are answered, but replies to it no longer prove
     /// that a neighbour is alive.
@@ -74,7 +74,7 @@ pub(crate) enum Reply {
 pub(crate) struct Path {
     /// Duration of one hop: transmission and handling of one frame.
     pub(crate) hop_time: Duration,
-    /// Number of hops on the path.
+    /// Number of hops on the message's path along the chain.
     pub(crate) hops: u16,
     /// True if the relays on the path compute before they forward the message.
     pub(crate) slow: bool,
@@ -90,7 +90,7 @@ pub(crate) struct Circulation {
     reply_due: Option<Reply>,
     /// Number of retransmissions of the message since the next relay's last reply.
     retries: u8,
-    /// True once the next relay has acknowledged the message.
+    /// True once the next relay on the path has acknowledged the message.
     is_received: bool,
     /// True if the channel counts as lossy: this message or one of the last messages has been lost once.
     is_lossy: bool,

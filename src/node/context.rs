@@ -16,7 +16,7 @@ pub(crate) struct Member {
     /// Interference as the active mission configures it, before any estimate from measurements.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
-    /// Node number: 1 is the relay next to Tx.
+    /// Node number of this relay: 1 is the relay next to Tx.
     pub(crate) node: u16,
     /// Number of relays of the mission as loaded before flight.
     pub(crate) all: u16,
@@ -239,7 +239,7 @@ pub(crate) enum Peer {
 /// Result of one protocol layer that other layers or the firmware handle as an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
-    /// The chain has agreed on its positions.
+    /// The relays of the chain have all agreed on their positions.
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
@@ -272,7 +272,7 @@ pub(crate) enum ProposalOutcome {
     /// Superseded: another view had been decided on before and is accepted instead. The leader then proposes a view
     /// that follows it.
     Superseded,
-    /// Rejected: too few relays are reachable for a quorum.
+    /// Rejected: fewer relays are reachable than a quorum needs.
     NoQuorum,
 }
 

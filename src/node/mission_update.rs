@@ -54,7 +54,7 @@ struct Offering {
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
-    /// True if a mission offer to the neighbour is pending.
+    /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
     /// Time at which the offer to the neighbour is sent again; `None` if it is not sent again.
     at: Option<Instant>,
@@ -79,7 +79,7 @@ impl Offering {
     };
 }
 
-/// Result of handling an offered mission.
+/// Result of handling a mission that a neighbour has offered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
     /// The offered mission is newer than the stored one, and has been stored.
@@ -101,7 +101,7 @@ const OFFERS: u8 = 16;
 /// Missions that one relay has stored, and its offers of the newest one to its neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
-    /// Identifier of the newest stored mission.
+    /// Identifier of the newest mission that this relay has stored.
     latest: MissionId,
     /// State of the mission uploads; the array is empty without the feature `upload`.
     uploads: [Uploads; UPLOAD as usize],
@@ -126,7 +126,7 @@ struct Uploads {
     /// Current nonce (random number) in this relay's hellos, and the previous one. A mission offer must repeat one of
     /// them.
     asked: [Asked; 2],
-    /// State of the mission offers toward Tx and toward Rx.
+    /// State of the mission offers to the two neighbours: toward Tx, and toward Rx.
     offering: [Offering; 2],
     jitter: Jitter,
 }

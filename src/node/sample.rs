@@ -21,7 +21,7 @@ pub enum Sample {
     /// Interference power at a relay's setpoint, for a mission with an interference field. A field is a known
     /// distribution of the interference along x.
     Interference {
-        /// Received power, W: above 0, at most `Measure::i_max_w`.
+        /// Received interference power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
     },
     /// Mean interference power at a position, for the estimate of an unknown interferer.
@@ -50,7 +50,7 @@ pub enum Sample {
     },
     /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from it.
     FirstHop {
-        /// Linear SIR, above 0.
+        /// Signal-to-interference ratio (SIR), linear, above 0.
         sir: f32,
     },
 }

@@ -46,7 +46,7 @@ pub enum Local {
     Grid {
         /// Number of positions of the grid along x, including those of the neighbours, 2 to 255.
         columns: u8,
-        /// Number of altitudes of the grid, 2 to 255.
+        /// Number of altitudes (rows) in the grid of candidate positions, 2 to 255.
         rows: u8,
     },
 }
@@ -58,7 +58,7 @@ pub struct HopEnd {
     pub place: Placement,
     /// Minimum distance between the neighbour and the relay that searches, m.
     pub apart_m: f32,
-    /// Transmit power of the neighbour, W.
+    /// Transmit power of the neighbouring node, W.
     pub power_w: f32,
 }
 

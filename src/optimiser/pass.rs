@@ -55,13 +55,13 @@ impl Behind {
 /// the farthest x, in the direction of the pass, that meets the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
-    /// Mission of the chain.
+    /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
     /// Relay from which the pass arrives; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
     pub index: u16,
-    /// Lateral offset, altitude and power of the relay.
+    /// Lateral offset, altitude and transmit power of this relay.
     pub own: Station,
     /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
     /// interference field.

@@ -19,7 +19,7 @@ pub struct Agreed {
     pub ladder: Ladder,
     /// Index of the committed target SIR in the ladder, the list of targets.
     pub commit: u8,
-    /// Committed target, linear SIR.
+    /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
     /// Upper bound, linear: no chain at these altitudes meets this target SIR. `None` with the paper's fixed step,
     /// whose passes do not try all chains, and for traffic in both directions.

@@ -73,7 +73,7 @@ pub struct Retreat<'a> {
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x that the hop's sender may take, m.
+    /// Smallest x that the sender of this hop may take, m from Tx.
     end_m: f32,
     to_rx: bool,
     /// Backward hop from the receiver to the sender, and the interference at the sender. `None` for data in one
@@ -405,9 +405,9 @@ impl<'a> Retreat<'a> {
 /// Hop along the line: the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
-    /// x of the hop's receiver, m.
+    /// x of the receiver of this hop, m from Tx.
     pub to_m: f32,
-    /// x of the hop's sender, m.
+    /// x of the sender of this hop, m from Tx.
     pub from_m: f32,
 }
 
@@ -469,9 +469,9 @@ impl<'a> HopInterference<'a> {
 /// Part of the line in which Upsilon = E[1/I], the mean inverse interference power, is linear in x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
-    /// Smallest x of this part, m.
+    /// Smallest x of this part of the interference field, m.
     start_m: f32,
-    /// Largest x of this part, m.
+    /// Largest x of this part of the interference field, m.
     end_m: f32,
     /// Upsilon at the part's smallest x, as a fraction of the field's largest. Upsilon is the mean inverse
     /// interference power.

@@ -82,7 +82,7 @@ pub struct Hop {
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
-    /// Maximum x that the hop's receiver may take, m.
+    /// Largest x that the receiver of this hop may take, m from Tx.
     end_m: f32,
     /// Maximum x of the receiver and of the sender, m. They leave the relays from there to Rx their minimum
     /// separation.

@@ -95,7 +95,7 @@ impl Spread {
 pub struct NumberedEstimate {
     /// Sequence number of the estimate, 0 for the initial one.
     pub number: u16,
-    /// Interference estimate with this number.
+    /// Interference estimate that has this sequence number.
     pub estimate: InterferenceEstimate,
 }
 

@@ -16,7 +16,7 @@ use crate::time::{Duration, Instant};
 /// in the units of [`sensing`](crate::sensing).
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
-/// Interference level measured at Tx or at Rx.
+/// Mean interference power that was measured at Tx or at Rx, and the number of its measurements.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Level {
     /// Mean interference power at this ground station, W; 0 without a measurement.
@@ -158,7 +158,7 @@ fn within(sum: f32) -> f32 {
 }
 
 impl Sums {
-    /// Sums before any measurement: all zero.
+    /// Sums before any measurement: all of them are zero.
     pub const NONE: Self = Self {
         numbers: [0.0; SUMS],
     };

@@ -145,7 +145,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P, D> SerialLink<P, D> {
-    /// Returns the counters since the link was created.
+    /// Returns the counters of received bytes and errors since the link was created.
     pub fn stats(&self) -> &SerialStats {
         &self.stats
     }
@@ -267,13 +267,13 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
 pub struct SerialStats {
     /// Number of bytes lost because they were not read in time.
     pub overrun: u32,
-    /// Number of bytes received without a stop bit.
+    /// Number of bytes that the serial port received without a stop bit (framing error).
     pub framing: u32,
-    /// Number of bytes received with the wrong parity.
+    /// Number of bytes that the serial port received with the wrong parity bit.
     pub parity: u32,
-    /// Number of bytes received with noise on the line.
+    /// Number of bytes that the serial port received with noise on the line.
     pub noise: u32,
-    /// Number of reads that failed for another reason.
+    /// Number of reads from the serial port that failed for another reason.
     pub other: u32,
     /// Number of failed writes to the port, plus failed checks if all bytes have left the port. Failed writes are
     /// repeated.

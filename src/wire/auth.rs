@@ -63,7 +63,7 @@ impl defmt::Format for Key {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Auth {
-    /// Secret key of the network.
+    /// Secret key that authenticates the frames of the network.
     pub key: Key,
     /// Start counter of this relay, from 1, larger at every start. A number in flash that is incremented before use, or the seconds
     /// of a clock that never runs backward. If an epoch is reused, frames recorded in it are accepted again.

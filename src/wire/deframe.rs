@@ -13,7 +13,7 @@ use super::frame::MAX_DECODED;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// The frame is longer than the maximum.
+    /// The received frame is longer than the maximum.
     Oversized,
     /// A delimiter came inside a COBS block: the end of the frame is missing.
     Truncated,

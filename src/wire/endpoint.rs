@@ -10,12 +10,12 @@ use super::session::{Checked, Session};
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 
-/// Frame to send: its destination and its length.
+/// Frame that is ready to send: its destination and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
-    /// Node number of the destination.
+    /// Node number of the frame's destination.
     pub(crate) to: u16,
-    /// Length of the frame, bytes.
+    /// Length of the encoded frame, bytes.
     pub(crate) len: usize,
 }
 

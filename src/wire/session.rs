@@ -32,7 +32,7 @@ use crate::time::{Duration, Instant};
 /// Actual sender of a frame that bears this relay's own node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
-    /// The relay itself: the frame is an echo of its own.
+    /// The relay itself: the received frame is an echo of one that it sent.
     Itself,
     /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
     Unknown,
@@ -74,7 +74,7 @@ const WENT_BACK: u8 = 5;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True if a handshake to this node must be sent.
+    /// True if an authentication handshake to this node must be sent.
     handshake: bool,
     /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only until
     /// the node has proved its presence.
@@ -89,7 +89,7 @@ struct Peer {
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
-    /// Largest nonce that the node has sent; 0 before any.
+    /// Largest nonce that this node has sent; 0 before any.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
@@ -158,7 +158,7 @@ pub(crate) struct Session {
     shown: Option<u16>,
 }
 
-/// Result of the authentication of a received frame.
+/// Result of authenticating a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
     /// Valid message that was not received before. It proves that its sender is present. `first` is true if the
@@ -342,7 +342,7 @@ impl Session {
         Checked::Fresh { first }
     }
 
-    /// Authenticates a handshake; `None` if its tag is wrong.
+    /// Checks the authentication tag of a handshake; `None` if the tag is wrong.
     fn check_handshake(
         &mut self,
         now: Instant,

@@ -165,8 +165,6 @@ impl Body<'_, '_> {
     }
 
     /// Appends the first fields of a Proposal or Decision: mission, view, and a relay's index in the view.
-    ///
-    /// They are the mission, the view and a relay's index in the view.
     fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);

@@ -91,8 +91,6 @@ pub struct Flight {
     pub relays: u16,
     /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first all relays
     /// had agreed, in the second as many as the last agreed view had.
-    ///
-    /// The first share is that of all relays, the second that of as many as the last agreed view had then.
     pub available: Option<(f64, [f64; 2])>,
     /// Lowest SIR of any known hop since the previous stored snapshot, for each stored snapshot, dB.
     pub worst_db: Vec<Option<f64>>,

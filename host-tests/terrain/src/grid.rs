@@ -246,8 +246,6 @@ impl Tile {
 
     /// Returns column and row of this tile's north-west height in the grid of another tile. The error is the property
     /// in which the two grids differ.
-    ///
-    /// The error is the property in which the grids differ.
     fn place_in(
         &self,
         system: System,

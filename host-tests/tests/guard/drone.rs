@@ -60,8 +60,6 @@ pub(crate) struct Drone {
     taken_s: f64,
     /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx. A reply is valid only if
     /// it repeats the number.
-    ///
-    /// A reply counts only if it repeats the number.
     pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,

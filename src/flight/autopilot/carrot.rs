@@ -331,7 +331,7 @@ const UNCONFIRMED: u8 = 10;
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// Number of times that the standing target has been sent.
+    /// Number of times that this target has been sent to the autopilot while it stands still.
     times_sent: u8,
     /// True once the autopilot has reported this target as its own.
     is_accepted: bool,
@@ -339,12 +339,12 @@ pub(super) struct Target {
     since: Instant,
     /// Number of consecutive reports in which the autopilot names another target.
     other_targets: u8,
-    /// True once the autopilot has reported any target.
+    /// True once the autopilot has reported any target position in POSITION_TARGET_GLOBAL_INT.
     is_reported: bool,
 }
 
 impl Target {
-    /// Creates a standing target that has not been sent.
+    /// Creates the state of a target standing at `place` that has not been sent to the autopilot yet.
     pub(super) const fn at(place: Placement, now: Instant) -> Self {
         Self {
             carrot: Carrot::at(place, now),

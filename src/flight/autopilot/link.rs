@@ -90,7 +90,7 @@ pub struct Autopilot {
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
-    /// Time at which the drone's position was last lost.
+    /// Time at which the autopilot last stopped reporting the drone's position.
     blind_at: Option<Instant>,
     /// Time since which positions are received again in the state [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
@@ -397,7 +397,7 @@ impl Autopilot {
         }
     }
 
-    /// Handles the timers due at `now`. Constant work.
+    /// Handles the timers of the autopilot link that are due at `now`. The work per call is constant.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.streams.handle_timeout(now);

@@ -35,7 +35,7 @@ const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 /// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Control of the drone: the relay takes or loses it.
+    /// Event about the control of the drone: the relay takes or loses it.
     Control,
     /// Reason for which the pilot cannot give the relay control of the drone.
     Wait,
@@ -43,7 +43,7 @@ pub(super) enum Topic {
     Upstream,
     /// Reason why the guard (collision avoidance) holds the drone back because of its downstream neighbour.
     Downstream,
-    /// Event of the relay, such as a lost neighbour.
+    /// Event of the relay itself that the operator is to see, such as a lost neighbour.
     Relay,
     /// Breach of the autopilot's own fence.
     Fence,
@@ -130,7 +130,7 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
-/// Queue of texts and numbers for the operator.
+/// Queue of the texts and named values that the link is to send to the operator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
@@ -317,9 +317,9 @@ pub enum AutopilotEvent {
     LostCleared {
         /// Side of this relay whose lost relays have landed.
         side: Side,
-        /// Numbers of the relays, padded with zeros.
+        /// Node numbers of the relays that have landed, padded with zeros.
         relays: [u16; MOST],
-        /// Sender of the command.
+        /// MAVLink address of the sender of the command.
         from: Address,
     },
     /// Denied command of the operator, which reports lost relays as landed. It does not name exactly the lost relays
@@ -327,7 +327,7 @@ pub enum AutopilotEvent {
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: [u16; MOST],
-        /// Sender of the command.
+        /// MAVLink address of the sender of the command.
         from: Address,
     },
     /// Mismatch of the signatures of autopilot and link.

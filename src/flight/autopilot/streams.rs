@@ -58,7 +58,7 @@ const REQUESTED: [RequestedMessage; 4] = [
     },
 ];
 
-/// State of the request for one message of the autopilot.
+/// State of the periodic request for one kind of message from the autopilot.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     is_requested: bool,
@@ -96,7 +96,7 @@ impl Streams {
         }
     }
 
-    /// Counts a received message with the number `id`.
+    /// Counts a message received from the autopilot, if its MAVLink id `id` is one of the requested ones.
     pub(super) fn count_message(&mut self, id: u32) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             if asked.id == id {

@@ -46,11 +46,11 @@ const CRITICAL: u8 = 5;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Position {
-    /// Time of the measurement, on the relay's clock.
+    /// Time of the autopilot's position measurement, on the relay's clock.
     pub at: Instant,
-    /// Position in the mission's coordinates.
+    /// Position of the drone in the mission's coordinates.
     pub place: Placement,
-    /// Velocity toward north, east and down, m/s.
+    /// Velocity of the drone toward north, east and down, m/s.
     pub velocity_m_s: [f32; 3],
 }
 
@@ -84,12 +84,12 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// Time of the autopilot's last message of any kind.
+    /// Time at which the last message of any kind was received from the autopilot.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the autopilot's mode is OFFBOARD or GUIDED, in which the relay sets the target.
     granted: bool,
-    /// Value of `MAV_STATE` in the last heartbeat.
+    /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
     /// True if OFFBOARD or GUIDED, now or once entered, counts as the pilot's choice. See [`Self::review_choice`].
     chosen: bool,
@@ -416,7 +416,7 @@ pub(super) struct Echo {
     /// Tag in the low bits of every request, by which this link recognises the replies to its own requests.
     tag: u32,
     due: Option<Instant>,
-    /// Time of the first TIMESYNC request.
+    /// Time of the first TIMESYNC request to the autopilot; `None` before it.
     begun_at: Option<Instant>,
     /// Time at which the newest TIMESYNC request with a reply was sent.
     answered_at: Option<Instant>,

@@ -42,7 +42,7 @@ static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Address {
-    /// System id of MAVLink, 1 to 255.
+    /// MAVLink system id of the sender or addressee, 1 to 255.
     pub system: u8,
     /// Component id of MAVLink: 1 is the autopilot, 191 an onboard computer.
     pub component: u8,
@@ -61,7 +61,7 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
-    /// Message id of MAVLink, 24 bits.
+    /// Id of the kind of MAVLink message, 24 bits.
     pub id: u32,
     /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
     pub crc_extra: u8,

@@ -47,14 +47,14 @@ pub enum Outgoing<'a> {
         command: u16,
         /// Value of `MAV_RESULT`, the answer.
         result: u8,
-        /// Sender of the command, to which the reply goes.
+        /// MAVLink address of the sender of the command, to which this reply goes.
         to: Address,
     },
     /// SET_POSITION_TARGET_GLOBAL_INT: target to fly to, above mean sea level (frame 5).
     SetPosition {
         /// Time since the companion's start, ms.
         boot_ms: u32,
-        /// Target position.
+        /// Target position of the drone.
         at: Geodetic,
         /// Target velocity toward north, east and down, m/s; without it the autopilot stops at the target.
         velocity_m_s: Option<[f32; 3]>,

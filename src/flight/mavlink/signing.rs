@@ -68,11 +68,11 @@ impl Stamp {
     }
 }
 
-/// Reason why a frame's signature is rejected.
+/// Reason why the signature of a received MAVLink frame is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Flaw {
-    /// The frame has no signature.
+    /// The received MAVLink frame has no signature.
     Unsigned,
     /// The signature is of another key, or the frame was altered.
     Key,
@@ -88,7 +88,7 @@ pub struct Signing {
     /// Timestamp of this link at the time `at`, in units of 10 µs.
     stamp: u64,
     at: Instant,
-    /// Timestamp of the last sent frame.
+    /// Timestamp in the signature of the last sent MAVLink frame.
     sent: u64,
     senders: [Sender; SENDERS],
 }

@@ -237,7 +237,7 @@ impl Node {
         self.telemetry.events.take()
     }
 
-    /// Returns the expiry of the lease; `None` without one.
+    /// Returns the time at which this relay's lease expires; `None` if it has no lease.
     pub(crate) const fn lease(&self) -> Option<Instant> {
         self.layers.lease.until()
     }
@@ -377,7 +377,7 @@ impl Layers {
     }
 }
 
-/// Events and counters for the firmware.
+/// Events and counters of a relay, which the firmware reads.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Telemetry {
     pub(super) events: Pending,

@@ -67,7 +67,7 @@ impl Heard {
 /// Record of losses of the link to one node. A link that was lost often (flaps) is not used for a while.
 #[derive(Clone, Copy, Debug)]
 struct Link {
-    /// Time at which the link was lost last.
+    /// Time at which the link to the neighbour was last lost.
     lost_at: Instant,
     /// Frames received since the last loss of the link: times of the first and last; `None` without any.
     back: Option<Heard>,

@@ -101,10 +101,10 @@ pub(crate) struct Liveness {
     longest: u16,
 }
 
-/// Result of a check if a silent neighbour is lost.
+/// Result of the check whether a silent neighbour is lost.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
-    /// True if the neighbour has become lost by this check.
+    /// True if this check has found that the neighbour is lost.
     pub(crate) lost: bool,
     /// Time at which the neighbour's silence is checked again.
     pub(crate) next_check: Instant,

@@ -53,7 +53,7 @@ enum NeighbourState {
 /// Neighbour on one side of this relay: its selection, its liveness and the search for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbour {
-    /// Node number of the selected neighbour, 0 for none.
+    /// Node number of the selected neighbour; 0 if there is none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
     /// End of the time after the selection of a neighbour in which no new view is requested. The relay beyond the
@@ -66,7 +66,7 @@ pub(crate) struct Neighbour {
     dropped: u16,
     /// Previous neighbour, which a nearer node has replaced; 0 for none.
     replaced: u16,
-    /// Start of the last search for a neighbour.
+    /// Time at which the last search for a neighbour began.
     searches_since: Instant,
     /// Distance to the selected neighbour, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
@@ -77,7 +77,7 @@ pub(crate) struct Neighbour {
     pub(super) selection: [u16; CANDIDATES as usize],
     /// Time of the last frame on this side from a node that is not the selected neighbour. `None` before any.
     unselected_at: Option<Instant>,
-    /// Nodes on this side that were received recently.
+    /// Nodes on this side of the relay from which it has recently received frames.
     pub(super) hearing: Hearing,
     /// Number of consecutive hellos of each node on this side that do not list this relay as received.
     pub(super) not_received: ConsecutiveCounts,
@@ -604,7 +604,7 @@ impl AgreedNodes {
     }
 }
 
-/// Pending heartbeat to the neighbour.
+/// Heartbeat that must be sent to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PendingHeartbeat {
     /// True if a heartbeat request to the neighbour is pending.

@@ -48,7 +48,7 @@ pub(super) enum PassKind {
 /// Position that the joint method has computed for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
-    /// Lateral offset and altitude of the position.
+    /// Lateral offset and altitude of the position that this relay computed.
     pub(super) cross_section: CrossSection,
     /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
     /// used in an interference field.
@@ -83,13 +83,13 @@ pub(crate) struct Computation {
     /// True from the start of a pass by this relay until the statistics count it. A pass is a message along the
     /// chain.
     pub(super) began: bool,
-    /// Altitude and power that this relay is configured with.
+    /// Altitude and transmit power that the mission gives to this relay.
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, collected by a message along the chain.
     pub(super) seats: Seats,
     /// Position that the joint method has computed for this relay in this view; `None` before it has.
     pub(super) chosen: Option<JointPlace>,
-    /// Lateral offset and altitude of the agreed position.
+    /// Lateral offset and altitude of the position that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
     /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. Algorithm 2 uses it as
     /// the end of the hop from this relay.

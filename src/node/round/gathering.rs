@@ -133,7 +133,7 @@ impl Computation {
     }
 }
 
-/// Known profiles of the relays of the view.
+/// Altitudes and transmit powers of the relays of the view, as far as they are known.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
     /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.

@@ -195,7 +195,7 @@ impl Round {
         }
     }
 
-    /// Handles a measurement; returns true if it was accepted.
+    /// Handles a measurement of this relay's radio; returns true if it was accepted.
     pub(crate) fn handle_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         if sample.is_heard() {
             return SENSING

@@ -24,13 +24,13 @@ use crate::node::circulation::LateMessages;
 pub enum Phase {
     /// Idle: this relay has not received a pass (message along the chain) yet.
     Idle,
-    /// The leader computes the targets of its next pass.
+    /// The leader computes the target SIRs of its next pass along the chain.
     Planning,
     /// Waiting: a pass or view proposal has been forwarded, and its result is not known yet.
     Waiting,
     /// The last pass (message along the chain) has ended without an agreement on positions.
     Answered,
-    /// The chain has agreed; the relay holds its position.
+    /// The chain has agreed on the positions, and this relay holds its own.
     Holding,
     /// The leader has found that no target SIR is feasible. All relays keep their positions.
     Infeasible,
@@ -44,7 +44,7 @@ pub enum Phase {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,
-    /// Ignore the message, and count it as outdated.
+    /// Ignore the received message, and count it as outdated.
     Stale,
     /// Drop the message that awaits a reply, and continue the computation after a pause.
     Work,
@@ -52,11 +52,11 @@ pub(crate) enum Action {
     Think,
     /// Forward the pass to the next relay, and retransmit it until there is a reply.
     Forward,
-    /// Reply to a duplicate of the current pass.
+    /// Repeat the reply, because the received message is a duplicate of the current pass.
     Repeat,
     /// Send the result of the pass (message along the chain) to the previous relay.
     Answer {
-        /// True if the chain has agreed on its positions.
+        /// True if the pass ends with the agreement of the chain on its positions.
         agreed: bool,
     },
     /// Complete the pass at the leader. No further pass starts now.

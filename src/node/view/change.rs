@@ -500,11 +500,11 @@ impl ViewChange {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     pub(crate) view: ViewId,
-    /// Identifier of the mission of the proposed view.
+    /// Identifier of the mission that the relays of the proposed view are to fly.
     pub(crate) mission_id: MissionId,
     /// Position of this relay in the order in which the relays vote: 1 for the proposer.
     pub(crate) rank: u16,
-    /// Votes on the proposal, including that of this relay.
+    /// Votes of the relays on the proposed view, including the vote of this relay.
     pub(super) poll: Poll,
     /// Node to which the proposal was forwarded; `None` before. It is never sent to a second node, because two views
     /// with the same identifier could result.
@@ -519,7 +519,7 @@ pub(crate) struct Proposed {
     pub(super) usable_in: u16,
 }
 
-/// Decision on a view proposal.
+/// Decision of the relays on a proposed view: accepted, or why not.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ViewVerdict {
     pub(super) reached: u16,
@@ -542,7 +542,7 @@ pub(super) struct ViewVerdict {
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
     pending: bool,
-    /// Number of view requests sent without a result.
+    /// Number of requests for a new view that this relay has sent without a result.
     tries: u8,
     at: Option<Instant>,
     /// Number of consecutive refusals of view proposals, for want of a quorum.
@@ -655,7 +655,7 @@ impl ViewRequest {
         self.at
     }
 
-    /// Creates a pending view request that is due at `at`.
+    /// Creates a request for a new view that must be sent at `at`.
     #[cfg(test)]
     pub(super) const fn due(at: Instant) -> Self {
         Self {

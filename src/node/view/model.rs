@@ -164,7 +164,7 @@ pub(super) struct Frame {
     pub(super) body: Body,
 }
 
-/// State of one relay in the model.
+/// State of one relay in the model of view changes.
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
@@ -214,7 +214,7 @@ pub(super) struct Chain {
     pub(super) parts: Vec<u8>,
     /// Frames that were sent and may still arrive, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// Views that were ever decided on.
+    /// Views that the relays of the model have ever decided on.
     pub(super) decided: Vec<DecidedView>,
     /// Views that were ever agreed on: all members have accepted them.
     pub(super) agreed: Vec<SizedView>,
@@ -224,7 +224,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
     /// Bit mask of the relays outside of the chain; bit 0 is the first relay.
     pub(super) outside: u8,
-    /// Number of departures and joins that may still happen.
+    /// Number of departures and joins that may still happen in this run of the model.
     pub(super) moves: u8,
 }
 

@@ -28,7 +28,7 @@ pub struct ViewRecord {
     electorate: Electorate,
 }
 
-/// Reason why a stored record was rejected.
+/// Reason why a stored record of the view votes is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum RecordError {
@@ -100,7 +100,7 @@ impl Reader<'_> {
 }
 
 impl ViewRecord {
-    /// Length of a stored record, bytes.
+    /// Length of a stored record of the view votes, bytes.
     pub const LENGTH: usize = 25 + 4 * VOTES;
 
     pub(crate) const fn new(base: u16, electorate: Electorate) -> Self {
@@ -129,7 +129,7 @@ impl ViewRecord {
         })
     }
 
-    /// Encodes the record for storage, without a checksum.
+    /// Encodes the record of the view votes for storage, without a checksum.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let said = &self.electorate;
         let accepted = said.accepted.unwrap_or(nothing_after(said.agreed));

@@ -75,7 +75,7 @@ pub(crate) enum AscentStep {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// Target of the current chain, as ln(SIR).
+    /// Target SIR of the current chain, as ln(SIR).
     pub(crate) sigma: f32,
     /// Slack of the current chain, m: the length by which it could reach beyond Rx at its target SIR. It is below 0
     /// if the chain is too short.

@@ -201,7 +201,7 @@ pub(super) struct Fitted<const RELAYS: usize> {
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
-    /// Number of the initial chain that is being improved.
+    /// Number of the initial chain that is being improved, from 0.
     number: u8,
     rounds: u8,
     /// Coordinate that the current pass changes: 0 for x, 1 for y, 2 for the altitude.

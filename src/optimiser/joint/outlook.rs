@@ -22,14 +22,10 @@ pub(crate) struct Outlook {
     /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) by_target: f32,
     /// Coefficient a of the spare length at Rx gained by the relays' moves, a f + b f^2, m. f is the fraction of
-    /// their computed moves that they make.
-    ///
-    /// f is the fraction of their computed moves that the relays toward Rx make.
+    /// their computed moves that the relays toward Rx make.
     pub(crate) linear: f32,
     /// Coefficient b of the spare length at Rx gained by the relays' moves, a f + b f^2, m. f is the fraction of
-    /// their computed moves that they make.
-    ///
-    /// f is the fraction of their computed moves that the relays toward Rx make.
+    /// their computed moves that the relays toward Rx make.
     pub(crate) square: f32,
 }
 

@@ -414,9 +414,9 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Lateral offsets that the relay may choose from, m.
+    /// Range of the lateral offsets that the relay may choose from, m.
     pub lateral: Band,
-    /// Altitudes that the relay may choose from, m.
+    /// Range of the altitudes that the relay may choose from, m.
     pub band: Band,
 }
 

@@ -44,7 +44,7 @@ pub struct Fewest {
 pub struct Most {
     /// Highest target SIR that can be met, linear, with a relative error of 1e-6.
     pub target: f32,
-    /// Minimum number of relays that meets `target`.
+    /// Minimum number of relays with which the chain reaches `target`.
     pub relays: u16,
 }
 

@@ -35,9 +35,9 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Noise {
-    /// Noise power at the relay's receiver, W.
+    /// Receiver noise power of the relay, W.
     pub relay_w: f32,
-    /// Noise power at the ground receiver Rx, W.
+    /// Receiver noise power of the ground receiver Rx, W.
     pub receiver_w: f32,
 }
 

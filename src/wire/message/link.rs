@@ -21,9 +21,9 @@ pub struct Hello {
     pub latest_view: ViewId,
     /// Node number of the sender's neighbour on the side to which this message is sent; 0 for none.
     pub neighbour: u16,
-    /// True to request a hello in return.
+    /// True if the sender requests a hello in return.
     pub requests_reply: bool,
-    /// True to request a new view.
+    /// True if the sender requests a new view (agreed members of the chain).
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,

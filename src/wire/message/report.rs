@@ -59,14 +59,14 @@ impl Coarse {
     }
 }
 
-/// State of one relay in a report.
+/// State of one relay in a report of the relays' states.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Entry {
     relay: Word,
     /// Age of the reported state, in tenths of a second.
     pub age: u8,
     state: Word,
-    /// Position of the drone when it was in this state.
+    /// Position of the drone at the time of the reported state.
     pub at: Coarse,
 }
 
@@ -91,7 +91,7 @@ impl Entry {
         (self.age < u8::MAX).then(|| Instant::from_micros(micros))
     }
 
-    /// Returns the number of the relay in the mission.
+    /// Returns the node number of the relay in the mission, 1 to N.
     pub const fn relay(&self) -> u16 {
         self.relay.number()
     }

@@ -24,11 +24,11 @@ use crate::wire::message::parts::{
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Target SIRs that this pass along the chain tries.
     pub ladder: Ladder,
-    /// Lateral offset, altitude and power of the sender.
+    /// Lateral offset, altitude and transmit power of the sender.
     pub relay: Station,
     /// True if relays use the lateral offsets and altitudes of the joint method. False for the configured ones.
     pub chosen: bool,
@@ -137,7 +137,7 @@ fn checked(
 pub struct SweepVerdict {
     /// Number of the pass along the chain, as in the sweep message that is answered.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Verdict of the sweep: the chain's spare length for each target, and the committed target, if any.
     pub verdict: Verdict,
@@ -206,7 +206,7 @@ pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 pub struct Roster {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
     pub after: u16,
@@ -265,7 +265,7 @@ impl Roster {
 pub struct Token {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
@@ -316,16 +316,16 @@ impl Token {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// Stay, and store the neighbours' positions.
+    /// The relay stays, and only stores its neighbours' positions.
     Look,
-    /// Move if another position has a better SIR.
+    /// The relay moves if another position has a better SIR.
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
         /// Method by which the relay searches for a better position.
         local: Local,
     },
-    /// Stay for good, because Algorithm 2 has ended.
+    /// The relay stays for good, because Algorithm 2 has ended.
     Stop,
 }
 
@@ -389,9 +389,9 @@ impl StepBody {
 /// Reply to a token of Algorithm 2; relays send it back to the leader.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
-    /// Number of the pass in which the token was received.
+    /// Number of the pass of Algorithm 2 in which the token was received.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
@@ -449,7 +449,7 @@ pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 pub struct Heard {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Interference estimate that all relays are to use.
     pub estimate: NumberedEstimate,

@@ -71,7 +71,7 @@ pub struct Successor {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
-    /// Identifier of the proposed view's mission.
+    /// Identifier of the mission that the members of the proposed view fly.
     pub mission_id: MissionId,
     /// Identifier of the proposed view.
     pub proposed_view: ViewId,
@@ -343,7 +343,7 @@ impl Requests {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulsed {
-    /// Number of the acknowledged lease renewal.
+    /// Number of the lease renewal that this reply acknowledges.
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,

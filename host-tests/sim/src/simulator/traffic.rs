@@ -303,8 +303,6 @@ impl Queue {
 
 /// End of a packet's transmission: time, order, node, and number of the transmission. If several end at the same
 /// time, `order` puts the node first that is nearest to the destination of the packets.
-///
-/// If several end at the same time, `order` puts the node first that is nearest to the destination of the packets.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
 /// Simulation of the traffic in one direction, while it runs.

@@ -24,8 +24,6 @@ pub struct TrueInterference {
     pub once: bool,
     /// Samples that relays get instead of measurements: the relay's number from 1, and the sample. They get them at
     /// the time of the first measurement.
-    ///
-    /// The relays get these samples at the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
     /// Measuring receivers that report wrong powers.
     pub broken: Vec<BrokenReceiver>,

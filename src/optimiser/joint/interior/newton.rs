@@ -53,7 +53,7 @@ pub(super) struct Factor {
     /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. Those of the
     /// diagonal are stored inverted, because they are divisors.
     lower: [f32; 6],
-    /// Equations for the relay's steps in x, y and h.
+    /// Linear equations for the relay's steps in x, y and h, one row each.
     rows: [Row; 3],
 }
 

@@ -47,7 +47,7 @@ struct Start {
     along: Along,
 }
 
-/// Way in which the initial x of the relays are chosen.
+/// Way to choose the initial x of the relays along the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Along {
     /// x from Algorithm 1, for the relays' lateral offsets and altitudes.
@@ -166,7 +166,7 @@ struct Pass {
     /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
     /// back.
     index: u16,
-    /// True during the pass back to Tx.
+    /// True while the solver passes along the chain from Rx back to Tx.
     is_back: bool,
     /// x of relay `index`, m. In the pass to Rx it is the farthest that meets the target, in the pass back the final
     /// one.
