@@ -57,7 +57,7 @@ impl FileOnlySettings {
 pub struct Override {
     /// Option of the command line and its value, as one text.
     pub option: String,
-    /// Value in the file that is overridden.
+    /// Value in the configuration file that a command-line option overrides.
     pub file_value: String,
     file: String,
 }

@@ -22,7 +22,7 @@ const MOST_STEPS: u32 = 400_000;
 /// Frame in transit between two nodes of the test bench.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time at which the frame arrives.
+    /// Time at which the frame arrives at the node.
     pub at: Instant,
     /// Node that sends the frame: 0 is the transmitter, then come the relays, and last the receiver.
     pub from: usize,

@@ -18,7 +18,7 @@ enum Error {
 /// Mathematical function under test, as computed by micromath, by libm and exactly in f64.
 struct Function {
     name: &'static str,
-    /// Unit of an absolute error.
+    /// Unit of the absolute error, as a text.
     unit: &'static str,
     error: Error,
     /// Range of the test points x. The points of a range above 0 are spaced logarithmically, those of others evenly.

@@ -13,10 +13,10 @@ use super::BAUD;
 /// Default silence of a neighbour, ms, after which a heartbeat is requested. It applies if the block's value is 0.
 const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
-/// Checked content of a configuration block.
+/// Checked content of a configuration block, which holds all settings of one relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
-    /// Network and index of this relay.
+    /// Network number and index of this relay.
     pub identity: Identity,
     /// Mission shared by all relays.
     pub mission: Mission,
@@ -24,7 +24,7 @@ pub struct Config {
     pub profile: Profile,
     /// True if the relay keeps its configured altitude when the method chooses altitudes.
     pub hold_altitude: bool,
-    /// Placement method that the leader runs.
+    /// Placement method that the leader of the chain runs.
     pub method: Method,
     /// Settings for measuring the interference at the relay, if the block gives its distribution along x. `None` for
     /// no measurement.
@@ -104,7 +104,7 @@ impl core::fmt::Debug for Secret {
 /// Channel parameters as stored in a configuration block. A [`Channel`] does not keep these numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChannelNumbers {
-    /// Carrier frequency, Hz.
+    /// Carrier frequency of the radio channel, Hz.
     pub carrier_hz: f64,
     /// Excess loss with line of sight, as a factor.
     pub excess_los: f64,
@@ -130,7 +130,7 @@ impl ChannelNumbers {
     }
 }
 
-/// Fault of a configuration block.
+/// Fault because of which a configuration block is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfigError {
     /// The configuration block is blank: all bits one, as after an erase, or all zero.

@@ -5,7 +5,7 @@ use crate::registers::{Register, Registers};
 /// Bit RMVF of RCC_CSR: clears the recorded causes of a reset.
 const FORGET: u32 = 1 << 24;
 
-/// The cause of the last reset.
+/// Cause of the last reset of the microcontroller.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Reset {
     /// The power was switched on.
@@ -46,7 +46,7 @@ impl Reset {
         }
     }
 
-    /// Returns the cause in words.
+    /// Returns the reset cause in words, for the log.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Power => "power-on reset",

@@ -43,7 +43,7 @@ pub(crate) enum Answer {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Solution {
-    /// Total processor time of the solver, s.
+    /// Total processor time that the solver took, s.
     pub(crate) time_s: f64,
     /// Number of chains that the solver evaluated; `None` for solvers that do not evaluate chains.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -10,9 +10,9 @@ use crate::value::Value;
 /// Result of verifying the authentication tag of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TagCheck {
-    /// The tag of the frame is right.
+    /// The authentication tag of the frame is right.
     Right,
-    /// The tag of the frame is wrong.
+    /// The authentication tag of the frame is wrong.
     Wrong,
     /// The tag was not checked, because the network key is not known.
     NoKey,
@@ -21,7 +21,7 @@ pub enum TagCheck {
 }
 
 impl TagCheck {
-    /// Returns the result as a text for people.
+    /// Returns the result of the tag's check as a text for people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Right => "tag right",

@@ -45,7 +45,7 @@ pub struct Sent {
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
-    /// Node number of the relay.
+    /// Node number of the relay under test.
     node: u16,
     /// Number of relays in the mission.
     all: u16,

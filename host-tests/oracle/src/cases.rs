@@ -37,7 +37,7 @@ pub struct Params {
     /// Interferer's lateral offset from the line Tx-Rx, metres.
     #[serde(rename = "Y")]
     pub y: f64,
-    /// Tx-Rx distance, metres.
+    /// Distance from Tx to Rx, metres.
     #[serde(rename = "D")]
     pub d: f64,
     /// Altitude of all relays, metres.

@@ -25,7 +25,7 @@ const APART: f64 = 3_600.0;
 /// Relation of a file's clock to that of the first file.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
-    /// Name of the file.
+    /// Name of the capture file.
     pub name: String,
     /// Number of frames that connect the clocks; `None` for the first file.
     pub common: Option<usize>,
@@ -120,7 +120,7 @@ pub struct Merged {
     pub frames: Vec<Frame>,
     /// Relation of each file's clock to that of the first file, in the order of the files.
     pub files: Vec<Alignment>,
-    /// Warnings, one line each.
+    /// Warnings about the captured files, one line each.
     pub warnings: Vec<String>,
 }
 

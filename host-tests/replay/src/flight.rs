@@ -62,18 +62,18 @@ impl Loss {
 /// Closest approach of two relays in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
-    /// Distance of the two relays, m.
+    /// Smallest distance of the two relays in the flight, m.
     pub distance_m: f64,
-    /// Numbers of the two relays.
+    /// Numbers of the two relays that came closest.
     pub relays: [u16; 2],
-    /// Time of the closest approach, s.
+    /// Time of the closest approach of two relays, s.
     pub time_s: f64,
 }
 
 /// Recorded flight. Times are in s since its first frame.
 #[derive(Debug, Default)]
 pub struct Flight {
-    /// Time of the first frame, s since 1970.
+    /// Time of the flight's first frame, s since 1970-01-01.
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
@@ -87,7 +87,7 @@ pub struct Flight {
     pub log: Vec<LogLine>,
     /// Alarms of the flight, as the ground station would have shown them.
     pub alarms: Vec<Alarm>,
-    /// Number of relays in the flight.
+    /// Number of relays in the recorded flight.
     pub relays: u16,
     /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first all relays
     /// had agreed, in the second as many as the last agreed view had.
@@ -260,7 +260,7 @@ struct Recorder<'a> {
     worst_db: Option<f64>,
     /// Periods without a report that have not ended yet, by relay number.
     open: BTreeMap<u16, Loss>,
-    /// Last time when no relay reported.
+    /// Last time at which no relay was reporting its state.
     silent_at: Instant,
     /// Time of the first agreement, s, and three numbers of snapshots since then. They count all snapshots, those
     /// with all relays agreed, and those with all members agreed.

@@ -31,7 +31,7 @@ pub struct Replay {
     pub flight: Flight,
     /// Page of the replay as HTML.
     pub html: String,
-    /// Warnings, one line each.
+    /// Warnings about the input files, one line each.
     pub warnings: Vec<String>,
 }
 

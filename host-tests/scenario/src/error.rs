@@ -18,7 +18,7 @@ pub struct ScenarioError {
     pub key: Option<String>,
     /// Wrong value as TOML, cut if it is long; `None` if the mistake is not in a value.
     pub value: Option<String>,
-    /// Kind of the mistake.
+    /// Kind of the mistake in the scenario file.
     pub problem: Problem,
     /// Allowed values, for the message: a range with its unit, or the keys that the table may have.
     pub allowed: String,

@@ -21,9 +21,9 @@ pub enum Refusal {
     NoHypothetical,
     /// The distance from Tx to Rx is too short for that number of relays at their minimum separation.
     NoRoom {
-        /// Number of relays.
+        /// Number of relays for which the distance is too short.
         relays: u16,
-        /// Least separation of two relays, m.
+        /// Minimum separation of two relays, m.
         apart_m: f32,
         /// Distance from Tx to Rx, m.
         distance_m: f32,

@@ -283,7 +283,7 @@ impl Scene {
 /// Sender of a signal that a relay receives: its position, its power and the path-loss factor.
 #[derive(Debug, Clone, Copy)]
 pub struct Sender {
-    /// Position of the sender.
+    /// Position of the node that sends over the hop.
     pub at: Place,
     power_w: f64,
     factor: f64,

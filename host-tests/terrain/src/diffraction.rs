@@ -27,7 +27,7 @@ pub type Point = [f64; 2];
 /// Electrical properties of the ground, and the polarisation of the antennas.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Surface {
-    /// Relative permittivity of the ground.
+    /// Relative permittivity of the ground, for the diffraction loss.
     pub permittivity: f64,
     /// Conductivity of the ground, S/m.
     pub conductivity: f64,

@@ -40,7 +40,7 @@ pub enum System {
     Geographic,
     /// Easting and northing, m, in a zone of the Universal Transverse Mercator projection.
     Utm {
-        /// Number of the zone, 1 to 60.
+        /// Number of the UTM zone, 1 to 60.
         zone: u8,
         /// True in the southern hemisphere, where northings begin at 10 000 km.
         south: bool,
@@ -106,7 +106,7 @@ struct Tile {
     nodata: Option<f32>,
 }
 
-/// Height of one node of the grid.
+/// Height at one node (point) of the terrain grid, or why there is none.
 enum Node<'a> {
     Height(f64),
     /// The node is in this file, which has this invalid value instead of a height there.
@@ -379,7 +379,7 @@ fn srtm_corner(name: &str) -> Option<[f64; 2]> {
     Some([lon, lat])
 }
 
-/// Reads a GeoTIFF file.
+/// Reads a tile of terrain heights from a GeoTIFF file.
 fn geotiff(path: &Path) -> Result<Tile, String> {
     let said = |error: tiff::TiffError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;

@@ -33,7 +33,7 @@ pub struct Ground<'a> {
     terrain: &'a Terrain,
     axis: Axis,
     step_m: f64,
-    /// Antennas of Tx and Rx.
+    /// Antennas of Tx and Rx, with their heights.
     pub ends: [Node; 2],
 }
 
@@ -57,7 +57,7 @@ pub struct Profile {
     pub points: Vec<Point>,
 }
 
-/// State of the line of sight of a hop.
+/// State of the line of sight of a hop: clear, grazing or blocked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
@@ -72,7 +72,7 @@ pub enum State {
 /// Clearance of a hop at its worst obstacle.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Clearance {
-    /// State of the line of sight.
+    /// State of the line of sight of this hop.
     pub state: State,
     /// Distance of the obstacle from the first antenna along the hop, m.
     pub along_m: f64,

@@ -95,7 +95,7 @@ struct Flight {
     to: Cable,
     from: Cable,
     companion: Option<Companion>,
-    /// Time of the companion's last start.
+    /// Time at which the companion program was last started.
     started: Instant,
     /// Time at which the companion starts again; `None` while it runs.
     starts_at: Option<Instant>,

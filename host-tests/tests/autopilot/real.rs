@@ -154,7 +154,7 @@ pub(crate) struct Real {
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
     sequence: u8,
-    /// Time at which the present failsafe began.
+    /// Time at which the autopilot's present failsafe began.
     fell_at: Instant,
     /// Time at which the companion sent the newest target.
     sent_at: Instant,

@@ -130,7 +130,7 @@ impl ReceivedMessage {
         self.0["type_mask"].as_u64().unwrap() & 0b11_1000 == 0
     }
 
-    /// Returns the position of a target message.
+    /// Returns the target position in a message to the autopilot.
     pub(crate) fn to(&self) -> Site {
         let number = |name: &str| self.0[name].as_f64().unwrap();
         [

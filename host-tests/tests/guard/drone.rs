@@ -49,7 +49,7 @@ pub(crate) struct Drone {
     /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
     pub(crate) flies: bool,
-    /// True while the drone's radio works.
+    /// True while the radio of the drone works, so that it sends and receives.
     pub(crate) speaks: bool,
     /// True while the pilot flies the drone, so that the guard's setpoint is ignored.
     pub(crate) taken: bool,
@@ -69,9 +69,9 @@ pub(crate) struct Drone {
 /// Timing of the flight controller's position reports.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Board {
-    /// Longest interval between two reports, s.
+    /// Longest interval between two position reports of the drone, s.
     pub(crate) every_s: f64,
-    /// Greatest age of a report on arrival, s.
+    /// Greatest age of a position report on its arrival, s.
     pub(crate) stale_s: f64,
 }
 

@@ -23,7 +23,7 @@ pub(crate) const MOST_FRAMES: u32 = 9;
 /// Model of one relay: its state as observed since it was switched on.
 #[derive(Debug)]
 pub(crate) struct Ledger {
-    /// Last setpoint; `None` before the first.
+    /// Last setpoint of the relay; `None` before the first.
     pub(crate) place: Option<Place>,
     pub(crate) target: Option<f32>,
     pub(crate) holding: bool,

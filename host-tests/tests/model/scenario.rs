@@ -61,9 +61,9 @@ impl Kind {
 pub(crate) struct Calm {
     /// Agreed x, y and altitude of every relay, as f32 bits.
     pub(crate) places: Vec<[u32; 3]>,
-    /// Agreed target SIR, as f32 bits.
+    /// Target SIR on which the relays agreed, as f32 bits.
     pub(crate) target: u32,
-    /// Virtual time until the agreement, µs.
+    /// Virtual time until the relays agreed, µs.
     pub(crate) took_us: u64,
 }
 

@@ -112,7 +112,7 @@ struct Step {
     /// next pass; its answer, the number of the pass sent last.
     off: i16,
     tame: bool,
-    /// Time until the next step, ms.
+    /// Time until the next step of the test, ms.
     wait_ms: u64,
     /// True if a neighbour's answer follows a message that travels along the chain.
     answered: bool,

@@ -17,7 +17,7 @@ use super::message::{WireMessage, plain_of, wire};
 #[derive(Clone, Debug)]
 pub(crate) struct Bench {
     relay: Relay,
-    /// Node number of the relay.
+    /// Node number of the relay under test.
     pub(crate) own: u16,
     /// Digest of the mission that the relay has before flight.
     pub(crate) mission: u16,

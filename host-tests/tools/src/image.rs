@@ -130,7 +130,7 @@ pub const BLANK: u8 = 0xFF;
 /// Part of an image: contiguous bytes, and the flash address of the first one.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Piece {
-    /// Address of the first byte.
+    /// Address in flash of the image's first byte.
     pub address: u32,
     /// Contents of this part of the flash image. The first byte is at `address`.
     pub bytes: Vec<u8>,

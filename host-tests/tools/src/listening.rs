@@ -25,7 +25,7 @@ const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 pub struct RandomScene {
     /// Geometry, powers and the true interferers.
     pub scenario: Scenario,
-    /// Number of relays.
+    /// Number of relays in the chain.
     pub relays: u16,
     /// Seed of the random numbers that draw the interferers, and of those in the simulation.
     pub seed: u64,

@@ -30,7 +30,7 @@ pub struct DroneStorage {
 }
 
 impl DroneStorage {
-    /// Creates empty storage.
+    /// Creates storage for a drone whose relay has not been created yet.
     pub const fn new() -> Self {
         Self {
             field: config::EMPTY,

@@ -18,7 +18,7 @@ pub const NETWORK: u16 = 9;
 /// A pass is a round of messages along the chain.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
-    /// Node number of the relay.
+    /// Node number of the relay under test.
     node: u16,
     /// Number of relays in the mission.
     all: u16,

@@ -44,7 +44,7 @@ pub enum Chain {
 pub struct Style {
     /// Smallest and largest number of relays, >= 1.
     pub relays: RangeInclusive<u32>,
-    /// Differences between the relays.
+    /// Differences between the relays of a random link.
     pub chain: Chain,
 }
 

@@ -596,7 +596,7 @@ pub enum QueuedEvent {
     Upload,
     /// A ground station begins to watch. The event's relay index is that of the setup's `watches`.
     Watch,
-    /// The drones fly for one time step.
+    /// The drones fly for one time step of the flight simulation.
     Fly,
     /// The autopilot of the relay's drone restarts.
     Restart,

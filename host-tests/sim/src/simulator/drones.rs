@@ -79,9 +79,9 @@ impl FlightSpec {
 /// Point mass that flies to a goal and stops there, with limited speed and acceleration per axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
-    /// True position of the body, m.
+    /// True position of the simulated drone, m.
     pub at: Point,
-    /// Velocity of the body, m/s.
+    /// True velocity of the simulated drone, m/s.
     pub velocity_mps: Point,
 }
 
@@ -132,7 +132,7 @@ pub struct Nearest {
     pub apart_m: f64,
     /// Indices of the two drones, from 1.
     pub pair: [usize; 2],
-    /// Time of the closest approach.
+    /// Time of the closest approach of the two drones.
     pub at: Instant,
 }
 

@@ -23,7 +23,7 @@ pub struct Faults {
 /// Counts of the frame faults that the simulated links caused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Injected {
-    /// Number of frames that never arrived.
+    /// Number of frames that were sent but never arrived.
     pub lost: u64,
     /// Number of frames whose bytes were changed.
     pub corrupted: u64,

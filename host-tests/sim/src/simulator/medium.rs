@@ -92,7 +92,7 @@ impl Medium {
         }
     }
 
-    /// Returns the counters of the channel.
+    /// Returns the counters of the frames on the shared channel.
     pub fn counts(&self) -> AirCounts {
         self.counts
     }

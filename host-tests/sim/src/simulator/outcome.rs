@@ -92,11 +92,11 @@ pub enum TimelineEvent {
 /// Entry in the log of a run: an event at one node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moment {
-    /// Time of the event.
+    /// Time of the event in the run.
     pub at: Instant,
     /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     pub relay: u16,
-    /// Kind of the event.
+    /// Kind of the event, with its data.
     pub what: TimelineEvent,
     /// Other node that the event concerns, such as a lost neighbour, by number from 1.
     pub other: Option<u16>,
@@ -138,7 +138,7 @@ pub struct RelayEnd {
     pub bound: Option<f32>,
     /// Shares of the frame time for the relay's fitted slots; `None` with equal slots.
     pub slot_shares: Option<SlotShares>,
-    /// Altitude and power of the relay.
+    /// Altitude and transmit power of the relay.
     pub profile: Profile,
     /// Counters of the relay since its last start.
     pub stats: Stats,
@@ -152,7 +152,7 @@ pub struct RelayEnd {
     pub view: u32,
     /// Version of the relay's mission; 0 for the mission loaded before the start.
     pub version: u16,
-    /// Interference estimate of the relay.
+    /// Interference estimate that the relay used at the end of the run.
     pub believed: NumberedEstimate,
     /// Geographic positions of Tx and Rx in the relay's mission; `None` unless an upload has moved them.
     pub sites: Option<Sites>,
@@ -207,7 +207,7 @@ pub struct Outcome {
     ///
     /// The key is the reporting relay's number from 1, and the side of the lost neighbour.
     pub noticed: BTreeMap<(u16, Side), Instant>,
-    /// Log of the run.
+    /// Log of the run: its events with their times.
     pub moments: Vec<Moment>,
     /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,

@@ -216,13 +216,13 @@ impl TrueHops {
 /// Recurring time slot of a hop: the same part of every TDMA frame. In a TDMA frame each hop has one slot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Window {
-    /// Start of the first TDMA frame, ps.
+    /// Start of the first TDMA frame of the link, ps.
     anchor: Ps,
     /// Duration of a TDMA frame, ps.
     frame: Ps,
     /// Time from the start of a TDMA frame to the start of the slot, ps.
     opens: Ps,
-    /// Duration of the slot, ps, at least 1.
+    /// Duration of the time slot, ps, at least 1.
     open_for: Ps,
 }
 
@@ -261,9 +261,9 @@ impl Window {
 /// Hop of the route while nothing changes. Node 0 is Tx, and the node after the last relay is Rx.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hop {
-    /// Number of the node that sends.
+    /// Number of the node that sends over this hop.
     pub from: usize,
-    /// Number of the node that receives.
+    /// Number of the node that receives over this hop.
     pub to: usize,
     /// Time that one packet takes on this hop at its present data rate, ps, above 0.
     pub packet: Ps,
@@ -294,7 +294,7 @@ pub struct Period {
     pub relays: u16,
     /// Number of the view (membership of the chain).
     pub view: u32,
-    /// State of the chain in this period.
+    /// State of the chain in this period of the traffic.
     pub state: ChainState,
     /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, then back to Tx.
     ///

@@ -19,7 +19,7 @@ use super::true_interference::TrueInterference;
 pub struct Partition {
     /// Number, from 1, of the relay after which the partition cuts the chain.
     pub after: u16,
-    /// Start of the partition.
+    /// Time at which the partition begins.
     pub from: Instant,
     /// End of the partition; `None` if it is permanent.
     pub until: Option<Instant>,
@@ -38,9 +38,9 @@ impl Partition {
 pub struct UploadSpec {
     /// End of the chain that uploads: upstream for the transmitter Tx, downstream for the receiver Rx.
     pub end: Side,
-    /// Start of the upload.
+    /// Time at which the upload begins.
     pub at: Instant,
-    /// Mission that is uploaded.
+    /// Mission that the ground station uploads.
     pub upload: Upload,
 }
 

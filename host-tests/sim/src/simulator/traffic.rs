@@ -92,7 +92,7 @@ pub struct Packets {
 /// Packets of a period and the delays of the delivered ones.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Delivery {
-    /// Numbers of packets in the period.
+    /// Numbers of packets offered, delivered, dropped and lost in the period.
     pub packets: Packets,
     /// Delays of the delivered packets from end to end, ps; sorted once the traffic has ended.
     pub delays: Vec<Ps>,

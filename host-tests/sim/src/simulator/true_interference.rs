@@ -36,7 +36,7 @@ pub struct TrueInterference {
     pub ends: bool,
     /// Time of the last measurement, which ends the run.
     pub until: Instant,
-    /// Seed of the shadowing at each position.
+    /// Seed of the random shadowing at each position.
     pub seed: u64,
 }
 
@@ -54,7 +54,7 @@ pub struct BrokenReceiver {
 /// Power that a broken receiver reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BrokenReading {
-    /// The true interference times this factor.
+    /// The true interference power times this factor.
     Times(f64),
     /// A constant power, W, whatever the true interference.
     Always(f64),
@@ -175,7 +175,7 @@ fn decibel(db: f64) -> f64 {
 /// Snapshot of the relays' positions and estimate at the time of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
-    /// Time of the snapshot.
+    /// Time of the snapshot of the interference.
     pub at: Instant,
     /// Numbers of the relays that are on, from 1.
     pub nodes: Vec<u16>,

@@ -18,9 +18,9 @@ pub struct Chart {
 pub struct Panel {
     /// Heading that tells this panel from the chart's others; empty for a single panel.
     pub heading: String,
-    /// Horizontal axis.
+    /// Horizontal axis of the panel.
     pub x: Axis,
-    /// Vertical axis.
+    /// Vertical axis of the panel.
     pub y: Axis,
     /// Curves in drawing order: later ones are on top.
     pub lines: Vec<Line>,
@@ -55,7 +55,7 @@ pub struct Line {
 pub struct Look {
     /// Number of the colour, from 0 to 6, which also selects the shape of the markers.
     pub hue: usize,
-    /// Stroke of the line between the points.
+    /// Stroke of the line between the curve's points: full, dashed or dotted.
     pub stroke: Stroke,
     /// Choice of the points that get a marker.
     pub signs: Signs,
@@ -77,11 +77,11 @@ pub enum Signs {
 pub enum Stroke {
     /// Points are not connected; only their markers are drawn.
     None,
-    /// Solid line.
+    /// Solid line through the curve's points.
     Full,
-    /// Dashed line.
+    /// Dashed line through the curve's points.
     Dashed,
-    /// Dotted line.
+    /// Dotted line through the curve's points.
     Dotted,
 }
 

@@ -17,7 +17,7 @@ use super::draw::{NotDrawn, draw};
 pub struct Sheet {
     /// Name of the figure on the command line, and of its file without `.svg`.
     pub name: &'static str,
-    /// Title of the figure.
+    /// Title of the figure, shown above it.
     pub title: &'static str,
     /// Paragraphs of the figure's caption, which say what the figure shows.
     pub says: Vec<String>,

@@ -17,7 +17,7 @@ use super::sheet::FigureError;
 pub struct Chain {
     /// Positions of the relays in order from Tx to Rx.
     pub places: Vec<Placement>,
-    /// SIR of the worst hop, linear.
+    /// SIR of the chain's worst hop, linear.
     pub sir: f64,
 }
 
@@ -158,7 +158,7 @@ pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
 pub struct Flown {
     /// Positions of the relays in order from Tx to Rx.
     pub places: Vec<Placement>,
-    /// SIR of the worst hop, linear.
+    /// SIR of the chain's worst hop, linear.
     pub sir: f64,
     /// SIR of the worst hop before Algorithm 2 and after each of its rounds, linear.
     pub rounds: Vec<f32>,
