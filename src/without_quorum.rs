@@ -30,7 +30,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position for a relay without a quorum; `place` is the last agreed position.
+    /// Returns the position at which a relay without a quorum waits; `place` is the last agreed position.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

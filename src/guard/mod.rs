@@ -289,8 +289,8 @@ impl Guard {
         }
     }
 
-    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` before there is an agreed
-    /// position and a report.
+    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` until there is an agreed
+    /// position and a reported position of the drone.
     ///
     /// `now` is the time at which the autopilot gets the setpoint: the drone flies toward it within
     /// [`GuardConfig::lag`].

@@ -362,7 +362,7 @@ pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
 /// Exponentially weighted mean of measurements, whose weight halves in each half-life.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Average {
-    /// Weighted mean of the measurements; 0 without any.
+    /// Weighted mean of the measured values; 0 without any.
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,

@@ -12,7 +12,7 @@ use crate::process::{LIMIT, Relay};
 use crate::web::{address, connect, snapshots};
 use crate::with_source;
 
-/// Connection of a test to a ground station's web page, as a browser uses it.
+/// Web page of a ground station, as a browser uses it.
 struct Page {
     address: String,
     token: String,

@@ -27,7 +27,7 @@ const SOON: Duration = Duration::from_secs(2);
 /// A drone flies up to 8 m/s, an age is rounded to 0.1 s by each of up to two relays, and a position to 0.25 m.
 const MOST_ERROR_M: f64 = 2.0 * 0.1 * 8.0 + 0.25;
 
-/// Page of a station, as a browser keeps it open.
+/// Web page of a ground station, as a browser keeps it open.
 pub(crate) struct Page {
     arriving: Receiver<(f64, Value)>,
     pub(crate) last: Value,

@@ -451,7 +451,7 @@ pub struct Flight {
     start: Option<PathBuf>,
 }
 
-/// Bound on |x|, |y| and height of a start position, m.
+/// Largest |x|, |y| and height of the start position that an option gives a drone, m.
 const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {

@@ -21,7 +21,7 @@ pub(crate) struct Path {
 
 const AE_KM: f64 = 8500.0;
 
-/// Parts of the diffraction loss, dB.
+/// Parts of the diffraction loss of a hop as ITU-R P.526 defines them, dB.
 pub(crate) struct Loss {
     pub(crate) actual: f64,
     pub(crate) smooth: f64,
