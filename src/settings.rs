@@ -180,9 +180,9 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if a relay with these settings may fly the slots of the mission `config`.
+    /// Returns true if a relay with these settings may fly a mission with the time slots of `config`.
     ///
-    /// They are equal, or fitted with the method `Joint` against a known interferer.
+    /// The slots are equal, or fitted with the method `Joint` against a known interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;

@@ -173,7 +173,7 @@ pub enum Extremum {
     /// First hop's SIR falls up to the first x, m, rises up to the second, and falls beyond. The interferer is ahead
     /// of Tx (X > 0), with noise.
     ValleyAndHill(f32, f32),
-    /// First hop's SIR along x rises up to this x, m, and falls beyond. The interferer is behind Tx (X < 0).
+    /// The first hop's SIR rises along x up to this x, m, and falls beyond it. The interferer is behind Tx (X < 0).
     Hill(f32),
     /// First hop's SIR falls with x. The interferer is at X = 0, or it is ahead of Tx and the noise exceeds the
     /// interference.

@@ -509,7 +509,7 @@ pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     }
 }
 
-/// Wraps an angle within (-3π, 3π) to -π to π.
+/// Returns an angle wrapped to the range -π to π, rad. `angle` must be within (-3π, 3π).
 pub(super) fn turned(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {

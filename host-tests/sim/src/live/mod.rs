@@ -17,7 +17,7 @@ use crate::simulator::chain::Chain;
 use crate::simulator::setup::Setup;
 use alarms::Observe as _;
 
-/// View of a running chain, with the history that its snapshots need.
+/// Display of a running chain: computes its snapshots, and keeps the history that they need.
 #[derive(Debug)]
 pub struct LiveView {
     axis: Option<Axis>,
