@@ -26,8 +26,8 @@ use crate::sir::{self, Sender};
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
-    /// Sixteen targets per pass along the chain, around the interpolated optimum. The search ends once it is known to
-    /// the mission's tolerance.
+    /// Sixteen targets per pass along the chain, around the interpolated optimum. The search ends once the optimum is
+    /// known to the mission's tolerance.
     #[default]
     Bracketed,
     /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the

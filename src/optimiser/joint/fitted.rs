@@ -197,7 +197,7 @@ pub(super) struct Fitted<const RELAYS: usize> {
     /// Positions of the best chain. In the end their first two values are replaced by the sums of the hop times up to
     /// each relay, toward Rx and back.
     best_places: [Triple; RELAYS],
-    /// Best choice among the five states of the relay before, for each state of a relay: three bits each.
+    /// Best state of the previous relay for each of a relay's five states: three bits per choice.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,

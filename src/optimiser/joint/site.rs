@@ -545,9 +545,9 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the squared distance by which a relay at `to` is too near the interferer, m^2, or 0. The second result
-    /// is the weight of the penalty for that, the third the derivative of the squared distance by the target in
-    /// ln(SIR). `c` is the target SIR over the sender's gain.
+    /// Returns by how much a relay at `to` is too near the interferer, in squared distance, m^2, or 0. The second
+    /// result is the weight of the penalty for that. The third is the derivative of the first by ln(target SIR). `c`
+    /// is the target SIR divided by the sender's gain.
     ///
     /// A hop of maximum length from p to p' that ends near the interferer at m is short. It violates the minimum
     /// separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with the inverse q of interference plus noise.

@@ -86,7 +86,8 @@ const HALVINGS: u8 = 48;
 pub enum AsideCase {
     /// Optimum at the lowest altitude, where the circles of constant SIR of both hops touch.
     Touching,
-    /// Optimum at the lowest altitude and the maximum of the first hop's SIR. The second hop has a higher SIR there.
+    /// Optimum at the lowest altitude, where the first hop's SIR is at its maximum. The second hop's SIR is higher
+    /// there.
     Hilltop,
     /// Optimum above Rx, at the lowest altitude: the first hop's SIR is the higher one there.
     AboveRx,

@@ -458,8 +458,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T, at which the sum of mu / (c - T) over all levels c is 1. mu is the barrier weight, and
-    /// a level is the logarithm of a hop's SIR in one direction.
+    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1. mu is the
+    /// barrier weight, and each level c belongs to one hop in one direction.
     ///
     /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to
     /// it.
