@@ -32,17 +32,17 @@ pub struct Channel {
     eta: f64,
 }
 
-/// Reason why channel parameters are rejected.
+/// Reason why the parameters of the radio channel model are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum ChannelError {
-    /// The carrier frequency is not within 1 MHz to 1 THz.
+    /// The carrier frequency of the radio channel is not within 1 MHz to 1 THz.
     Carrier,
     /// An excess loss factor is not within 1 (0 dB) to 1e20 (200 dB).
     ExcessLoss,
     /// The excess loss without line of sight is smaller than with it.
     LossOrder,
-    /// The weight of line of sight is not within 0 to 1.
+    /// The weight of the line-of-sight path in the channel model is not within 0 to 1.
     Weight,
 }
 

@@ -27,19 +27,19 @@ const FRAMES: u64 = 8;
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3 / 20. The rest is for other
-/// messages, retransmissions, and waits for a free channel.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain, as [3, 20] for 3/20. The rest is for
+/// other messages, retransmissions, and waits for a free channel.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range for which no wait for a free channel is assumed.
+/// Maximum number of relays in range at which transmissions are assumed to find the channel free.
 ///
 /// For every further nine relays, a transmission is assumed to take one frame time longer. Nine are this relay and
 /// four on either side.
 const NEAR: u16 = 9;
 
-/// Maximum time assumed for one transmission including its wait for the channel, in frame times.
+/// Maximum time assumed for one transmission with its wait for the channel. The unit is the duration of a frame.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
@@ -165,7 +165,8 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time assumed for one transmission including its wait for the channel, in frame times.
+    /// Returns the time assumed for one transmission with its wait for the channel. The unit is the duration of a
+    /// frame.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -181,7 +182,7 @@ impl ChannelLoad {
 pub struct ChannelFull {
     /// Number of relays in range of each other, for which the channel is too slow.
     pub in_range: u16,
-    /// Minimum data rate that would carry these relays, bit/s.
+    /// Minimum data rate of a channel that carries these relays, bit/s.
     pub least_baud: u32,
     /// Minimum [`Settings::probe_after`](crate::Settings::probe_after) for these relays, in whole ms.
     ///

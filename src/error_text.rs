@@ -3,7 +3,7 @@
 //! An image stores only the numbers of the texts that `defmt` prints, so that they take no flash. An error that prints the name of its
 //! variant instead would name neither the range of a parameter nor the remedy.
 
-/// Implements `Display`, `Error` and `defmt::Format` for an error enum, with one text for each variant.
+/// Implements `Display`, `Error` and `defmt::Format` for an error enum, from one text for each variant.
 ///
 /// The texts are string literals, because `defmt` takes nothing else. A `const fn text` returns them, also to a `const fn` that
 /// panics.

@@ -31,7 +31,7 @@ pub enum Event {
     NeighbourLost {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the lost neighbour.
+        /// Index of the lost neighbour in the chain, 1 to N.
         node: u16,
     },
     /// A lost neighbour is received again, or another node has replaced it. In the second case `node` differs from
@@ -133,8 +133,8 @@ pub enum Event {
     },
 }
 
-/// Events that concern no node and that the firmware receives first, before those that concern a node. The other
-/// events without a node, `POLLED_LAST`, come at the end.
+/// Events without a node that the firmware polls before those that concern a node. The rest, `POLLED_LAST`, come at
+/// the end.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -175,10 +175,9 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Duplicate index: two nodes use the same one. If it is this relay's index, the side of the event has no
-    /// meaning.
+    /// Two nodes use the same index. If it is this relay's index, the side of the event has no meaning.
     Index,
-    /// Sensor fault: measurements of the node do not fit those of the other nodes.
+    /// The measurements of the node do not fit those of the other nodes.
     Sensor,
     #[cfg(feature = "departures")]
     MayLeaveTold,
@@ -218,7 +217,7 @@ impl NodeEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u32,
-    /// Raised events that concern a node at the upstream [0] and the downstream [1] side. Bit i stands for
+    /// Raised events that concern a node on the upstream [0] or downstream [1] side. Bit i stands for
     /// `NodeEvent::ALL[i]`.
     kinds: [u16; 2],
     nodes: [[u16; NodeEvent::ALL.len()]; 2],

@@ -57,9 +57,9 @@ pub(crate) fn to_integer(value: f64) -> i32 {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sites {
-    /// Position of the transmitter.
+    /// Position of the transmitter Tx on earth.
     pub tx: Geodetic,
-    /// Position of the receiver.
+    /// Position of the receiver Rx on earth.
     pub rx: Geodetic,
 }
 

@@ -36,7 +36,7 @@ impl defmt::Format for Event {
     }
 }
 
-/// Returns the node that the event concerns, if any.
+/// Returns the index of the node that the event concerns; `None` if it concerns none.
 const fn node(event: Event) -> Option<u16> {
     match event {
         Event::NeighbourLost { node, .. }

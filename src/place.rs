@@ -72,7 +72,7 @@ impl CrossSection {
     }
 }
 
-/// Relay whose position along x is searched: its given lateral offset, altitude and transmit power.
+/// Lateral offset, altitude and transmit power of a relay whose x is searched.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {

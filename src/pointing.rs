@@ -96,7 +96,7 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// Returns the angle whose tangent is `opposite` / `adjacent`, in the quadrant of the two. 0 if both are 0.
+/// Returns the angle whose tangent is `opposite` / `adjacent`, rad, in the quadrant of the two. 0 if both are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());
     if large > 0.0 {

@@ -24,7 +24,7 @@ impl PowerRatio {
         }
     }
 
-    /// Returns this ratio, rounded to f32.
+    /// Returns this power ratio as a single f32, rounded.
     pub const fn value(&self) -> f32 {
         self.hi
     }

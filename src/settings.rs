@@ -11,7 +11,7 @@ use crate::time::Duration;
 use crate::wire::auth::Auth;
 use crate::without_quorum::WithoutQuorum;
 
-/// Time for the computation and the buffers of a link, which the preset settings include in `hop_time`.
+/// Time that the preset settings include in `hop_time` for computation and the link's buffers.
 const LATENCY: Duration = Duration::from_millis(10);
 
 /// Identity of a relay: its network's number, and its index in the chain.
@@ -26,9 +26,9 @@ const LATENCY: Duration = Duration::from_millis(10);
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identity {
-    /// Network number; frames of other networks are ignored.
+    /// Number of the network; frames of other networks are ignored.
     pub network: u16,
-    /// Index in the chain, 1 (next to the transmitter) to N.
+    /// Index of this relay in the chain, from 1 (next to the transmitter) to N.
     pub index: u16,
 }
 
@@ -125,8 +125,8 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first computes the chain's target SIR by itself, from the mission. If that target is right,
-    /// one round trip of messages along the chain is enough. For the bracketed schedule only.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one
+    /// round trip of messages along the chain is enough. For the bracketed schedule only.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
@@ -169,7 +169,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Returns the default settings, for two links of 57 600 baud or faster.
+    /// Returns the default settings, for a link of 57 600 baud or faster to each neighbour.
     ///
     /// The relays compute their positions by [`Method::Align`], the paper's Algorithm 1. The leader predicts the
     /// highest target SIR that the chain can meet, and searches by [`Schedule::Bracketed`] if the prediction is
@@ -180,9 +180,9 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if a relay with these settings may fly the slots of the mission `config`.
+    /// Returns true if a relay with these settings may fly a mission with the time slots of `config`.
     ///
-    /// They are equal, or fitted with the method `Joint` against a known interferer.
+    /// The slots are equal, or fitted with the method `Joint` against a known interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
@@ -274,8 +274,7 @@ impl Settings {
         }
     }
 
-    /// Returns the settings with the minimum `hop_time` for a channel of `baud` bit/s with this `load`. A longer
-    /// `hop_time` is kept.
+    /// Returns the settings with at least the minimum `hop_time` for a channel of `baud` bit/s and `load`.
     const fn with_hop_time(self, load: ChannelLoad, baud: u32) -> Self {
         let needed = load.hop_time(baud, LATENCY);
         let hop_time = if needed.as_micros() > self.hop_time.as_micros() {

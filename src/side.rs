@@ -17,14 +17,14 @@ pub enum Heading {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {
-    /// Side toward the transmitter Tx.
+    /// Side of a relay toward the transmitter Tx.
     Upstream,
-    /// Side toward the receiver Rx.
+    /// Side of a relay toward the receiver Rx.
     Downstream,
 }
 
 impl Side {
-    /// Returns the side to which a relay forwards messages that travel along the chain in this direction.
+    /// Returns the side to which messages that travel along the chain in the direction `heading` go.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -32,7 +32,7 @@ impl Side {
         }
     }
 
-    /// Returns the side from which messages arrive that travel along the chain in this direction. Replies go back
+    /// Returns the side from which messages arrive that travel along the chain in the direction `heading`. Replies go
     /// there.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {

@@ -53,8 +53,8 @@ pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     }
 }
 
-/// Returns the inverse interference plus noise, s / (1 + nu s), m^2; without noise exactly s. `s` is the squared
-/// distance from the interferer, m^2, and `nu` the noise, 1/m^2.
+/// Returns the inverse of interference plus noise, s / (1 + nu s), m^2. `s` is the squared distance from the
+/// interferer, m^2, and `nu` the noise, 1/m^2.
 pub(crate) const fn in_noise(s: f32, nu: f32) -> f32 {
     if nu > 0.0 { s / (1.0 + nu * s) } else { s }
 }
@@ -132,8 +132,7 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K over the squared length of the hop. It
-/// is the counterpart of [`Mission::receiver_gain`].
+/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K over the squared length of the hop.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"
@@ -158,7 +157,7 @@ pub(crate) const fn square(x: f32) -> f32 {
     x * x
 }
 
-/// Number of bisection steps for an x at which the slope of the first hop's SIR changes its sign.
+/// Number of bisection steps for the x at which the first hop's SIR has an extremum.
 const HALVINGS: u8 = 32;
 
 /// Maximum number of doublings of x in the search for an x beyond an extremum of the first hop's SIR.
@@ -174,7 +173,7 @@ pub enum Extremum {
     /// First hop's SIR falls up to the first x, m, rises up to the second, and falls beyond. The interferer is ahead
     /// of Tx (X > 0), with noise.
     ValleyAndHill(f32, f32),
-    /// First hop's SIR along x rises up to this x, m, and falls beyond. The interferer is behind Tx (X < 0).
+    /// The first hop's SIR rises along x up to this x, m, and falls beyond it. The interferer is behind Tx (X < 0).
     Hill(f32),
     /// First hop's SIR falls with x. The interferer is at X = 0, or it is ahead of Tx and the noise exceeds the
     /// interference.

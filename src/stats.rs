@@ -6,26 +6,26 @@
 pub struct Stats {
     /// Frames given to the link for transmission, including retransmissions.
     pub sent: u32,
-    /// Retransmissions of proposals, and of messages that travel along the chain, after a missing reply.
+    /// Retransmissions for want of a reply, of view proposals and of messages that travel along the chain.
     pub repeats: u32,
-    /// Proposals and messages along the chain (passes of any kind) that this relay started as the leader.
+    /// View proposals and messages along the chain that this relay has started as the leader.
     pub passes_begun: u32,
     /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
     /// example as stale.
     pub received: u32,
-    /// Duplicates of proposals and of messages along the chain. The reply to them is sent again.
+    /// Received duplicates of view proposals and of messages along the chain. This relay has answered them again.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, received on a shared channel.
     pub overheard: u32,
-    /// Frames longer than the format allows.
+    /// Received frames that are longer than the format allows.
     pub oversized: u32,
-    /// Truncated frames.
+    /// Received frames that were cut short, so that their end is missing.
     pub truncated: u32,
-    /// Frames with a CRC mismatch.
+    /// Received frames with a wrong CRC.
     pub crc: u32,
-    /// Intact frames of another version of the frame format.
+    /// Received intact frames of another version of the frame format.
     pub version: u32,
-    /// Handshake frames with the right authentication tag. They only establish sessions, and carry no message.
+    /// Received handshake frames with the right authentication tag, which only establish sessions.
     pub handshakes: u32,
     /// Intact frames without an authentication tag, received by a relay with a key. A relay without a key counts
     /// mission offers here, because it accepts offers only with a key.
@@ -34,14 +34,14 @@ pub struct Stats {
     pub forged: u32,
     /// Frames with the right authentication tag that were received before, or are too old to check.
     pub replayed: u32,
-    /// Intact frames without a valid message, or with a value out of range.
+    /// Received intact frames without a valid message, or with a value out of range.
     pub malformed: u32,
-    /// Intact frames of another network.
+    /// Received intact frames of another network.
     pub foreign: u32,
-    /// Intact frames from a node that is no neighbour, or, on a point-to-point link, for another node.
+    /// Received intact frames from a node that is no neighbour. On a point-to-point link also those for another node.
     pub misaddressed: u32,
-    /// Messages from the wrong neighbour. They are messages along the chain from the next relay, and replies from the
-    /// previous relay.
+    /// Received messages from the wrong neighbour. They are messages along the chain from the next relay, or replies
+    /// from the previous one.
     pub misdirected: u32,
     /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
@@ -50,7 +50,7 @@ pub struct Stats {
     /// Ignored messages of passes along the chain and of view changes, with a foreign view or mission. Their view or
     /// mission is not the one that this relay uses.
     pub view: u32,
-    /// New views that this relay has accepted.
+    /// Views (chain memberships) that this relay has accepted.
     pub views: u32,
     /// Ignored outdated messages, for example of a pass along the chain or a view change that has ended. Also mission
     /// offers that this relay has not requested by a recent hello.

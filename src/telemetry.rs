@@ -7,42 +7,43 @@ use crate::place::Placement;
 use crate::time::Instant;
 use crate::wire::message::{Coarse, Detail, Entry};
 
-/// State that a relay has reported, and that has reached the ground station through the chain.
+/// State that a relay has reported to the ground station through the chain.
 ///
 /// Pairs have the neighbour toward Tx first, then the one toward Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
-    /// Number of the relay in the mission, 1..=N.
+    /// Number of the relay in the mission, from 1 (next to Tx) to N.
     pub relay: u16,
-    /// Time of the state, on the clock of the station.
+    /// Time at which the relay was in this state, on the station's clock.
     pub at: Instant,
     /// Position of the drone by its autopilot; `None` if it has none.
     pub position: Option<Placement>,
-    /// Setpoint of the drone.
+    /// Setpoint of the drone; `None` if the drone has none.
     pub setpoint: Option<Placement>,
-    /// Position on which the chain has agreed for this relay.
+    /// Position on which the chain has agreed for this relay; `None` before an agreement.
     pub agreed: Option<Placement>,
-    /// Phase of the relay's protocol.
+    /// Phase of the relay in the agreement on positions.
     pub phase: Phase,
-    /// True while a lease covers the agreement, as [`Relay::lease`](crate::Relay::lease) does.
+    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). It permits the relay to rely on the
+    /// agreed positions.
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons to hold the position, because of each neighbour.
+    /// Reasons why the drone holds its position, because of the neighbours toward Tx and toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
-    /// Numbers of the neighbours in the relay's view.
+    /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// True for a neighbour that this relay does not receive now.
+    /// True for each neighbour, toward Tx and toward Rx, that the relay does not receive now.
     pub silent: [bool; 2],
-    /// True while another node with this relay's number has been received within three `dead_after`.
+    /// True if the relay has received another node with its own number within the last three `dead_after`.
     pub is_duplicated: bool,
-    /// Last measured interference at this relay, W, to 0.8 %; `None` if not measured.
+    /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
     pub version: u16,
 }
 
-/// Phases by their numbers in an entry.
+/// Phases in the order of their numbers in a report.
 const PHASES: [Phase; 8] = [
     Phase::Idle,
     Phase::Planning,
@@ -54,7 +55,7 @@ const PHASES: [Phase; 8] = [
     Phase::NoQuorum,
 ];
 
-/// Control states by their numbers in an entry, from 1.
+/// Control states in the order of their numbers in a report, from 1.
 const CONTROLS: [State; 5] = [
     State::Silent,
     State::Grounded,
@@ -63,7 +64,7 @@ const CONTROLS: [State; 5] = [
     State::Blind,
 ];
 
-/// Hold reasons by their numbers in an entry, from 1.
+/// Hold reasons in the order of their numbers in a report, from 1.
 const HOLDS: [HoldReason; 7] = [
     HoldReason::Unheard,
     HoldReason::Order,
@@ -74,13 +75,13 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the element with this number, from 1; `None` for 0.
+/// Returns the element of `all` with this number, counted from 1; `None` for 0 or a number too large.
 fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
     all.get(usize::from(number).checked_sub(1)?).copied()
 }
 
 impl Report {
-    /// Creates the report of an entry at time `at`, with the last details of the same relay.
+    /// Creates the report of one relay from its `entry` of time `at` and its last details.
     ///
     /// Not part of the public interface: for captures, which tests and tools of this workspace decode.
     #[doc(hidden)]

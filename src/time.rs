@@ -118,7 +118,7 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 pub(crate) struct MonotonicClock {
     /// Time of the caller's clock up to which this clock has advanced.
     latest: Instant,
-    /// Internal time at the moment `latest`.
+    /// Internal time, which never runs backward, when the caller's clock showed `latest`.
     internal: Instant,
 }
 

@@ -8,7 +8,7 @@ use crate::mission::MAX_RELAYS;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
 
-/// Number of bits of a view's identifier for the proposing node's number. They suffice for a chain of 1000 relays.
+/// Number of bits of a view identifier that hold the proposing node's number, enough for 1000 relays.
 const NODE: u32 = 10;
 
 impl ViewId {
@@ -50,8 +50,8 @@ impl ViewId {
         }
     }
 
-    /// Returns `view`, but with its number at most `most` above this view's number. Views received from other nodes
-    /// thus raise the number only by bounded steps.
+    /// Returns `view` with its number limited to this view's number plus `most`. A received view thus raises the
+    /// known number only by bounded steps.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -61,21 +61,21 @@ impl ViewId {
         }
     }
 
-    /// Returns the value that marks messages of this view; it is added to the mission's digest. The value differs
-    /// between views of one number by different proposers, and between views of thousands of consecutive numbers.
+    /// Returns a 16-bit value that is added to the mission's digest in messages of this view. It differs between
+    /// views of one number by different proposers, and between thousands of consecutive views.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
     }
 }
 
-/// View of the chain's members: its identifier and the number of relays.
+/// View: agreed membership of the chain, with its identifier and its number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {
-    /// Identifier of the view.
+    /// Identifier of the view, an agreed set of members of the chain.
     pub id: ViewId,
-    /// Number of relays in the view, 1 to 1000.
+    /// Number of relays that are members of the view, 1 to 1000.
     pub relays: u16,
 }
 

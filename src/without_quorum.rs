@@ -9,7 +9,7 @@ use crate::place::Placement;
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// Hold the last agreed position while there is no quorum.
+    /// The drone holds its last agreed position while there is no quorum.
     #[default]
     Hold,
     /// Leave the line from Tx to Rx: fly from the last agreed position sideways (along y) and upward. With a guard,
@@ -30,7 +30,7 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position for a relay without a quorum; `place` is the last agreed position.
+    /// Returns the position at which a relay without a quorum waits; `place` is the last agreed position.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

@@ -18,7 +18,7 @@ use super::missions::mission;
 /// Bit rate of the ports, bit/s.
 const BAUD: u32 = 115_200;
 
-/// Serial port in memory. `coming` is a frame and the range of its unread bytes, `gone` the number of sent bytes.
+/// Serial port in memory. `coming` is a frame and the range of its unread bytes, `gone` the number of bytes sent.
 struct Memory {
     coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,

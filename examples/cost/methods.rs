@@ -11,7 +11,7 @@ pub(crate) struct Flight {
     relays: heapless::Vec<Relay, 3>,
     /// Number of instructions of the most expensive call of a relay's function so far.
     most: u32,
-    /// Length of the longest frame so far, bytes.
+    /// Length of the longest frame sent so far, bytes.
     longest: usize,
 }
 

@@ -50,7 +50,7 @@ pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
     unpainted_bytes()
 }
 
-/// Fills with the pattern the part of the stack that the next call will use.
+/// Fills the part of the stack that the next call will use with a pattern.
 #[inline(never)]
 pub(crate) fn paint() {
     let mut words = [0_u32; PAINTED];

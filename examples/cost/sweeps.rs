@@ -74,7 +74,7 @@ struct SweepCost {
     at_tail: u32,
     back: u32,
     next: u32,
-    /// Length of the longest frame, bytes.
+    /// Length of the longest frame in the sweep, bytes.
     longest: usize,
     /// True if the chain has agreed on positions.
     settled: bool,

@@ -36,7 +36,7 @@ fn start() -> Option<Uart> {
     Serial::new(chip.USART2, (a.pa2, a.pa3), config, &mut rcc).ok()
 }
 
-/// Answers each frame received from `uart`, forever. It blocks on the port, because nothing else runs here.
+/// Receives frames from `uart` and answers each, forever.
 #[cfg(target_os = "none")]
 fn serve(mut uart: Uart) -> ! {
     use embedded_hal_nb::serial::Read as _;

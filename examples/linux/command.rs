@@ -28,8 +28,7 @@ pub fn read<T: Parser>(
     Ok((options, beyond))
 }
 
-/// Returns the first paragraph of clap's error as one line, with the suggested spelling. Other tips and the usage are
-/// dropped.
+/// Returns the first paragraph of clap's error as one line, with the suggested spelling.
 pub fn one_line(error: &clap::Error) -> String {
     let text = error.to_string();
     let mut lines = text.lines().map(str::trim);

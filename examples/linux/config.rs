@@ -57,7 +57,7 @@ impl FileOnlySettings {
 pub struct Override {
     /// Option of the command line and its value, as one text.
     pub option: String,
-    /// Value in the file that is overridden.
+    /// Value in the configuration file that a command-line option overrides.
     pub file_value: String,
     file: String,
 }
@@ -131,8 +131,7 @@ impl FileOptions {
         }
     }
 
-    /// Returns an error if the file has settings for an autopilot, but no autopilot is named. Both the file and the
-    /// command line may name one.
+    /// Checks that an autopilot is named if the file has settings for one. The file or the command line may name it.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {

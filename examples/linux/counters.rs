@@ -40,13 +40,12 @@ const EVERY: Duration = Duration::from_millis(2_000);
 /// Minimum number of frames rejected for a reason between two checks before the reason is reported.
 const MANY: u32 = 3;
 
-/// Number of damaged frames between two checks from which on the log suggests a wrong baud rate.
-///
-/// It does so only if no intact frame was received between the two checks.
+/// Number of damaged frames between two checks from which on the log suggests a wrong baud rate. It does so only if
+/// no intact frame was received between the two checks.
 const DAMAGED: u32 = 10;
 
-/// Detector of the reasons why frames are rejected. It has the counters at the last check, and the reasons already
-/// reported.
+/// Detects reasons why frames are rejected, from the growth of counters. It has the counters at the last check, and
+/// the reasons already reported.
 #[derive(Debug, Default)]
 pub struct RejectionReasons {
     last: Stats,

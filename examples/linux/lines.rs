@@ -134,7 +134,7 @@ impl Fifo {
         })
     }
 
-    /// Returns the file descriptor to poll.
+    /// Returns the FIFO's file descriptor, to wait for input with `poll`.
     #[must_use]
     pub fn fd(&self) -> BorrowedFd<'_> {
         self.fd.as_fd()

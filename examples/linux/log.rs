@@ -50,7 +50,7 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request to the writer thread to confirm that all earlier lines are written or dropped.
+    /// Requests that the writer thread confirms that all earlier lines are written or dropped.
     Flush(SyncSender<()>),
 }
 
@@ -166,7 +166,7 @@ fn appended(path: &Path) -> std::io::Result<File> {
 struct Writer {
     file: File,
     path: Option<PathBuf>,
-    /// True if the last log line was written only in part, for example on a full disk.
+    /// True if the last log line was written only partly, for example because the disk is full.
     torn: bool,
     /// Number of dropped lines that have already been reported in the log.
     reported_drops: u64,

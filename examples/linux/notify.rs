@@ -10,7 +10,7 @@ use uav_relay::{Duration, Instant};
 pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
-    /// Interval of the reports to systemd's watchdog, half of its timeout; `None` without a watchdog.
+    /// Interval of the reports to systemd's watchdog: half of its timeout. `None` without a watchdog.
     every: Option<Duration>,
     due: Instant,
 }

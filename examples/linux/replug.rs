@@ -18,8 +18,7 @@ use crate::tty::Tty;
 const FIRST: Duration = Duration::from_millis(250);
 const LONGEST: Duration = Duration::from_millis(4_000);
 
-/// Tty that may be unplugged and plugged in again under the same name. All its traffic passes through `read` and
-/// `write`.
+/// Serial port (tty) that may be unplugged and plugged in again under the same name.
 #[derive(Debug)]
 pub struct Replug {
     option: &'static str,
@@ -33,12 +32,12 @@ pub struct Replug {
     tap: Option<Tap>,
 }
 
-/// Traffic counters of a tty: bytes, and the number of times that it was missing.
+/// Traffic counters of a serial port (tty): bytes, and the number of times that it was missing.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,
     written: u64,
-    /// Bytes to send that were discarded while the tty was missing.
+    /// Number of bytes to send that were discarded while the serial port was missing.
     lost: u64,
     times_gone: u32,
 }

@@ -86,7 +86,7 @@ pub struct StoredFile {
     done: Receiver<Done>,
     /// Socket that becomes readable when a write has ended, for poll(2).
     ended: UnixStream,
-    /// Newest record to store.
+    /// Newest record that must be written to the file; `None` if all are written.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
     /// Record whose write has ended last, successful or not.
@@ -225,7 +225,7 @@ impl StoredFile {
         self.ended.as_fd()
     }
 
-    /// Returns the number of successful writes.
+    /// Returns the number of successful writes of the record file.
     pub const fn writes(&self) -> u64 {
         self.writes
     }
@@ -235,7 +235,7 @@ impl StoredFile {
         1e3 * self.slowest.as_secs_f64()
     }
 
-    /// Returns the number of failed writes.
+    /// Returns the number of failed writes of the record file.
     pub const fn failures(&self) -> u64 {
         self.failures
     }

@@ -32,7 +32,7 @@ struct Piece {
 /// State of a capture of serial traffic, shared by all its ports.
 #[derive(Debug, Default)]
 struct CaptureState {
-    /// Error that ended the capture early.
+    /// Error that ended the capture of frames early.
     fault: OnceLock<String>,
     is_reported: AtomicBool,
 }

@@ -15,14 +15,14 @@ use uav_relay::{
 
 use crate::fixtures::NETWORK;
 
-/// Limit of the number of frames delivered at one instant. The bench panics above it, because the relays then seem to
-/// send without end.
+/// Limit of the number of frames that the bench delivers at one instant. Above it the relays seem to send without
+/// end, and the bench panics.
 const MOST_STEPS: u32 = 400_000;
 
 /// Frame in transit between two nodes of the test bench.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time at which the frame arrives.
+    /// Time at which the frame arrives at the node.
     pub at: Instant,
     /// Node that sends the frame: 0 is the transmitter, then come the relays, and last the receiver.
     pub from: usize,
@@ -62,7 +62,7 @@ pub struct Bench {
     pub relays: Vec<Relay>,
     /// Ground stations at the transmitter and at the receiver; `None` where there is none.
     pub grounds: [Option<Box<Ground>>; 2],
-    /// Index in the chain, from 1, of each entry of `relays`. A copy of a relay has the same index.
+    /// Index in the chain, from 1, of each relay in `relays`. A duplicate of a relay has the same index.
     places: Vec<usize>,
     pub now: Instant,
     pub flying: VecDeque<Frame>,
@@ -127,7 +127,7 @@ impl Bench {
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Processes the next event: delivers a frame that has arrived, or advances the time to the next event.
+    /// Processes the next event of the bench. It delivers an arrived frame, or advances the time to the next event.
     ///
     /// Then all nodes handle their timers and send. Returns false if nothing is left to do up to `until`.
     pub fn step(&mut self, until: Instant) -> bool {
@@ -173,7 +173,7 @@ impl Bench {
         self.run(self.now + span);
     }
 
-    /// Runs until `done` returns true, and returns the virtual time taken. `None` if `limit` passes first.
+    /// Runs the bench until `done` returns true, and returns the virtual time taken. `None` if `limit` passes first.
     pub fn run_until(&mut self, limit: Duration, done: impl Fn(&Self) -> bool) -> Option<Duration> {
         let begun = self.now;
         while !done(self) {

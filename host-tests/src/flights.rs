@@ -16,7 +16,7 @@ pub const fn seconds(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Makes a simulated run continue until `at`, even if the chain has settled before.
+/// Makes a simulated run continue until `at`, even if the chain has settled before then.
 pub fn go_on_until(setup: &mut Setup, at: Instant) {
     // A partition behind the last relay separates no relays, but keeps the run going.
     setup.partitions.push(Partition {
@@ -26,7 +26,7 @@ pub fn go_on_until(setup: &mut Setup, at: Instant) {
     });
 }
 
-/// Makes a simulated run end at `at`, even if the chain has settled before.
+/// Makes a simulated run end at `at`, even if the chain has settled before then.
 pub fn end_at(setup: &mut Setup, at: Instant) {
     go_on_until(setup, at);
     setup.deadline = at;
@@ -93,7 +93,7 @@ pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     FlightSpec::exact(start, speed_mps, Duration::from_millis(200))
 }
 
-/// Minimum separation of drones in flights with a collision guard, m.
+/// Minimum separation of drones in test flights with a collision guard, m.
 pub const SEPARATION_M: f32 = 5.0;
 
 /// Smallest distance of two drones that the tests permit, m.
@@ -108,9 +108,8 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
     setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
 }
 
-/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list.
-///
-/// With an empty list, all relays have the common profile of the mission.
+/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list. Without a
+/// profile of its own, a relay has the mission's common one.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();

@@ -98,7 +98,7 @@ pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Li
 pub struct Solved {
     /// Distances of the relays from Tx along the line to Rx, m.
     pub x: Vec<f64>,
-    /// Relative shortfall of the SIR from the optimum: 1 - SIR / optimum.
+    /// Relative shortfall of the SIR from the reference optimum: 1 - SIR / optimum.
     pub short: f64,
     /// Number of passes of messages along the chain that the solution needs.
     pub sweeps: u32,
@@ -186,7 +186,7 @@ pub struct DrawnHop {
     pub index: u16,
     /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// SIR of the hop, linear, without noise, if sender and interferer are equally far from the receiver.
+    /// SIR of the hop without noise if sender and interferer are equally far from the receiver, linear.
     pub gain: f64,
     relays: u16,
 }

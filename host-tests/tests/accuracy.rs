@@ -9,16 +9,16 @@ use micromath::F32;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Error {
-    /// Kind of error: the difference from the exact value as a fraction of that value.
+    /// Relative error: the difference from the exact value as a fraction of that value.
     Relative,
-    /// Kind of error: the difference from the exact value, in the function's `unit`.
+    /// Absolute error: the difference from the exact value, in the function's `unit`.
     Absolute,
 }
 
 /// Mathematical function under test, as computed by micromath, by libm and exactly in f64.
 struct Function {
     name: &'static str,
-    /// Unit of an absolute error.
+    /// Unit of the absolute error, as a text.
     unit: &'static str,
     error: Error,
     /// Range of the test points x. The points of a range above 0 are spaced logarithmically, those of others evenly.

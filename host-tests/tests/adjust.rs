@@ -40,7 +40,8 @@ fn setup(relays: usize, adjust: Adjust) -> (Link, Setup) {
     (link, setup)
 }
 
-/// Returns an outcome's lowest SIR by the f64 reference, and the least distance of neighbours in m.
+/// Returns the SIR of an outcome's worst hop, and the least distance of neighbours, m. The SIR is by the f64
+/// reference model.
 fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     let places: Vec<Place> = setpoints(outcome).into_iter().map(reference).collect();
     let apart = places.windows(2).map(|pair| pair[0].distance_m(&pair[1]));
@@ -48,7 +49,8 @@ fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     (sir(link, &places).unwrap(), apart)
 }
 
-/// Runs a local search to its end. Returns a position that is better than the relay's present one, if found.
+/// Runs Algorithm 2's search of one relay to its end. Returns a position better than the relay's present one, if
+/// found.
 fn searched(mut search: LocalSearch) -> Option<Placement> {
     loop {
         if let Poll::Ready(found) = search.step(500) {

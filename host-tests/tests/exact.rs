@@ -17,13 +17,13 @@ use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Largest relative distance from the optimum that counts as optimal.
+/// Largest relative shortfall from the optimum SIR at which a result counts as optimal.
 const NEAR: f64 = 1e-3;
 
 /// Relative error by which an upper bound may be too low: search tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
-/// Returns true if `target` is met with every relay as far along the line as the target permits.
+/// Returns true if a chain meets the SIR `target` with every relay as far along as `target` permits.
 fn is_met_greedily(mission: &Mission, own: &[(u16, Profile)], target: f64) -> bool {
     let (mut behind, mut index) = (None, mission.leader());
     let first = match mission.heading() {
@@ -71,15 +71,15 @@ struct Tally {
     plain: usize,
     worst: f64,
     sweeps: u32,
-    /// Ratios of the computed upper bound to the optimum, one for each scene.
+    /// Ratios of the computed upper bound of the SIR to the optimum, one for each scene.
     bounds: Vec<f64>,
     /// Ratios of the upper bound to the optimum, for the scenes whose result is below the optimum.
     bounds_of_short: Vec<f64>,
 }
 
 impl Tally {
-    /// Solves a scene with the known optimum `best`, and records the result. `sir` returns the SIR of a chain with
-    /// its relays at given positions.
+    /// Solves a scene whose optimum SIR is `best`, and records the result. `sir` returns the SIR of a chain with its
+    /// relays at given positions.
     fn judge(
         &mut self,
         mission: &Mission,
@@ -146,7 +146,7 @@ impl Tally {
     }
 }
 
-/// Returns the distribution of ratios (upper bound to optimum) as text.
+/// Formats the distribution of the ratios in `of`: upper bound to optimum.
 fn spread(of: &mut [f64]) -> String {
     of.sort_by(f64::total_cmp);
     let Some(most) = of.last() else {

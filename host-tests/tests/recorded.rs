@@ -35,7 +35,7 @@ fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     all().unwrap().iter().filter(wanted).filter_map(placed)
 }
 
-/// Returns the link with its relays at the given altitudes, without a minimum separation.
+/// Returns the link with its relays at `altitudes`, m, and without a minimum separation.
 fn flown(link: &Link, altitudes: &[f64]) -> Link {
     let relays = link.relays.iter().zip(altitudes);
     let relays = relays.map(|(relay, &altitude_m)| Relay {
@@ -49,7 +49,7 @@ fn flown(link: &Link, altitudes: &[f64]) -> Link {
     }
 }
 
-/// Returns the paper's scenario with the interferer at (`x_i`, `y_i`), and a separation of 4 m.
+/// Returns the paper's link with the interferer at (`x_i`, `y_i`), m, and a separation of 4 m.
 fn paper(relays: usize, x_i: f64, y_i: f64) -> Link {
     Link {
         x_i,
@@ -214,14 +214,14 @@ fn no_single_move_improves_an_optimum() {
     assert!(legal > 50_000, "{legal}");
 }
 
-/// Returns the best SIR of the relays at one common altitude, over 61 altitudes.
+/// Returns the best SIR of a chain whose relays share one altitude, by trying 61 altitudes.
 fn best_common(link: &Link, room: Corridor) -> f64 {
     let altitude = |i: i32| room.least_m * (room.most_m / room.least_m).powf(f64::from(i) / 60.0);
     let level = |h: f64| flown(link, &vec![h; link.len()]).optimum();
     (0..=60).map(altitude).filter_map(level).fold(0.0, f64::max)
 }
 
-/// Returns the best SIR over all ways to give each relay one of the altitudes `levels`.
+/// Returns the best SIR over all ways to give each relay of a chain one of the altitudes `levels`.
 fn best_of_levels(link: &Link, levels: &[f64]) -> f64 {
     let relays = u32::try_from(link.len()).unwrap();
     let assignments = (0..levels.len().pow(relays)).map(|number| {
@@ -264,7 +264,7 @@ fn no_common_altitude_and_no_assignment_of_levels_is_better() {
     assert!(common >= 40 && levelled >= 40 && gained >= 4);
 }
 
-/// Returns the maximum of `of` over [low, high], by successively finer grids.
+/// Returns the maximum of the function `of` over [low, high], by successively finer grids.
 fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f64) -> f64 {
     if low >= high {
         return of(low);

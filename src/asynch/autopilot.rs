@@ -30,12 +30,12 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// relay's ports, as with [`AsyncRelay`].
 pub struct AsyncAutopilot {
     link: RefCell<Autopilot>,
-    /// Signal that wakes the future which exchanges data with the relay. It is raised after received bytes and events
-    /// of the relay.
+    /// Signal that wakes the future exchanging data with the relay. It is raised after received bytes and events of
+    /// the relay.
     exchange_signal: Signal,
-    /// Signal that wakes the future which sends frames to the autopilot. It is raised when a frame may be pending.
+    /// Signal that wakes the future sending frames to the autopilot: raised when a frame may be pending.
     send_signal: Signal,
-    /// Waker of the task in `next_event`, which waits for an event of the autopilot link.
+    /// Waker of the firmware task that waits in `next_event` for an event of the autopilot link.
     listener: Cell<Option<Waker>>,
 }
 

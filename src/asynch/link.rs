@@ -20,7 +20,7 @@ use crate::wire::frame::{FrameBuf, MAX_FRAME};
 /// Pause before a port that has failed or ended is used again, in byte times (11 ms at 115 200 baud).
 const PAUSE: u32 = 128;
 
-/// Time in byte times for which the driver-enable pin stays high after the last byte should have left.
+/// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
 ///
 /// One byte time is for a byte that the port may still be sending, and one for the tolerance of its clock.
 const PIN_HOLD: u32 = 2;
@@ -46,7 +46,7 @@ struct Sender<W, D> {
     tx: W,
     pin: Option<D>,
     byte_time: Duration,
-    /// Time at which all written bytes have left the port, computed from the baud rate.
+    /// Time at which all bytes written so far have left the port, computed from the baud rate.
     quiet_at: Instant,
     /// True if the last frame may have been cut short, because its writing failed or was cancelled.
     cut: bool,
@@ -332,7 +332,7 @@ impl Frames {
 /// Time and timers of an executor: `embassy-time`, `rtic-monotonics`, a virtual clock. A delay alone (`embedded-hal-async`'s
 /// `DelayNs`) is not enough, because the relay needs the current time.
 pub trait Clock {
-    /// Returns the time since an arbitrary epoch; never decreases.
+    /// Returns the present time since an arbitrary start; it never decreases.
     fn now(&self) -> Instant;
 
     /// Completes at time `at`, at once if that has passed. The future is dropped and created anew whenever another event comes

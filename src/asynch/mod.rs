@@ -189,7 +189,7 @@ where
         }
     }
 
-    /// Returns the links, to recover their ports.
+    /// Returns the two links, so that their ports can be used again.
     pub fn release(self) -> (AsyncLink<UR, UW, UPin>, AsyncLink<DR, DW, DPin>) {
         (self.upstream, self.downstream)
     }
@@ -224,13 +224,13 @@ impl<R: Read, W: Write, Pin: OutputPin> AsyncShared<R, W, Pin> {
         }
     }
 
-    /// Returns the link, to recover its reader, writer and pin.
+    /// Returns the link, so that its reader, writer and pin can be used again.
     pub fn release(self) -> AsyncLink<R, W, Pin> {
         self.channel
     }
 }
 
-/// Handles the relay's timers and queues its frames, forever.
+/// Runs the relay itself, forever: handles its timers and queues its frames for the ports.
 async fn run_relay(
     relay: &AsyncRelay<'_>,
     queues: &[(Port, &RefCell<Frames>)],
@@ -256,7 +256,7 @@ async fn run_relay(
     }
 }
 
-/// Handles the relay's due timers, stores its changed votes, and queues its frames for the ports.
+/// Runs the relay once: handles its due timers, stores its changed votes, and queues its frames.
 ///
 /// Returns the time of the relay's next timeout; `None` if there is none.
 fn turn(

@@ -15,7 +15,7 @@ use crate::serial::SerialStats;
 /// relay across an `await`. An interrupt passes its data through a channel to such a task.
 pub struct AsyncRelay<'a> {
     relay: RefCell<&'a mut Relay>,
-    /// True if the relay has received bytes or was called since the task that runs its ports last ran.
+    /// True if the relay has had new input since the task that runs its ports last ran.
     changed: Cell<bool>,
     /// Waker of the task that runs the relay's ports.
     runner: Cell<Option<Waker>>,

@@ -30,15 +30,15 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Number 1 in the fixed-point format of the samples I / `I_max`: 2^31. With it no sum overflows: 2^32 samples sum to
-/// at most 2^63, and their squares, times the number of samples, to 2^126.
+/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. With it no sum of samples or squares
+/// overflows.
 const ONE: f32 = 2_147_483_648.0;
 
-/// Number of fractional bits of the fixed-point numbers in which the samples are summed.
+/// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of I / `I_max` for which an estimate is made. A step of the fixed-point format is 5e-4 of it; with a
-/// smaller mean the rounding would falsify the estimate.
+/// Smallest mean of the samples I / `I_max` for which an estimate is made. Below it the rounding would falsify the
+/// estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
 /// Running sums of the interference powers measured at one position; samples are not stored.
@@ -183,13 +183,13 @@ impl Estimator {
 
 /// Beta distribution that has the mean and the variance of the samples.
 struct Fit {
-    /// Mean m of the samples I / `I_max`.
+    /// Mean m of the accepted samples, each the interference power I divided by `I_max`.
     m: f32,
-    /// Difference 1 - m, with m the mean of the samples, computed without cancellation.
+    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without cancellation.
     rest: f32,
-    /// Standard deviation of the samples I / `I_max`.
+    /// Standard deviation s of the accepted samples, each the interference power I divided by `I_max`.
     s: f32,
-    /// Sum of the shape parameters of the fitted Beta distribution, alpha + beta.
+    /// Sum alpha + beta of the two shape parameters of the fitted Beta distribution.
     w: f32,
 }
 

@@ -9,8 +9,8 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to interference of 1e9 W down to 1e-32 W, far more and far
-/// less than is ever measured.
+/// Allowed range of Upsilon = E[1/I], 1/W. It is for interference I of 1e9 W down to 1e-32 W, beyond all that is
+/// measured.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power there.
@@ -29,7 +29,7 @@ pub struct FieldPoint {
 pub enum FieldError {
     /// The table has no point, or more than [`Field::MAX_POINTS`].
     Points,
-    /// The `x_m` of a point is not within -1e7 to 1e7.
+    /// The x of a point of the interference field, `x_m`, is not within -1e7 to 1e7 m.
     Place,
     /// The `x_m` of a point is not larger than the `x_m` of the point before it.
     Order,
@@ -127,7 +127,7 @@ impl Field {
         }
     }
 
-    /// Returns the points of the table.
+    /// Returns the points of the interference field, a table of the interference over x.
     pub const fn points(&self) -> &'static [FieldPoint] {
         self.points
     }

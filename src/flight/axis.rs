@@ -45,12 +45,12 @@ pub enum AxisError {
     Rx(Geodetic),
     /// The transmitter and the receiver are less than 10 m apart.
     TooShort {
-        /// Straight distance between transmitter and receiver, m.
+        /// Distance between transmitter and receiver along a straight line, m.
         distance_m: f64,
     },
     /// The transmitter and the receiver are more than 100 km apart.
     TooLong {
-        /// Straight distance between transmitter and receiver, m.
+        /// Distance between transmitter and receiver along a straight line, m.
         distance_m: f64,
     },
 }
@@ -89,9 +89,9 @@ pub struct Axis {
     middle: Vector,
     /// Unit vector toward the receiver, at the middle of the line.
     along: Vector,
-    /// Unit vector to the right of the line, at its middle.
+    /// Unit vector to the right of the line from Tx to Rx, at the middle of the line.
     right: Vector,
-    /// Unit vector upward, at the middle of the line.
+    /// Unit vector upward, at the middle of the line from Tx to Rx.
     up: Vector,
     /// Half the length of the chord from transmitter to receiver, m.
     half_chord_m: f64,
@@ -509,7 +509,7 @@ pub(super) fn sine_and_cosine(units: i32) -> [f64; 2] {
     }
 }
 
-/// Wraps an angle within (-3π, 3π) to -π to π.
+/// Returns an angle wrapped to the range -π to π, rad. `angle` must be within (-3π, 3π).
 pub(super) fn turned(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {

@@ -5,7 +5,7 @@ use super::axis::{Axis, AxisError};
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 
-/// Line on earth from Tx to Rx and speed limit with which a drone flies a mission.
+/// Line on earth from Tx to Rx, and the speed limit with which a drone flies along it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Course {
     /// Line on earth from transmitter to receiver.
@@ -19,7 +19,7 @@ pub struct Course {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CourseError {
-    /// The positions of Tx and Rx do not define a line.
+    /// The positions of the transmitter and the receiver do not define a line.
     Axis(AxisError),
     /// The distance of Tx and Rx along the ground is not the mission's distance. The value is the distance along the
     /// ground, m.

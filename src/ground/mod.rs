@@ -30,8 +30,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
-/// Silence of a relay, 15 s, after which another node with its node number is accepted. Relays use
-/// `Settings::dead_after` for this purpose, which is 15 s by default.
+/// Silence of a relay after which another node with its node number is accepted, 15 s. Relays use
+/// `Settings::dead_after` for this.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
@@ -41,11 +41,11 @@ const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 #[cfg(feature = "telemetry")]
 const REPORTED: usize = 128;
 
-/// Time between two requests to one relay for the reports of all relays.
+/// Interval between two requests for the reports of all relays; each goes to another relay in reach.
 #[cfg(feature = "telemetry")]
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay after which the next relay is polled.
+/// Number of unanswered hellos to one relay after which the station polls the next relay.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
@@ -233,7 +233,7 @@ impl Ground {
         true
     }
 
-    /// Returns the progress of the upload.
+    /// Returns the progress of the mission upload.
     pub const fn progress(&self) -> Progress {
         self.progress
     }
@@ -493,7 +493,7 @@ impl Ground {
         self.at(self.distance)
     }
 
-    /// Returns the node number of the relay that is `distance` relays away from this station.
+    /// Returns the node number of the relay `distance` places from this station; 1 is the nearest.
     fn at(&self, distance: u16) -> u16 {
         match self.end {
             Side::Upstream => distance,
@@ -601,22 +601,23 @@ impl Ground {
 #[cfg(feature = "telemetry")]
 #[derive(Clone, Debug)]
 struct Watching {
-    /// Number of relays of the mission.
+    /// Number of relays in the mission that the relays fly.
     all: u16,
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Distance of the relay that the last request is for; 0 before the first one. `is_due` is true until it is sent.
+    /// Distance, in relays, of the relay that the last request is for; 0 before the first. `is_due` is true until it
+    /// is sent.
     distance: u16,
     is_due: bool,
-    /// Entries that have arrived since the last call with a time.
+    /// Report entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
-    /// Newest state of every relay, by rising number.
+    /// Newest known state of every relay that has reported, in the order of their node numbers.
     known: heapless::Vec<KnownState, REPORTED>,
 }
 
-/// Newest state that the station knows of a relay, and the last details received. `at` is the time at which the relay
-/// was in that state, by the station's clock.
+/// Newest known state of a relay, and the last details received. `at` is the time of that state, by the station's
+/// clock.
 #[cfg(feature = "telemetry")]
 #[derive(Clone, Debug)]
 struct KnownState {
@@ -627,7 +628,8 @@ struct KnownState {
 
 #[cfg(feature = "telemetry")]
 impl Watching {
-    /// Creates a station that requests nothing. A start with the next `epoch` has larger request numbers.
+    /// Creates the state of a station that requests no reports. With a larger `epoch` its later request numbers are
+    /// larger, too.
     ///
     /// After a run of more than 85 minutes the numbers of the next start may be smaller. Relays then ignore requests
     /// until 60 s after the last one of that run.
@@ -644,7 +646,7 @@ impl Watching {
         }
     }
 
-    /// Schedules the request to the next of the `reach` nearest relays, the farthest first, if it is due.
+    /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The farthest comes first.
     fn request(&mut self, now: Instant, reach: u16, node: u64) {
         if self.repeat_at.is_some_and(|at| at <= now) {
             // Two stations do not request at the same time again and again.
@@ -662,7 +664,8 @@ impl Watching {
         }
     }
 
-    /// Schedules the request again for the relay at `distance`, which could not verify an earlier one.
+    /// Schedules the request for reports again for the relay at `distance`. That relay could not verify an earlier
+    /// one.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;
@@ -686,7 +689,8 @@ impl Watching {
         true
     }
 
-    /// Makes the newest report of every relay of the entries that have arrived, at `now`.
+    /// Merges the report entries that have arrived into the newest report of every relay. `now` is their arrival
+    /// time.
     fn apply(&mut self, now: Instant) {
         for (entry, detail) in &self.arrived {
             let Some(at) = entry.time(now) else {
@@ -720,7 +724,7 @@ const fn is_under_way(progress: Progress) -> bool {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FlownMission {
-    /// Node number of the relay that answered.
+    /// Node number of the relay that answered the query.
     pub by: u16,
     /// Version of the mission; 0 for the one that was loaded before flight.
     pub version: u16,
@@ -739,14 +743,14 @@ impl FlownMission {
     }
 }
 
-/// Progress of an upload.
+/// Progress of the upload of a new mission from the ground station to the relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Progress {
-    /// Idle: there is no upload.
+    /// No mission upload is in progress.
     #[default]
     Idle,
-    /// The mission is being offered; no relay is known to have stored it.
+    /// The mission is being offered; no relay has reported yet that it has stored it.
     Offering,
     /// A relay has stored the mission. The ground station polls until the relays fly it.
     Stored {
@@ -778,7 +782,7 @@ pub enum Progress {
     },
     /// The upload is outdated: a relay has stored a newer mission, or another with its version.
     Outdated {
-        /// Version of the stored mission.
+        /// Version of the newer mission that the relay has stored.
         version: u16,
     },
 }
@@ -792,7 +796,7 @@ const REPORTS_PER_HANDSHAKE: u8 = 16;
 pub(super) struct PendingReports {
     /// Last measured interference power, W; 0 before the first measurement.
     power_w: f32,
-    /// Bit mask of the relays to which the report is pending. Bit d - 1 is the relay at distance d.
+    /// Relays to which the last measured power must be reported, as a bit mask. Bit d - 1 is the relay at distance d.
     pending: u8,
     measurements: u8,
 }

@@ -12,15 +12,14 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer messages
-/// of another association may be late ones, from before.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer may be
+/// late messages from before.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
-/// Number of reminders, one per second, after which a halt request expires unless it is repeated.
+/// Number of seconds after which a neighbour's halt request expires unless it is repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of reminders, one per second, after which a neighbour's last x is no longer used. A new message of the
-/// neighbour restarts the count.
+/// Number of seconds after which a neighbour's last reported x expires, unless a new message comes.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Notice that tells a neighbour that this relay has left the association (session) with it. The relay leaves it
@@ -41,7 +40,7 @@ struct LeaveNotice {
 )]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Association {
-    /// Node number of the neighbour, 0 for none.
+    /// Node number of the neighbour in this association; 0 if there is no neighbour.
     pub(super) node: u16,
     /// Random number by which this relay identifies the association (session) with the neighbour.
     pub(super) own_number: u16,
@@ -49,7 +48,7 @@ pub(super) struct Association {
     pub(super) peer_number: u16,
     /// Number of consecutive messages that belong to another association (session) of the neighbour.
     foreign_messages: u8,
-    /// True if a message to the neighbour is pending.
+    /// True if a message to the neighbour about the minimum separation must be sent.
     pub(super) due: bool,
     /// True while the neighbour requests an open chain. In an open chain all relays are at least the minimum separation
     /// apart along x.
@@ -104,10 +103,8 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance along x by which this relay is on the correct side of its neighbour, m.
-    ///
-    /// The neighbour is at `side`; its last received x counts. Negative on the wrong side; NaN if a position is
-    /// unknown.
+    /// Returns by how much this relay is on the correct side of its neighbour along x, m. The neighbour is at `side`;
+    /// its last received x counts. Negative on the wrong side; NaN if a position is unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -117,7 +114,7 @@ impl Association {
         }
     }
 
-    /// Returns the neighbour's last x, m; NaN if it is unknown or expired.
+    /// Returns the neighbour's last reported x, m; NaN if it is unknown or expired.
     pub(super) const fn seen_m(&self) -> f32 {
         if self.seen_reminders_left == 0 {
             f32::NAN
@@ -148,8 +145,8 @@ impl Association {
         self.left_number = association;
     }
 
-    /// Accepts the number that the neighbour gave to the association (session) with this relay. A neighbour that was
-    /// absent counts as back.
+    /// Accepts the number that the neighbour has given to the association (session) with this relay. A neighbour that
+    /// had left counts as back.
     pub(super) const fn pair(&mut self, association: u16) {
         self.peer_number = association;
         self.left_number = 0;
@@ -321,17 +318,17 @@ impl Association {
     }
 }
 
-/// Obstacles on one side of this relay, which limit its x. They are a lost relay that may still hover, and a drone
-/// that does not fly to setpoints.
+/// Obstacles that limit this relay's x on one side. They are a lost relay that may still hover, and a drone that does
+/// not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
     /// is lost.
     lost: Option<(u16, f32)>,
-    /// x to which this relay must move to be the separation away from a lost relay, m; NaN if none is near. Until
+    /// x at which this relay will be the minimum separation away from a lost relay, m; NaN if none is near. Until
     /// then, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
-    /// True if a lost relay was last reported on the wrong side of this one along x.
+    /// True if a lost relay was last reported on the wrong side of this one along x, which is out of order.
     disordered: bool,
     /// Node number and last reported position of a neighbour whose drone does not fly to setpoints. `None` without
     /// such a neighbour.
@@ -394,8 +391,8 @@ impl KeepOut {
         self.unflown = None;
     }
 
-    /// Returns the obstacles that remain after a change of the line from Tx to Rx. A drone that does not fly to
-    /// setpoints is dropped, because its x along the new line is unknown.
+    /// Returns the obstacles that remain when the line from Tx to Rx changes: lost relays. A drone that does not fly
+    /// to setpoints is dropped, because its x along the new line is unknown.
     pub(super) const fn leave_line(mut self) -> Self {
         self.unflown = None;
         self
@@ -459,26 +456,25 @@ impl KeepOut {
         }
     }
 
-    /// Records that the relay lost last may be closer than the separation. This ends when this relay is at x =
-    /// `near_m`.
+    /// Records that the relay lost last may be closer than the minimum separation. This ends when this relay is at x
+    /// = `near_m`.
     pub(super) const fn mark_near(&mut self, near_m: f32) {
         self.near_m = near_m;
     }
 
-    /// Returns the x, m, at which this relay is the separation away from the relay that was lost last. NaN if it
+    /// Returns the x, m, at which this relay will be the minimum separation away from the relay lost last. NaN if it
     /// already is.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
 
-    /// Returns true while the relay that was lost last may be closer than the separation.
+    /// Returns true while the relay lost last may be closer than the minimum separation.
     pub(super) const fn is_near(&self) -> bool {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay is the separation away from the lost relay. That is at the x
-    /// `near_m`, which limits this relay's x from then on. `is_beyond` returns true if this relay has passed the x
-    /// that is its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay is the minimum separation from the lost relay. This is so at x
+    /// = `near_m`. `is_beyond` returns true if this relay has passed the x that is its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -532,18 +528,16 @@ pub struct Fence {
     /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
     /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// x limit that the sender states, m, -1e7 to 1e7: the fence, or an end of the sender's own interval.
-    ///
-    /// The relay upstream sends the x of the fence; before the first fence, its highest possible x. The relay
-    /// downstream sends its lowest possible x.
+    /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx sends the x of the fence, or before the
+    /// first fence its highest possible x. The relay toward Rx sends its lowest possible x.
     pub x_m: f32,
-    /// Agreed x of the sender, m, -1e7 to 1e7.
+    /// x of the position that the chain has agreed on for the sender, m: -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
     /// setpoints, they are those of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the relay upstream requests to stay before the fence, m, 0 to 1e5. If it is less than
-    /// the separation, the relay downstream must not change its lateral offset or altitude.
+    /// Distance along x that the upstream relay requests to stay before the fence, m, 0 to 1e5. Below the minimum
+    /// separation, the downstream relay must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -552,7 +546,7 @@ pub struct Fence {
 impl Fence {
     /// Flag: the sender has arrived at its lateral offset and altitude.
     pub const ARRIVED: u8 = 1;
-    /// Flag of the relay downstream: it agrees to the distance `apart_m` of the newest fence.
+    /// Flag of the downstream relay: it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: request to open the chain: neighbours at least the minimum separation apart along x. The sender, or a
     /// relay beyond it, needs that to change its lateral offset or altitude.
@@ -604,20 +598,19 @@ impl Fence {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HoldReason {
-    /// Hold reason: messages have not confirmed yet that this relay and the neighbour are in order along x.
+    /// Messages have not confirmed yet that this relay and the neighbour are in order along x.
     Unheard,
-    /// Hold reason: the neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
+    /// The neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
     Order,
-    /// Hold reason: the agreed positions of this relay and the neighbour are too close along x. Lateral offsets and
-    /// altitudes do not keep the two at the minimum separation.
+    /// The agreed positions of this relay and the neighbour are too close. Neither their x nor their lateral offsets
+    /// and altitudes separate them.
     Close,
-    /// Hold reason: a lost relay may still hover between this relay and its agreed position.
+    /// A lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// Hold reason: the neighbour's drone does not fly to setpoints, and is in the way or makes no room.
+    /// The neighbour's drone does not fly to setpoints, and is in the way or makes no room.
     NotFlown,
-    /// Hold reason: the setpoint has not moved for at least five seconds. The neighbour has not made room.
+    /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
     Pending,
-    /// Hold reason: another relay is, or may be, on the wrong side of a neighbour. All relays therefore hold their
-    /// positions.
+    /// The chain halts, because a relay is, or may be, on the wrong side of a neighbour.
     Halted,
 }

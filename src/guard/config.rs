@@ -6,7 +6,7 @@ use crate::root::sqrt;
 use crate::time::Duration;
 use crate::without_quorum::WithoutQuorum;
 
-/// Default of [`GuardConfig::lag`]: the time to stop from the default speed of the autopilot link.
+/// Default of [`GuardConfig::lag`]: time to stop from the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);
 
 /// Maximum distance from the geofence at which a relay may start, m in each coordinate.
@@ -16,9 +16,9 @@ pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geofence {
-    /// Smallest x, m from Tx toward Rx: -1e7 to `most_x_m`.
+    /// Lower limit of the geofence along x, m from Tx toward Rx: -1e7 to `most_x_m`.
     pub least_x_m: f32,
-    /// Largest x, m from Tx toward Rx: `least_x_m` to 1e7.
+    /// Upper limit of the geofence along x, m from Tx toward Rx: `least_x_m` to 1e7.
     pub most_x_m: f32,
     /// Smallest y, m to the right of the line (negative to its left): -1e7 to `most_y_m`.
     pub least_y_m: f32,
@@ -31,7 +31,7 @@ pub struct Geofence {
 }
 
 impl Geofence {
-    /// Returns true if `place` is inside the geofence.
+    /// Returns true if the position `place` is inside the geofence.
     pub fn contains(&self, place: Placement) -> bool {
         (self.least_x_m..=self.most_x_m).contains(&place.x_m)
             && (self.least_y_m..=self.most_y_m).contains(&place.y_m)
@@ -39,7 +39,7 @@ impl Geofence {
     }
 }
 
-/// Configuration of a guard, set before flight.
+/// Configuration of a relay's guard (collision avoidance), set before flight.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GuardConfig {
@@ -50,7 +50,7 @@ pub struct GuardConfig {
     pub separation_m: f32,
     /// Number of relays of the mission, 1 to 1000; the same on all relays.
     pub relays: u16,
-    /// Maximum deviation of a hovering relay's reported position, 0 to 1e3 m per coordinate.
+    /// Maximum error of a hovering relay's reported position, 0 to 1e3 m per coordinate.
     ///
     /// It reduces the separation by this much at each of two relays.
     pub hover_m: f32,
@@ -98,8 +98,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns the configuration with a geofence large enough for relays that leave the line. Relays leave the line
-    /// Tx to Rx while they have no quorum, if `without_quorum` says so.
+    /// Returns this configuration with a geofence enlarged for relays that leave the line Tx-Rx. They do so while
+    /// they have no quorum, if `without_quorum` says so.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -110,7 +110,7 @@ impl GuardConfig {
         self
     }
 
-    /// Returns true if every number is within its range.
+    /// Returns true if every number of this configuration is within its range.
     pub fn is_valid(&self) -> bool {
         let fence = &self.geofence;
         is_coordinate(fence.least_x_m)
@@ -191,7 +191,7 @@ impl GuardConfig {
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))
     }
 
-    /// Returns the maximum rounding error of a position in the geofence, m: four units in the last place.
+    /// Returns the maximum rounding error of a coordinate in the geofence, m: four units in the last place.
     pub(super) fn rounding(&self) -> f32 {
         let fence = &self.geofence;
         4.0 * f32::EPSILON * fence.most_x_m.abs().max(fence.least_x_m.abs())

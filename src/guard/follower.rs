@@ -7,30 +7,30 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Limit for the comparison of wrapping fence numbers. A fence is newer if its number minus the last one, modulo
-/// 2^16, is above 0 and below the limit.
+/// Limit for the comparison of wrapping 16-bit fence numbers. A fence is newer if its number minus the last one,
+/// modulo 2^16, is above 0 and below the limit.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The neighbour upstream places it.
+/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
     /// Number of the newest fence (limit of x) from the neighbour upstream, 0 before the first.
     number: u16,
-    /// x of the newest fence that the neighbour upstream has announced, m: this relay stays beyond it.
+    /// x of the newest fence that the upstream neighbour has announced, m. This relay stays beyond it.
     fence_m: f32,
-    /// Distance along x that the neighbour upstream requests to stay before the fence, m. Infinite before its first
+    /// Distance along x that the upstream neighbour asks to keep before its fence, m. Infinite before its first
     /// request.
     requested_m: f32,
-    /// Distance along x to the neighbour upstream to which this relay has agreed, m. Infinity stands for the
-    /// separation; it is the value before any agreement.
+    /// Distance along x to the upstream neighbour to which this relay has agreed, m. Infinity stands for the minimum
+    /// separation, and is the value before any agreement.
     agreed_m: f32,
-    /// Agreed x of the neighbour upstream, m.
+    /// x of the position that the chain has agreed on for the neighbour toward Tx, m.
     target_m: f32,
     /// Lateral offset and altitude of the setpoint of the neighbour upstream.
     across: CrossSection,
-    /// True once this relay is known to be past a fence of the neighbour upstream, at a larger x.
+    /// True once this relay is known to be past a fence of the upstream neighbour, at a larger x.
     clear: bool,
     /// True once the upstream neighbour was informed that this relay is past the newest fence. The fence is a limit of
     /// x which that neighbour, its owner, has set; past the fence means at a larger x.
@@ -107,9 +107,8 @@ impl FenceFollower {
         };
     }
 
-    /// Handles the notice that the neighbour upstream no longer flies to setpoints. This relay then comes no nearer
-    /// to that neighbour than its present setpoint. If the two were in the right order along x, this relay may
-    /// otherwise move; if not, it holds its position.
+    /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay then comes no nearer
+    /// to it. If the two were not in the right order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -184,27 +183,27 @@ impl FenceFollower {
         granted.max(self.keep_out.limit_m().unwrap_or(f32::NEG_INFINITY))
     }
 
-    /// Returns true if the upstream side lets this relay change its lateral offset and altitude.
+    /// Returns true if nothing on the upstream side forbids a change of lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if the neighbour requests a distance along x below the separation. This relay then must not
-    /// change its lateral offset or altitude.
+    /// Returns true if the upstream neighbour requests a distance along x below the minimum separation. This relay
+    /// must then not change its lateral offset or altitude.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true if this relay and its neighbour upstream may still be as close as at the start. That may be
-    /// closer than the separation. The neighbour has announced a fence (limit of x), but this relay is not yet known
-    /// to be beyond one.
+    /// Returns true while this relay and its upstream neighbour may be as close as at the start. That may be below
+    /// the separation. The neighbour has announced a fence (limit of x), but this relay is not known to be beyond it
+    /// yet.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and the upstream relay are closer than the separation.
+    /// Returns true if the agreed x of this relay and its upstream neighbour violate the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
@@ -220,9 +219,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the least possible distance along x to the neighbour upstream, m. Infinity stands for the separation.
-    /// It is 0 near a lost relay, and until this relay is beyond the first fence (limit of x). The limits toward the
-    /// neighbour downstream are computed from this distance.
+    /// Returns the least possible distance along x to the upstream neighbour, m. Infinity stands for the minimum
+    /// separation. It is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -231,8 +229,8 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if this relay is known to be beyond its neighbour upstream along x. Also true if that neighbour
-    /// does not fly to setpoints, or the chain ends here.
+    /// Returns true if this relay is known to be beyond its upstream neighbour along x. Also if that neighbour does
+    /// not fly to setpoints, or the chain ends here.
     ///
     /// The neighbour's fence (limit of x) shows it: the neighbour announces one only after it has found this relay to
     /// be beyond. False while a lost relay may be on the wrong side.
@@ -254,8 +252,8 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Records that this relay is past the newest fence (at a larger x), if its known position shows that. A message is
-    /// due then, because the neighbour upstream waits for that. `low_m` is the lowest x of this relay and of those
+    /// Records that this relay is past the newest fence (limit of x), if its known position shows that. A message to
+    /// the upstream neighbour, which waits for that, is then due. `low_m` is the lowest x of this relay and of those
     /// downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {

@@ -102,7 +102,7 @@ use follower::FenceFollower;
 use own::{Own, ReachableInterval};
 use owner::FenceOwner;
 
-/// Guard of one relay: computes safe setpoints on the way to the agreed position.
+/// Guard (collision avoidance) of one relay: computes safe setpoints on the way to the agreed position.
 ///
 /// Call [`commit`](Self::commit), [`position`](Self::position), [`handle_fence`](Self::handle_fence) and [`set_neighbour`](Self::set_neighbour) with new inputs.
 /// After each call [`steer`](Self::steer), fly to its result, then send the messages of [`poll`](Self::poll). Every call takes at
@@ -112,7 +112,7 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last position reported before the first setpoint; it becomes the first setpoint. `None` before any report.
+    /// Last reported position before the first setpoint, which it becomes; `None` before any report.
     initial_place: Option<Placement>,
     /// True while the drone flies to this guard's setpoints.
     flown: bool,
@@ -122,17 +122,16 @@ pub struct Guard {
     ///
     /// It is on the wrong side of a neighbour, or several reminders in a row found its order along x unknown.
     disorder: bool,
-    /// Number of consecutive reminders, one per second, that found the order along x unknown.
+    /// Number of seconds (reminders) in a row in which the order along x was unknown.
     unordered: u8,
     reminders: u8,
     refused: u32,
 }
 
-/// Number of reminders, one per second, between two messages of a relay that does not fly to setpoints. It sends more
-/// often while it moves.
+/// Number of seconds between two messages of a standing relay that does not fly to setpoints.
 const UNFLOWN_EVERY: u8 = 4;
 
-/// Number of reminders, one per second, after which an unknown order along x halts the chain.
+/// Number of seconds after which an unknown order along x halts the chain.
 const MAX_UNORDERED: u8 = 3;
 
 impl Guard {
@@ -168,7 +167,7 @@ impl Guard {
         self.owner.association.due = true;
     }
 
-    /// Returns true if `place`, limited to the geofence, is the current agreed position.
+    /// Returns true if `place`, limited to the geofence, equals the current agreed position.
     pub fn is_for(&self, place: Placement) -> bool {
         self.own.target == Some(self.own.config.clamp(place))
     }
@@ -290,8 +289,8 @@ impl Guard {
         }
     }
 
-    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` before there is an agreed
-    /// position and a report.
+    /// Moves the setpoint as far as the neighbours allow now, and returns it. `None` until there is an agreed
+    /// position and a reported position of the drone.
     ///
     /// `now` is the time at which the autopilot gets the setpoint: the drone flies toward it within
     /// [`GuardConfig::lag`].
@@ -350,7 +349,7 @@ impl Guard {
         self.own.setpoint
     }
 
-    /// Lifts the restrictions near a lost neighbour once this relay is the separation away from it.
+    /// Lifts the restrictions near a lost neighbour once this relay is the minimum separation away from it.
     fn clear_near(&mut self) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         self.follower
@@ -379,7 +378,7 @@ impl Guard {
         down.forward_open(downward);
     }
 
-    /// Returns true if this relay is known to be between its two neighbours along x.
+    /// Returns true if this relay is known to be between its two neighbours along x, as it should be.
     fn is_ordered(&self) -> bool {
         self.follower.is_ordered() && self.owner.is_ordered(&self.own)
     }
@@ -492,8 +491,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position and the relay was reported there since. The agreed position is limited
-    /// to the geofence.
+    /// Returns true if the setpoint is the agreed position, and the relay was reported there since. The agreed
+    /// position is limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -546,8 +545,8 @@ impl Guard {
         }
     }
 
-    /// Returns the hold reason for a move toward `side` that has waited for five reminders; else `None`. There is one
-    /// reminder per second. The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
+    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if it has not. It is
+    /// `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {

@@ -38,16 +38,16 @@ pub(super) struct ReachableInterval {
     pub(super) setpoint_m: f32,
     pub(super) low_m: f32,
     pub(super) high_m: f32,
-    /// Time of the last change of the setpoint's x.
+    /// Time at which the x of the drone's setpoint last changed.
     changed_at: Instant,
     /// Interval that contains the x of all setpoints since the time `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval that contains the x of earlier setpoints, m. When the last position was reported, the relay may still
-    /// have been on its way to one of them.
+    /// Interval of the x of earlier setpoints, m. At the last position report the relay may still have been on its
+    /// way to one of them.
     earlier_span: Span,
     reported_at: Instant,
-    /// True once a position report was measured late enough after the first setpoint to show its effect.
+    /// True once a position report was measured late enough to show the effect of the first setpoint.
     known: bool,
 }
 
@@ -121,13 +121,13 @@ impl ReachableInterval {
         self.known
     }
 
-    /// Returns true if the relay has arrived at its setpoint's x.
+    /// Returns true if the relay has arrived at the x of its setpoint.
     pub(super) fn has_arrived(&self) -> bool {
         self.known && self.high_m <= self.low_m
     }
 }
 
-/// Number of reminders, one per second, after which a setpoint that has not moved counts as held up.
+/// Number of seconds after which a setpoint that has not moved counts as held up.
 const MAX_REMINDERS_STILL: u8 = 5;
 
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +138,7 @@ pub(super) struct Own {
     pub(super) target: Option<Placement>,
     pub(super) setpoint: Option<Placement>,
     pub(super) reachable: ReachableInterval,
-    /// Time of the last change of the setpoint's lateral offset or altitude.
+    /// Time at which the setpoint's lateral offset or altitude changed last.
     cross_section_changed_at: Instant,
     /// True once the relay has arrived at the setpoint's lateral offset and altitude.
     pub(super) arrived: bool,
@@ -150,7 +150,7 @@ pub(super) struct Own {
     pub(super) reported: Option<Placement>,
     /// Position in the last message that was sent while the drone did not fly to setpoints.
     pub(super) sent_place: Placement,
-    /// Number of reminders, one per second, since the last change of the setpoint.
+    /// Number of seconds (reminders) since the setpoint changed last.
     reminders: u8,
     /// Last setpoint at which this relay arrived, or its first one. If the relay halts on its way from there, it
     /// stops no farther outside the geofence than that setpoint.
@@ -206,9 +206,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for five reminders, and `side` may be the cause. This is so if the
-    /// agreed position is farther toward `side`, or if it has another lateral offset or altitude and this side
-    /// forbids that move (`clear` is false).
+    /// Returns true if the setpoint has not moved for five seconds, and `side` may be the cause. Then the agreed
+    /// position is farther toward `side`, or this side forbids a change of lateral offset or altitude (`clear` is
+    /// false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;
@@ -275,7 +275,7 @@ impl Own {
         }
     }
 
-    /// Returns true if two lateral offsets and altitudes agree, within the error of a hovering relay.
+    /// Returns true if two lateral offsets and altitudes agree, within a hovering relay's position error.
     fn is_near(&self, is: CrossSection, to_be: CrossSection) -> bool {
         let most = self.config.hover_m + self.config.rounding();
         (is.y_m - to_be.y_m).abs() <= most && (is.altitude_m - to_be.altitude_m).abs() <= most
@@ -300,8 +300,8 @@ impl Own {
         self.goal_of(self.node, self.target_m())
     }
 
-    /// Returns the x to which `node` should fly now, m: `target_m`, or its x in an open chain. In an open chain all
-    /// relays are at least the minimum separation apart along x.
+    /// Returns the x to which relay `node` should fly now, m: `target_m`, or its x in an open chain. In an open chain
+    /// all relays are at least the minimum separation apart along x.
     pub(super) fn goal_of(&self, node: u16, target_m: f32) -> f32 {
         if self.open {
             self.config.open_chain_x(node, target_m)
@@ -310,7 +310,7 @@ impl Own {
         }
     }
 
-    /// Returns true if two positions `step_m` apart along x are closer than the separation.
+    /// Returns true if two relays `step_m` apart along x are closer than the minimum separation.
     pub(super) fn is_close(&self, step_m: f32) -> bool {
         step_m < self.config.separation_m - self.config.rounding()
     }

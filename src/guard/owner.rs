@@ -7,8 +7,7 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx, a plane x = constant that the neighbour downstream stays beyond. This relay places
-/// it.
+/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
@@ -19,14 +18,14 @@ pub(super) struct FenceOwner {
     /// x of the newest fence that this relay has announced, m; infinite before the first. The neighbour downstream
     /// stays beyond it.
     fence_m: f32,
-    /// Distance along x that this relay requests to stay before the fence, m; infinite before any request.
+    /// Distance along x that this relay asks to keep before its fence, m; infinite before any request.
     requested_m: f32,
-    /// Distance along x that has to be kept to the neighbour downstream now, m. It is the distance to which the
-    /// neighbour has agreed, or a larger one that this relay has requested since. Infinity stands for the separation.
+    /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed one, or a larger one
+    /// requested since. Infinity stands for the minimum separation.
     agreed_m: f32,
     /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
     follower_low_m: f32,
-    /// Agreed x of the neighbour downstream, m.
+    /// x of the position that the chain has agreed on for the neighbour toward Rx, m.
     target_m: f32,
     /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
     /// there.
@@ -34,7 +33,7 @@ pub(super) struct FenceOwner {
     arrived: bool,
     /// True if the neighbour downstream has received the newest fence (limit of x).
     is_acknowledged: bool,
-    /// True once the neighbour downstream has reported that it is past a fence (at a larger x).
+    /// True once the downstream neighbour has reported that it is past a fence, at a larger x.
     clear: bool,
 }
 
@@ -104,9 +103,8 @@ impl FenceOwner {
         };
     }
 
-    /// Handles the notice that the neighbour downstream no longer flies to setpoints. This relay then comes no nearer
-    /// to that neighbour than its present setpoint. If the two were in the right order along x, this relay may
-    /// otherwise move; if not, it holds its position.
+    /// Handles the notice that the downstream neighbour no longer flies to setpoints. This relay then comes no nearer
+    /// to it. If the two were not in the right order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -173,8 +171,8 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the distance along x that this relay keeps from the neighbour downstream, m. `kept_m` is the distance
-    /// to the neighbour upstream. Both together are at least the separation, so that the two neighbours are that far
+    /// Returns the distance along x that this relay keeps from the downstream neighbour, m. `kept_m` is that to the
+    /// upstream neighbour. Their sum is at least the minimum separation, so that the two neighbours are that far
     /// apart.
     pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
@@ -193,9 +191,9 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if this relay has requested or agreed to a distance along x below the separation. The distance is
-    /// that to the neighbour downstream. This relay must not change its lateral offset or altitude then, because
-    /// these may be all that separates the two.
+    /// Returns true if less than the minimum separation along x is requested or agreed to. The distance is that to
+    /// the downstream neighbour. It must then not change its lateral offset or altitude, which may be all that
+    /// separates the two.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -270,33 +268,32 @@ impl FenceOwner {
         granted.min(self.keep_out.limit_m().unwrap_or(f32::INFINITY))
     }
 
-    /// Returns true if the downstream side lets this relay change its lateral offset and altitude.
+    /// Returns true if nothing on the downstream side forbids a change of lateral offset and altitude.
     pub(super) fn may_move_across(&self, own: &Own) -> bool {
         (self.association.has_no_flown_neighbour() || self.clear)
             && !self.has_reduced_step(own)
             && !self.keep_out.is_near()
     }
 
-    /// Returns true if this relay and its neighbour downstream may still be as close as at the start. That may be
-    /// closer than the separation. The neighbour has answered, but has not reported yet that it is past a fence (at a
-    /// larger x).
+    /// Returns true while this relay and its downstream neighbour may be as close as at the start. That may be below
+    /// the separation. The neighbour has answered, but has not reported yet that it is past a fence (limit of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
 
-    /// Returns true if the agreed x of this relay and the downstream relay are closer than the separation.
+    /// Returns true if the agreed x of this relay and its downstream neighbour violate the separation.
     pub(super) fn is_close(&self, own: &Own) -> bool {
         self.has_reply() && own.is_close(self.target_m - own.target_m())
     }
 
-    /// Returns true if the neighbour has the newest fence (limit of x) and is known to be beyond it.
+    /// Returns true if the downstream neighbour is known to be beyond the newest fence (limit of x).
     pub(super) fn is_cleared(&self) -> bool {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x to the neighbour downstream for both agreed positions, m. It is below
-    /// the separation only if the agreed positions are that close, and both relays have arrived at their lateral
-    /// offsets and altitudes.
+    /// Returns the smallest distance along x to the downstream neighbour for both agreed positions, m. It is below
+    /// the minimum separation only if these are that close, and both relays have arrived at their lateral offsets and
+    /// altitudes.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();

@@ -16,11 +16,11 @@ pub(crate) mod tests;
 /// Maximum number of relays of a mission, the value of [`Mission::MAX_RELAYS`](Mission::MAX_RELAYS).
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
-/// Smallest step in x between two relays, as a fraction of the distance D. It is at least two steps of an f32, even
-/// near Rx, so that the positions remain distinct after rounding.
+/// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least two steps of an
+/// f32 even near Rx, so that positions stay distinct.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
-/// Maximum rounding error of a step in x between two positions, as a fraction of the distance D.
+/// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
 pub(super) const ROUNDING: f32 = 2.0 * FINEST_STEP;
 
 /// Parameters of a mission; [`Mission::try_new`](Mission::try_new) checks them.
@@ -46,7 +46,8 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: a transmitter at a known or an unknown position, or a field.
+    /// Interference on the hops: one transmitter at a known or unknown position, or a field. A field is a
+    /// distribution along x.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
@@ -111,8 +112,8 @@ pub enum MissionError {
     Distance,
     /// `min_separation_m` is not within 0 to 1e5.
     Separation,
-    /// The relays, `min_separation_m` apart, need more than `distance_m`. This includes a margin for rounding of 5e-7
-    /// `distance_m` for each relay.
+    /// The relays with `min_separation_m` between them need more than `distance_m`. This includes a rounding margin
+    /// of 5e-7 `distance_m` per relay.
     TooManyForDistance,
     /// `tx_power_w` is not within 1e-6 to 1e6.
     TxPower,
@@ -220,14 +221,14 @@ pub enum Interference {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Band {
-    /// Lower limit of the altitudes or lateral offsets, m.
+    /// Smallest allowed altitude, or smallest allowed lateral offset, of the relays, m.
     pub least_m: f32,
     /// Upper limit of the altitudes or lateral offsets, m: at least `least_m`.
     pub most_m: f32,
 }
 
 impl Band {
-    /// Lateral range of zero width, as in the paper: relays stay in the vertical plane through Tx and Rx.
+    /// Lateral range that allows y = 0 only. As in the paper, relays stay in the vertical plane through Tx and Rx.
     pub const NONE: Self = Self::at(0.0);
 
     /// Returns the range that contains only the value `at_m`, m.
@@ -270,7 +271,7 @@ impl Band {
     }
 }
 
-/// Altitude and transmit power of one relay.
+/// Altitude and transmit power that the mission gives to one relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Profile {
@@ -320,8 +321,8 @@ pub struct Mission {
     pub(super) noise_at_a_metre: f32,
 }
 
-/// Maximum noise relative to the interferer's power received at 1 m. With more noise the interferer would be lost in
-/// f32 rounding.
+/// Maximum receiver noise relative to the interferer's power received at 1 m. With more noise, f32 rounding would
+/// hide the interferer.
 const MOST_NOISE: f64 = 1e12;
 
 impl Mission {
@@ -527,12 +528,12 @@ impl Mission {
         &self.config
     }
 
-    /// Number of relays N.
+    /// Returns the number N of relays of the mission.
     pub const fn relays(&self) -> u16 {
         self.config.relays
     }
 
-    /// Returns the kind of interference on the hops.
+    /// Returns the kind of interference that the relays suffer in this mission.
     pub const fn interference(&self) -> &Interference {
         &self.config.interference
     }
@@ -547,7 +548,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field, or `None` if the interference is a single transmitter.
+    /// Returns the interference field (distribution along x), or `None` for a single transmitter.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
             Interference::Field(field) if cfg!(feature = "field") => Some(field),
@@ -607,7 +608,7 @@ impl Mission {
         }
     }
 
-    /// Relay that computes its position first and starts the passes: 1, or N in an interference field.
+    /// Returns the leader, which computes its position first. It is 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -615,7 +616,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay after `index` in the order of computation; `None` after the last.
+    /// Returns the relay whose position is computed after that of relay `index`; `None` after the last one.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -684,7 +685,7 @@ impl Mission {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 
-    /// Power that a relay at the squared distance `squared_m2` from Tx receives from Tx, W.
+    /// Power that a relay receives from Tx, W, at the squared distance `squared_m2` from it.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -722,13 +723,13 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, without a separation of the relays after it. After means
-    /// in the order of computation. Farthest means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, if relays computed after it need no separation. Farthest
+    /// means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Number of relays whose positions are computed after that of relay `index`.
+    /// Returns the number of relays whose positions are computed after that of relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -736,13 +737,12 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, with enough space for the relays between it and Rx. Each of those
-    /// relays needs the minimum separation.
+    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index`, m, if the relays between it and Rx need no separation.
+    /// Returns the largest x of relay `index`, m, if the relays between it and Rx may share one x.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -819,8 +819,8 @@ impl Mission {
     }
 }
 
-/// Interferer that stands for an unknown one. It is so far away that all receivers have the same interference, to
-/// 1e-7.
+/// Substitute for an interferer at an unknown position. It is so far away that all receivers have the same
+/// interference, to 1e-7.
 pub(super) const FAR: Interferer = Interferer {
     power_w: 1.0,
     x_m: 0.0,

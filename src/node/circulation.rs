@@ -34,15 +34,15 @@ use crate::time::{Duration, Instant, Jitter};
 /// then twice as long, and each relay may take thirty steps of a computation.
 const SLOW: u32 = 4;
 
-/// Number of retransmissions after which the wait for a reply stops doubling. The wait after n of them is 2 << n hop
-/// times, so it is at most eight.
+/// Number of retransmissions after which the wait before the next one stops doubling. After n of them it is 2 << n
+/// hop times: at most eight.
 const LOG_MOST: u32 = 2;
 
-/// Wait before the first retransmission on a channel that counts as lossy, in hop times. The reply of the next relay
-/// to the message, or to a duplicate of it, normally arrives earlier.
+/// Wait before the first retransmission on a lossy channel, in hop times. The next relay's acknowledgement normally
+/// arrives earlier.
 const SOON: u32 = 4;
 
-/// Number of messages after a loss for which the channel counts as lossy.
+/// Number of messages after a lost one for which the channel still counts as lossy.
 const MEMORY: u8 = 8;
 
 /// Progress of a message that goes along the chain and returns with a result, as seen by one relay.
@@ -50,12 +50,12 @@ const MEMORY: u8 = 8;
 pub(crate) enum Stage {
     /// No message is known, or this relay has not forwarded it yet.
     Idle,
-    /// The message has been forwarded, or is about to be; its result is not known yet.
+    /// The message has been forwarded, or is about to be; the reply with its result has not arrived yet.
     Outstanding,
-    /// The result of the message is known.
+    /// The message has circulated through the chain, and its result is known.
     Completed,
-    /// The message was cancelled after it was sent. Duplicates are answered as in `Completed`, but replies to the
-    /// message no longer count as proof that a neighbour is alive.
+    /// The message was cancelled after it was sent. Duplicates of it are answered, but replies to it no longer prove
+    /// that a neighbour is alive.
     Cancelled,
 }
 
@@ -68,12 +68,13 @@ pub(crate) enum Reply {
     InProgress,
 }
 
-/// Path from this relay to the one that replies. The wait for the reply is computed from it.
+/// Path along the chain from this relay to the one that replies to a message. The retransmission timeout is computed
+/// from it.
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
     /// Duration of one hop: transmission and handling of one frame.
     pub(crate) hop_time: Duration,
-    /// Number of hops on the path.
+    /// Number of hops on the message's path along the chain.
     pub(crate) hops: u16,
     /// True if the relays on the path compute before they forward the message.
     pub(crate) slow: bool,
@@ -87,22 +88,22 @@ pub(crate) struct Circulation {
     completed_at: Instant,
     is_forward_due: bool,
     reply_due: Option<Reply>,
-    /// Number of retransmissions since the next relay replied last.
+    /// Number of retransmissions of the message since the next relay's last reply.
     retries: u8,
-    /// True once the next relay has replied that it has received the message.
+    /// True once the next relay on the path has acknowledged the message.
     is_received: bool,
     /// True if the channel counts as lossy: this message or one of the last messages has been lost once.
     is_lossy: bool,
-    /// Number of further messages during which the channel still counts as lossy.
+    /// Number of further messages for which the channel still counts as lossy, after a lost one.
     lossy_messages: u8,
-    /// Number of further repetitions of the reply. On a lossy channel a reply is repeated without a request.
+    /// Number of times that the reply will still be repeated unasked, as on a lossy channel.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
 }
 
 impl Circulation {
-    /// Creates the state of a relay that has no message yet; `seed` sets the random part of the waits.
+    /// Creates the state of a relay that has no message yet; `seed` randomises the retransmission timeouts.
     pub(crate) const fn new(seed: u32) -> Self {
         Self {
             stage: Stage::Idle,
@@ -120,7 +121,7 @@ impl Circulation {
         }
     }
 
-    /// Returns the state of a message at `stage` without times, for model checks that leave time out.
+    /// Returns the state of a message at `stage` with all times zero, for model checks without time.
     #[cfg(test)]
     pub(crate) const fn at_stage(stage: Stage) -> Self {
         Self {
@@ -134,7 +135,7 @@ impl Circulation {
         self.stage
     }
 
-    /// Returns true while the result of the message is awaited.
+    /// Returns true from the forwarding of the message until the reply with its result arrives.
     pub(crate) const fn is_outstanding(&self) -> bool {
         matches!(self.stage, Stage::Outstanding)
     }
@@ -168,8 +169,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Completes the message and schedules the reply with its result. `path` leads to the initiator; it has no hops
-    /// if this relay is the initiator, which sends no reply.
+    /// Records the result of the message, and schedules the reply with it. `path` leads to the relay that started the
+    /// message; it has no hops if that is this relay, which then sends no reply.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -178,7 +179,7 @@ impl Circulation {
         self.repeat_reply(now, path);
     }
 
-    /// Completes the message at its initiator, which sends no reply and starts no other message.
+    /// Completes the message at the relay that started it, which needs no reply.
     pub(crate) const fn close(&mut self) {
         self.stop(Stage::Completed);
     }
@@ -333,7 +334,7 @@ mod tests {
 
     const START: Instant = Instant::from_millis(1_000);
 
-    /// Starts a message at `now` and forwards it.
+    /// Test helper: starts a message at relay time `now` and forwards it.
     fn send(circulation: &mut Circulation, now: Instant) {
         circulation.start(now);
         assert!(circulation.poll_forward());
@@ -346,7 +347,7 @@ mod tests {
         circulation
     }
 
-    /// Returns the number of hop times from `now` until the timer expires.
+    /// Returns the time from `now` to the retransmission timeout, in hop times.
     fn wait(circulation: &Circulation, now: Instant) -> u64 {
         let at = circulation.next_timeout().unwrap();
         at.since(now).as_micros() / HOP.as_micros()

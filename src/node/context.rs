@@ -11,20 +11,20 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Mission that this relay flies now, with the number of relays reduced to the members of the view.
+    /// Mission that this relay flies now. Its number of relays is the number of members of the current view.
     pub(crate) mission: Mission,
-    /// Interference that the active mission configures. The current estimate does not change it.
+    /// Interference as the active mission configures it, before any estimate from measurements.
     pub(crate) interference: Interference,
     pub(crate) settings: Settings,
-    /// Node number: 1 is the relay next to Tx.
+    /// Node number of this relay: 1 is the relay next to Tx.
     pub(crate) node: u16,
     /// Number of relays of the mission as loaded before flight.
     pub(crate) all: u16,
-    /// Digest of the mission that was loaded before flight.
+    /// Digest (16-bit checksum) of the mission that was loaded before flight.
     pub(crate) digest: u16,
-    /// Identifier of the active mission.
+    /// Identifier of the mission that this relay flies now.
     pub(crate) active: MissionId,
-    /// Last accepted view (agreed members of the chain).
+    /// Identifier of the view that this relay accepted last. A view is an agreed membership of the chain.
     pub(crate) view: ViewId,
     /// Index of this relay among the members of the view: 1 for the member next to Tx.
     pub(crate) index: u16,
@@ -46,8 +46,8 @@ impl Member {
         }
     }
 
-    /// Returns this relay's rank in the loaded mission, and the mission's number of relays. The rank counts from 1 at
-    /// the leader's end. View changes alter neither number.
+    /// Returns this relay's rank and the number of relays in the mission as loaded before flight. Rank 1 is at the
+    /// leader's end. View changes (of the chain's members) alter neither number.
     pub(crate) const fn rank_in_all(&self) -> (u16, u16) {
         let place = match self.mission.heading() {
             Heading::TowardRx => self.node,
@@ -68,11 +68,11 @@ impl Member {
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Identifier of the newest mission that this relay has stored. The relay may still fly an older one.
+    /// Identifier of the newest mission that this relay has stored. The active mission may still be an older one.
     pub(crate) latest: MissionId,
     /// True if this relay is the last one of its chain, with no neighbour on the side away from the leader.
     pub(crate) end: bool,
-    /// Remaining leases of other relays, which delay the use of a new view's positions.
+    /// Remaining lease times of other relays. Until they have ended, the positions of a new view must not be used.
     pub(crate) other_leases: OtherLeases,
 }
 
@@ -93,9 +93,9 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay solves the whole chain by the joint method. The settings must select this method,
-    /// and the mission must leave the lateral offset or the altitude free, or have fitted slots (as long as each hop
-    /// needs).
+    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. The settings
+    /// must select it, and the mission must leave lateral offset or altitude free, or have fitted slots (as long as
+    /// each hop needs).
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
@@ -103,7 +103,8 @@ impl<'a> Context<'a> {
         cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
     }
 
-    /// Returns the maximum duration of a lease, in tenths of a second.
+    /// Returns the maximum duration of a lease, in tenths of a second. A lease permits the use of the agreed
+    /// positions.
     pub(crate) fn longest_lease(&self) -> u16 {
         tenths(longest_lease(self.settings()))
     }
@@ -116,7 +117,7 @@ impl<'a> Context<'a> {
         self.mission().after(self.index()).is_none()
     }
 
-    /// Returns the number and duration of the hops from this relay to the last relay of the view.
+    /// Returns the path from this relay to the last relay of the view: number and duration of its hops.
     pub(crate) fn path_to_last(&self) -> Path {
         let mission = self.mission();
         self.path(match mission.heading() {
@@ -125,7 +126,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Returns the number and duration of the hops from this relay to the leader.
+    /// Returns the path from this relay to the leader: number and duration of its hops.
     pub(crate) fn path_to_leader(&self) -> Path {
         let relays = self.mission().relays();
         self.path(
@@ -135,7 +136,7 @@ impl<'a> Context<'a> {
         )
     }
 
-    /// Returns a path of `hops` hops on which no relay computes.
+    /// Returns a path of `hops` hops whose relays forward messages at once, without computing first.
     pub(crate) const fn path(&self, hops: u16) -> Path {
         Path {
             hop_time: self.member.settings.hop_time,
@@ -160,16 +161,17 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Remaining leases of other relays, as far as this relay knows.
+/// Remaining lease times of other relays, as far as this relay knows. A lease permits a relay to use the agreed
+/// positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Upper bound of the remaining leases of the other members of this relay's view. The bound is known because a
-    /// lease is granted only after all members, and so this relay, have taken part in a renewal.
+    /// Upper bound of the remaining lease time of the other members of this relay's view. It is known because every
+    /// lease renewal passes this relay, too.
     pub(crate) lease_left: Duration,
     /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
-    /// Longest remaining lease of any view before `view`. `None` if unknown, because a member may not have accepted
-    /// `view`.
+    /// Longest remaining lease time granted in any view before `view`. `None` if unknown, because a member may not
+    /// have accepted `view`.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -181,8 +183,8 @@ impl OtherLeases {
         earlier_lease_left: Some(Duration::from_micros(0)),
     };
 
-    /// Returns the time until all leases of views before `view` have expired, in tenths of a second. `u16::MAX` if
-    /// the time is not known.
+    /// Returns the time until all leases of views before `view` have ended, in tenths of a second. `u16::MAX` if
+    /// unknown. A lease permits a relay to use the agreed positions of its view.
     pub(crate) fn earlier_lease_tenths(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
@@ -193,34 +195,34 @@ impl OtherLeases {
     }
 }
 
-/// Results of one protocol layer's work that concern other layers or the firmware.
+/// Results of one protocol layer's step that other layers or the firmware need.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is one thing that happened or did not"
 )]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Effects {
-    /// Reason why the received message had no effect; `None` if it had an effect.
+    /// Reason why the received message was ignored; `None` if it was not ignored.
     pub(crate) ignored: Option<Ignored>,
-    /// True if a message was retransmitted.
+    /// True if this step scheduled a retransmission of a message.
     pub(crate) resent: bool,
     /// True if this relay has started a pass (message along the chain) or a view proposal.
     pub(crate) began: bool,
-    /// True if a new view (agreed members of the chain) is needed.
+    /// True if the relays must agree on a new view (membership of the chain).
     pub(crate) view_needed: bool,
     /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
     /// proves that the neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
     /// Origin of the view proposal that this relay has received or made now; `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
-    /// True if a view proposal is outstanding. No pass along the chain continues before its decision.
+    /// True while a view proposal awaits its decision. No pass (message along the chain) continues meanwhile.
     pub(crate) view_proposed: bool,
     pub(crate) event: Option<LayerEvent>,
     /// Changes of the interference estimate and of the set of faulty interference sensors.
     pub(crate) sensed: Sensed,
 }
 
-/// Reason why a message had no effect.
+/// Reason why a received message was ignored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Ignored {
     Stale,
@@ -234,18 +236,18 @@ pub(crate) enum Peer {
     Previous,
 }
 
-/// Result of one protocol layer for the other layers or the firmware.
+/// Result of one protocol layer that other layers or the firmware handle as an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
-    /// The chain has agreed on its positions.
+    /// The relays of the chain have all agreed on their positions.
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease of the last agreement has expired.
+    /// The lease has expired: this relay may not use the agreed positions any more.
     Lapsed,
     /// A hello that requests a new view is due, to the neighbour toward the leader.
     RequestView,
-    /// A view proposal has been decided.
+    /// A proposal of a view (membership of the chain) has been decided.
     ProposalDecided(ProposalOutcome),
 }
 
@@ -255,7 +257,7 @@ pub(crate) enum LayerEvent {
 pub(crate) struct Sensed {
     /// True if the interference estimate has changed.
     pub(crate) new_estimate: bool,
-    /// True if the measurements do not fit a single source of interference.
+    /// True if no single interferer explains the measurements.
     pub(crate) unclear: bool,
     /// Node that was found now to measure values that contradict those of the other nodes; else `None`.
     pub(crate) faulty_sensor: Option<u16>,
@@ -264,12 +266,13 @@ pub(crate) struct Sensed {
 /// Decision on a view proposal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum ProposalOutcome {
-    /// Accepted: the view has `relays` members. Its positions may be used in `usable_in` tenths of a second.
+    /// Accepted: the view has `relays` members. Its positions may be used after `usable_in` tenths of a second, when
+    /// older leases have ended.
     Granted { relays: u16, usable_in: u16 },
-    /// Superseded: the decision accepts another view, decided on earlier, instead of the proposed one. The leader
-    /// then proposes a view that follows the accepted one.
+    /// Superseded: another view had been decided on before and is accepted instead. The leader then proposes a view
+    /// that follows it.
     Superseded,
-    /// Rejected: too few relays are reachable for a quorum.
+    /// Rejected: fewer relays are reachable than a quorum needs.
     NoQuorum,
 }
 
@@ -307,8 +310,8 @@ impl Effects {
         ..Self::NONE
     };
 
-    /// Effects of a message of a view to which this relay does not belong. The message is ignored, and a new view is
-    /// requested.
+    /// Effects of a message of a view (membership) to which this relay does not belong. The message is ignored, and a
+    /// new view is requested.
     pub(crate) const FOREIGN: Self = Self {
         view_needed: true,
         ..Self::STALE
@@ -321,7 +324,7 @@ impl Effects {
         }
     }
 
-    /// Returns these effects with `proposer` as the origin of a view proposal.
+    /// Returns these effects with `proposer` recorded as the origin of the view proposal.
     pub(crate) const fn by(self, proposer: Proposer) -> Self {
         Self {
             proposed_by: Some(proposer),
@@ -330,19 +333,20 @@ impl Effects {
     }
 }
 
-/// Pause between two steps of a long computation, so that the caller's loop can do other work.
+/// Pause between two steps of a long computation, in which the firmware's main loop can do other work.
 pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 
-/// Maximum duration of a lease, as a multiple of `dead_after`.
+/// Maximum duration of a lease, as a multiple of the setting `dead_after`. A lease permits the use of the agreed
+/// positions.
 const MAX_LEASE: u32 = 8;
 
-/// Returns the maximum duration of a lease.
+/// Returns the maximum duration of a lease (permission to use the agreed positions).
 pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the maximum time from the leader's first pass message until its result is back there. It is computed for a
-/// chain of `all` relays in which half of the frames are lost.
+/// Returns the maximum time from the leader's first message along the chain until its result is back. It assumes a
+/// chain of `all` relays that loses half of its frames.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

@@ -50,7 +50,8 @@ use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 use crate::wire::session::{RAISED, Rival, Sender};
 
-/// Wait before the first unprompted claim to this relay's node number. The next intervals double from claim to claim.
+/// Wait before the first unprompted claim to this relay's node number. The intervals between later claims double each
+/// time.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
 /// Time added before the first unprompted claim to this relay's node number, after a start. It is about the time that
@@ -61,11 +62,11 @@ const AFTER_START: Duration = Duration::from_millis(2_000);
 /// `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims by which this relay answers an active node's claim to the same node number. They are
-/// [`least_interval`] apart.
+/// Number of claims by which this relay defends its node number against another node's. They are [`least_interval`]
+/// apart.
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay repeats after a frame with its own node number that shows no claim.
+/// Number of claims that follow a frame with this relay's own node number that shows no claim.
 ///
 /// With signed frames: number of claims that it repeats after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
@@ -90,12 +91,12 @@ pub(crate) struct IndexClaims {
     rival: u32,
     /// Last claim number received from another node with the same node number; 0 before any.
     last_rival: u32,
-    /// Last contact with another node of this node number: its time, and a flag; `None` before any. The flag is true
-    /// if this relay already had a position at the first contact.
+    /// Last contact with another node of this node number: its time, and a flag. `None` before any. The flag is true
+    /// if this relay already had a position at the first contact. `None` before any.
     contest: Option<(Instant, bool)>,
     /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received a frame that it had sent itself; `None` before any.
+    /// Time at which this relay last received one of its own frames; `None` before any.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
@@ -103,14 +104,13 @@ pub(crate) struct IndexClaims {
     next_claim: Option<Instant>,
     /// Time from the next unprompted claim to the one after it.
     interval: Duration,
-    /// Number of claims still to send because another active node uses this relay's node number. They are
-    /// [`least_interval`] apart.
+    /// Number of claims still to be sent in defence of this relay's node number. They are [`least_interval`] apart.
     defences: u8,
     /// Earliest time at which a further claim to this relay's node number may be scheduled. This limits the rate of
     /// Claim messages.
     quiet_until: Instant,
     claim_due: bool,
-    /// True if all authentication sessions must be restarted under the new claim number.
+    /// True if all authentication sessions must be restarted with this relay's new claim number.
     sessions_due: bool,
     jitter: Jitter,
 }
@@ -150,8 +150,8 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use the same number. Returns true if that has not been observed for twice `dead_after`,
-    /// and must be reported.
+    /// Records that two nodes use the same number. Returns true, for a report, if this was not observed in the last
+    /// two `dead_after`.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -192,8 +192,8 @@ impl IndexClaims {
         self.last_rival
     }
 
-    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease, and already
-    /// had one when it received the first such frame.
+    /// Records a frame of another node with this relay's number. Returns true if this relay has a lease now, and had
+    /// one at the first such frame.
     fn had_position_before(&mut self, now: Instant, has_lease: bool, settings: &Settings) -> bool {
         let known = self.contest;
         let known = known.filter(|(at, _)| now.since(*at) <= settings.dead_after.times(2));
@@ -202,8 +202,8 @@ impl IndexClaims {
         held && has_lease
     }
 
-    /// Handles a frame that bears this relay's node number. Returns true if this relay becomes passive. `has_lease`
-    /// is true while it has a setpoint and a lease.
+    /// Handles a frame that bears this relay's own node number as its sender. Returns true if this relay becomes
+    /// passive. `has_lease` is true while it has a setpoint and a lease.
     pub(crate) fn handle_frame(
         &mut self,
         now: Instant,
@@ -276,8 +276,7 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim to this relay's node number, unless one was sent a moment ago. The minimum interval is
-    /// [`least_interval`].
+    /// Schedules a claim to this relay's node number, unless one was sent just before ([`least_interval`]).
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);
@@ -302,9 +301,8 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts the claims that this relay sends unprompted. They are needed on point-to-point links without a key, and
-    /// against another active node. On a shared channel a relay receives the frames of another node with its number
-    /// directly.
+    /// Starts periodic claims to this relay's node number. Needed on point-to-point links without a key, and against
+    /// another active node. On a shared channel a relay receives the frames of such a node directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -316,17 +314,17 @@ impl IndexClaims {
         self.passive_until.is_some()
     }
 
-    /// Returns true if a claim to this relay's node number is due, and marks it as sent.
+    /// Returns true if a claim to this relay's node number must be sent now, and marks it as sent.
     pub(crate) const fn poll_claim(&mut self) -> bool {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns the new claim number if all authentication sessions must be restarted with it; else `None`.
+    /// Returns this relay's new claim number if all authentication sessions must be restarted with it. Else `None`.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
 
-    /// Handles expired timers. Returns true if the passive relay becomes active.
+    /// Handles expired timers of the claims to the node number. Returns true if the passive relay becomes active.
     pub(crate) fn handle_timeout(&mut self, now: Instant, settings: &Settings) -> bool {
         if self.passive_until.is_some_and(|until| until <= now) {
             self.activate(now, settings);
@@ -407,8 +405,8 @@ mod tests {
         }
     }
 
-    /// Checks that a claim from before this relay's last start has no effect but a reply. Such a claim does not name
-    /// this relay's current claim number.
+    /// Checks that a claim that names an older claim number of this relay is only answered. It is from before the
+    /// relay's last start.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();
@@ -440,8 +438,7 @@ mod tests {
         }
     }
 
-    /// Checks which of two nodes with one number becomes passive, for all rows of the state table. It tries larger
-    /// and smaller claim numbers, with and without a lease, and each epoch and state of the other node.
+    /// Checks which of two nodes with one number becomes passive, for all rows of the state table.
     #[test]
     fn the_smaller_claim_becomes_passive_unless_a_lease_raises_it() {
         let settings = Settings::default();
@@ -479,8 +476,8 @@ mod tests {
         }
     }
 
-    /// Checks that a relay raises its claim only if it had a position before it met its duplicate. After 40 s of
-    /// silence the next contact counts as the first one.
+    /// Checks that a relay raises its claim number only if it had a position before it met its duplicate. After 40 s
+    /// of silence the next contact counts as the first one.
     #[test]
     fn a_position_after_the_first_contact_raises_no_claim() {
         let settings = Settings::default();
@@ -575,8 +572,8 @@ mod tests {
         assert!((200..=245).contains(&sent), "{sent} in an hour");
     }
 
-    /// Checks that a relay repeats its claim for four seconds after a claim of its active duplicate. It stops early
-    /// once the duplicate is passive.
+    /// Checks that a relay repeats its claim to its number for 4 s after a claim of an active duplicate. It stops
+    /// early once the duplicate is passive.
     #[test]
     fn an_index_is_defended_for_4_s_or_until_the_other_is_passive() {
         let settings = Settings::default();

@@ -21,7 +21,7 @@ pub(crate) const FIRST_PATIENCE: Duration = PATIENCE;
 
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
-/// Message that is handed on, and the side of its destination.
+/// Telemetry message to be forwarded to the other neighbour, with that neighbour's side. `None` if there is none.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting([Option<(Side, Message)>; cfg!(feature = "auth") as usize]);
 

@@ -37,7 +37,7 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
 
-/// Nonce in this relay's hellos, with the times of its first and last use; 0 stands for no nonce.
+/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0 stands for none.
 ///
 /// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
 #[derive(Clone, Copy, Debug)]
@@ -54,13 +54,13 @@ struct Offering {
     nonce: u16,
     /// Time at which the neighbour's last hello was received; `None` before any.
     heard: Option<Instant>,
-    /// True if a mission offer to the neighbour is pending.
+    /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
     /// Time at which the offer to the neighbour is sent again; `None` if it is not sent again.
     at: Option<Instant>,
-    /// Number of offers sent since the last change of the mission or of the neighbour.
+    /// Number of mission offers sent since the mission or the neighbour last changed.
     tries: u8,
-    /// True if a hello to the ground station is pending.
+    /// True if a hello to the ground station on this side is pending.
     reports: bool,
     /// Number of the ground station's request for the uploaded mission; 0 if there is no such request. The reply
     /// repeats the number.
@@ -79,10 +79,10 @@ impl Offering {
     };
 }
 
-/// Result of handling an offered mission.
+/// Result of handling a mission that a neighbour has offered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Offered {
-    /// The mission is newer and has been stored.
+    /// The offered mission is newer than the stored one, and has been stored.
     Stored,
     /// The mission is rejected: it does not fit the positions of Tx and Rx, the geofence or the settings. `is_new` is true at the
     /// first rejection of this mission.
@@ -91,9 +91,9 @@ pub(crate) enum Offered {
     Passed,
 }
 
-/// Time until the first repetition of a mission offer, in hop times.
+/// Wait before a mission offer is first repeated, in hop times.
 const OFFER_HOPS: u32 = 4;
-/// Number of mission offers that are sent at the same interval, before that interval doubles.
+/// Number of mission offers after which the interval between them doubles.
 const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
@@ -101,13 +101,13 @@ const OFFERS: u8 = 16;
 /// Missions that one relay has stored, and its offers of the newest one to its neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
-    /// Identifier of the newest stored mission.
+    /// Identifier of the newest mission that this relay has stored.
     latest: MissionId,
-    /// State of the uploads: one element with the feature `upload`, none without it.
+    /// State of the mission uploads; the array is empty without the feature `upload`.
     uploads: [Uploads; UPLOAD as usize],
 }
 
-/// State of mission uploads, which only relays with the feature `upload` have.
+/// State of mission uploads, which only builds with the feature `upload` have.
 #[derive(Clone, Copy, Debug)]
 struct Uploads {
     /// Newest mission that was uploaded to this relay; `None` if it has only the one loaded before flight.
@@ -117,19 +117,21 @@ struct Uploads {
     sites: Option<Sites>,
     /// Distance from Tx to Rx of the mission loaded before flight, m.
     loaded_m: f32,
-    /// Range of altitudes of the mission loaded before flight, m, including the common altitude.
+    /// Range of altitudes in the mission loaded before flight, m. It includes the permitted range and the common
+    /// altitude.
     loaded_band: Band,
     /// Identifier of the last mission that a relay has refused; `None` if there is none. It was refused by this
     /// relay, a neighbour, or a relay that is farther away.
     refused: Option<MissionId>,
-    /// Present nonce in this relay's hellos, and the previous one. A mission offer must repeat one of the two.
+    /// Current nonce (random number) in this relay's hellos, and the previous one. A mission offer must repeat one of
+    /// them.
     asked: [Asked; 2],
-    /// State of the mission offers toward Tx and toward Rx.
+    /// State of the mission offers to the two neighbours: toward Tx, and toward Rx.
     offering: [Offering; 2],
     jitter: Jitter,
 }
 
-/// Returns true if uploads are accepted, which requires signed frames.
+/// Returns true if this relay accepts uploaded missions. Its frames must be signed.
 pub(crate) const fn accepts_uploads(member: &Member) -> bool {
     UPLOAD && member.settings.auth.is_some()
 }
@@ -195,7 +197,8 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if this relay has sent a hello with the nonce `answer` within twice `dead_after`.
+    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. Recent is within the last
+    /// two `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -225,7 +228,7 @@ impl MissionUpdate {
         }
     }
 
-    /// Allows all repetitions of an offer at `side` again, because the mission or the neighbour is new.
+    /// Resets the count of offers to the neighbour at `side`, because the mission or the neighbour is new.
     pub(crate) fn reset_offers(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.tries = 0;
@@ -283,7 +286,7 @@ impl MissionUpdate {
     }
 
     /// Schedules replies to the ground station at `side`. It is sent a hello if `reports` is true, and the stored
-    /// upload if `asks` has the number of the station's request.
+    /// upload if `asks` has a request's number.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -311,8 +314,8 @@ impl MissionUpdate {
         refused.filter(|refused| *refused >= self.latest && *refused != active)
     }
 
-    /// Records that a neighbour reports mission `refused` as refused. Returns true if it is the stored mission, and
-    /// was not known to be refused.
+    /// Records a neighbour's report that the mission `refused` is refused. Returns true if this is the stored
+    /// mission, and news.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
@@ -428,7 +431,7 @@ impl MissionUpdate {
     }
 }
 
-/// Methods for the line from Tx to Rx, along which the x of the active mission is measured.
+/// Methods for the Tx and Rx positions of the active mission, which define its x axis.
 impl MissionUpdate {
     /// Returns the positions of Tx and Rx that the active mission has of its own. `None` if the configured positions
     /// apply.
@@ -436,7 +439,7 @@ impl MissionUpdate {
         self.uploads()?.sites
     }
 
-    /// Returns the digest by which two relays check that they use the same x axis (line from Tx to Rx).
+    /// Returns a digest of the Tx and Rx positions. Relays compare it to check that they use the same x axis.
     pub(crate) fn line_digest(&self, member: &Member) -> u16 {
         between(member.digest, self.sites())
     }

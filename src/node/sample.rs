@@ -10,8 +10,8 @@ use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
 
-/// True with the feature `field` (known distribution of interference along x). Without it `Settings::measure` is
-/// rejected, and the code is unreachable.
+/// True with the feature `field` (interference as a known distribution along x). If false, `Settings::measure` is
+/// rejected.
 const FIELD: bool = cfg!(feature = "field");
 
 /// Measurement of a relay or of a ground station, which the firmware gives to the relay.
@@ -21,7 +21,7 @@ pub enum Sample {
     /// Interference power at a relay's setpoint, for a mission with an interference field. A field is a known
     /// distribution of the interference along x.
     Interference {
-        /// Received power, W: above 0, at most `Measure::i_max_w`.
+        /// Received interference power, W: above 0, at most `Measure::i_max_w`.
         power_w: f32,
     },
     /// Mean interference power at a position, for the estimate of an unknown interferer.
@@ -50,7 +50,7 @@ pub enum Sample {
     },
     /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from it.
     FirstHop {
-        /// Linear SIR, above 0.
+        /// Signal-to-interference ratio (SIR), linear, above 0.
         sir: f32,
     },
 }
@@ -115,7 +115,7 @@ impl Meter {
         used
     }
 
-    /// Discards the samples, because the relay moves.
+    /// Discards the samples averaged so far, because the relay moves.
     pub(crate) fn restart(&mut self) {
         if let Some((estimator, _)) = &mut self.estimator {
             estimator.clear();

@@ -12,7 +12,7 @@ use crate::time::{Duration, Instant};
 /// plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// True with the feature `guard`; without it no setpoint is limited.
+/// True with the feature `guard` (collision avoidance); without it no setpoint is limited.
 const GUARD: bool = cfg!(feature = "guard");
 
 /// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
@@ -22,11 +22,11 @@ pub(crate) struct Steering {
     remind_at: Option<Instant>,
     /// Setpoint last reported to the firmware; `None` if there was no setpoint.
     reported_setpoint: Option<Placement>,
-    /// Way to a new agreed position in steps. Empty without the feature `departures`.
+    /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
     way: [Way; RESPACING as usize],
 }
 
-/// Number of steps of a motion to a new agreed position, as a power of two.
+/// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
 /// True with the feature `departures`; without it setpoints do not move in steps.
@@ -41,13 +41,13 @@ struct Motion {
     at: Instant,
 }
 
-/// Way to a new agreed position, so that all relays of a chain arrive at the same time.
+/// Stepwise motion of the setpoint to a new agreed position. All relays of a chain thus arrive at the same time.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position of the last call, and the place to fly to now, which moves there in steps.
+    /// Agreed position at the last call, and the present place to fly to, which approaches it in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
-    /// Motion to the agreed position; `None` at the position.
+    /// Motion to the agreed position; `None` once the place to fly to is there.
     motion: Option<Motion>,
 }
 
@@ -58,7 +58,7 @@ impl Way {
         motion: None,
     };
 
-    /// Moves the place to fly to by the steps that are due on the way to the position `agreed`. Returns it.
+    /// Moves the place to fly to by the steps that are due toward the position `agreed`, and returns it.
     fn advance(
         &mut self,
         now: Instant,
@@ -255,9 +255,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint, because these have left the air. `others`
-    /// is true if the view has relays at that side that are not lost. If none of these was received, the guard keeps
-    /// clear of all x beyond the relay's own on that side.
+    /// Removes the limits that lost relays at `side` put on the setpoint. They are no longer in the air. `others` is
+    /// true if other relays of the view at that side are not lost. If none of these was received, the guard does not
+    /// move toward that side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -268,7 +268,7 @@ impl Steering {
         self.guard.as_ref().filter(|_| GUARD)?.hold_reason(side)
     }
 
-    /// Returns the agreed position of the neighbour at `side`; `None` while unknown or without a guard.
+    /// Returns the agreed position of the neighbour at `side`. `None` while it is unknown, and without a guard.
     pub(crate) fn neighbour_place(&self, side: Side) -> Option<Placement> {
         self.guard.as_ref().filter(|_| GUARD)?.neighbour_place(side)
     }

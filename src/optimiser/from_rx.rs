@@ -31,7 +31,7 @@ use crate::mission::{Interferer, Mission};
 use crate::place::Station;
 use crate::sir::{Sender, square};
 
-/// Hop from Rx to the last relay: the first hop of the traffic from Rx to Tx.
+/// Hop from Rx to the last relay: the first hop of data from Rx to Tx.
 pub(super) struct FromRx {
     /// Hop from Rx in a mirrored frame: x is the distance from Rx.
     hop: Hop,
@@ -98,8 +98,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay is placed farther from Rx, at an x at which it receives Rx well enough. At x = 650
-    /// m, where the search begins, a strong interferer at x = 700 m prevents that. Rx is at x = 1000 m.
+    /// Checks that the last relay is placed farther from Rx if it otherwise receives Rx too weakly. At x = 650 m,
+    /// where the search begins, a strong interferer at x = 700 m prevents that. Rx is at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

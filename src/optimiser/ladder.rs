@@ -11,18 +11,18 @@ use crate::root::sqrt;
 /// Number of target SIRs in a full ladder, the set of targets that one sweep along the chain tries.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between neighbouring targets in half of a full ladder, including the middle gap.
+/// Number of gaps between targets in half of a full ladder (list of targets), including the middle gap.
 const HALF: usize = TARGETS / 2;
 
-/// Ladder: target SIRs (linear, rising) that the relays try in one pass along the chain (a sweep). They are encoded
-/// as one target and two one-byte codes.
+/// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
+/// one-byte codes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
     /// Target SIR just below the middle gap of the list, or the only target of a list of one.
     anchor: f32,
-    /// Code of the relative width of the middle gap between two targets, 3e-8 to 120. It is a float of 5 exponent and
-    /// 3 mantissa bits. Code 0: `anchor` is the only target.
+    /// Code of the width of the middle gap between two targets, relative to the lower one. It is a float of 5
+    /// exponent and 3 mantissa bits. Code 0: `anchor` is the only target.
     gap: u8,
     /// Code of the growth of the gaps between targets from the middle of the list to its ends. Each gap is 1 +
     /// `growth` / 16 times the next one toward the middle.
@@ -33,8 +33,8 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// Returns a list (ladder) of one target SIR, above 0. The last relay commits the chain to it if the chain meets
-    /// it.
+    /// Returns a ladder (list of targets) with the single SIR `target`, above 0. The last relay commits the chain to
+    /// it if it is met.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -44,14 +44,14 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets for a pass that is plain if `plain` is true. In a plain pass every relay takes the
-    /// farthest x that meets the target.
+    /// Returns the same targets, for a plain pass if `plain` is true. In it every relay takes the farthest x that
+    /// meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In other passes
-    /// a relay may stay short of that x for the sake of the next relay on the pass.
+    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In others a
+    /// relay may stay short of it to help the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
@@ -171,9 +171,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the span of half a ladder: its highest target over the lower of its two middle targets. The other half,
-/// from the higher middle target down to the lowest target, has the same span. `gap` and `growth` are the codes in a
-/// [`Ladder`].
+/// Returns the highest target of a ladder over the lower of its two middle targets. The other half has the same
+/// ratio. `gap` and `growth` are the codes in a [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -188,13 +187,13 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the width of a gap from its one-byte `code`: (1 + m / 8) 2^(e - 25). m are its low three bits, e the other
-/// five; they become mantissa and exponent bits of an f32.
+/// Returns the relative width of the gap between two targets. It is (1 + m / 8) 2^(e - 25), encoded by the byte
+/// `code`. m are the low three bits, e the other five.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// Returns the code of the representable gap nearest to `gap`, within 1 to 254.
+/// Returns the one-byte code, 1 to 254, of the gap width that is nearest to `gap`.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

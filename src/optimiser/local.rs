@@ -28,8 +28,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x on each side of the interferer, at whose ends hops are evaluated. All are at one
-/// altitude. Only for traffic in both directions.
+/// Number of equal intervals on each side of the interferer at whose ends the search evaluates hops. For traffic in
+/// both directions only.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -38,15 +38,15 @@ const ROUNDING: f32 = 3e-7;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
-    /// Search from coarse to fine altitudes. At most 1080 evaluations of both hops; for traffic in both directions
-    /// 8730.
+    /// Coarse-to-fine search over altitudes. It takes at most 1080 evaluations of both hops, 8730 with traffic in
+    /// both directions.
     #[default]
     Fine,
-    /// Search on the paper's grid of positions: `columns` by `rows` evaluations of both hops.
+    /// Search on the paper's grid of positions, with `columns` times `rows` evaluations of both hops.
     Grid {
         /// Number of positions of the grid along x, including those of the neighbours, 2 to 255.
         columns: u8,
-        /// Number of altitudes of the grid, 2 to 255.
+        /// Number of altitudes (rows) in the grid of candidate positions, 2 to 255.
         rows: u8,
     },
 }
@@ -58,7 +58,7 @@ pub struct HopEnd {
     pub place: Placement,
     /// Minimum distance between the neighbour and the relay that searches, m.
     pub apart_m: f32,
-    /// Transmit power of the neighbour, W.
+    /// Transmit power of the neighbouring node, W.
     pub power_w: f32,
 }
 
@@ -72,7 +72,7 @@ pub struct HopEnd {
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the hop from the node toward Tx. Its SIR is A times inverse interference over squared length.
+    /// Gain A of the hop from the previous node. The hop's SIR is A times inverse interference over squared length.
     gain: f32,
     /// SIR of the relay's signal at the next node toward Rx, times the squared length of the hop, m^2.
     received: f32,
@@ -126,8 +126,8 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the hops of a relay of `power_w` watts. `before` is the previous node, `None` for Tx; `after` is the
-    /// next one, `None` for Rx.
+    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx (`None` for Tx itself),
+    /// `after` the node toward Rx (`None` for Rx).
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -210,16 +210,16 @@ pub struct LocalSearch {
     hops: Hops,
     bottom_m: f32,
     top_m: f32,
-    /// Lowest altitude that the current round of the search tries, m.
+    /// Lowest altitude that the current round of the coarse-to-fine search tries, m.
     low_m: f32,
-    /// Highest altitude that the current round of the search tries, m.
+    /// Highest altitude that the current round of the coarse-to-fine search tries, m.
     high_m: f32,
     round: u8,
     row: u8,
     column: u8,
     /// Best altitude of the current round, m, and the SIR of the worse hop there.
     best_row: (f32, f32),
-    /// Best position found if it is better than the current position; `None` otherwise.
+    /// Best position found so far if it is better than the relay's current position; else `None`.
     found: Option<Placement>,
     /// Linear SIR of the worse hop at the position found, or at the current position if none is better.
     best_sir: f32,
@@ -296,8 +296,8 @@ impl LocalSearch {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
 
-    /// Searches the next altitude of the search from coarse to fine. Returns the number of evaluations that this
-    /// took, or `None` after the last round.
+    /// Searches the best x at the next altitude of the coarse-to-fine search. Returns the number of evaluations, or
+    /// `None` after the last round.
     fn fine(&mut self) -> Option<u16> {
         if self.row >= ROWS {
             let (h, _) = self.best_row;

@@ -22,7 +22,6 @@ pub mod reverse;
 pub mod search;
 pub mod spacing;
 
-/// List with one number for each target SIR of a pass along the chain: x, slack, or target. The x is the farthest one
-/// at which a relay meets the target, m. The slack is the maximum length of a chain that meets the target, less the
-/// distance from Tx to Rx, m.
+/// List with one number per target SIR of a pass along the chain. The numbers are the targets, a relay's farthest x,
+/// or the spare lengths at Rx, m.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

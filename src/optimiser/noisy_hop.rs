@@ -38,19 +38,18 @@
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum ratio of a hop's target SIR and gain. With a larger ratio no hop is short enough to meet the target; up to
-/// it, all numbers of the computation are finite.
+/// Maximum ratio of a hop's target SIR to its gain; with a larger one no hop is short enough. The limit keeps all
+/// numbers finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
-/// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual; near
-/// a double root each halves the error.
+/// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
 const STEPS: u8 = 32;
 
 /// Maximum number of steps of a search by bisection, each of which at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
-/// Number of Newton steps for the hop length at which the margin g changes its curvature. g is the margin of a hop
-/// with noise: 0 or above where the target is met. The worst case is exact to an f32 after four.
+/// Number of Newton steps for the hop length at which the margin g changes its curvature. g is 0 or above where a hop
+/// with noise meets its target.
 const TURNS: u8 = 5;
 
 /// Rounding error of the margin of a hop with noise, relative to what the target requires. A target that is missed by
@@ -90,7 +89,7 @@ impl NoisyHop {
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
-    /// Returns true if the target is met with the receiver `d` metres from the sender along x.
+    /// Returns true if the hop meets its target with the receiver `d` metres from the sender along x.
     pub(super) fn is_met(&self, d: f32) -> bool {
         let s = square(d - self.ahead) + self.aside_squared;
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
@@ -220,7 +219,7 @@ impl NoisyHop {
     }
 }
 
-/// Returns `x_m` - `d`, rounded so that it is at least `d` from `x_m`.
+/// Returns `x_m` - `d`, m, rounded down so far that the result is at least `d` below `x_m`.
 pub(super) fn before(x_m: f32, d: f32) -> f32 {
     let place = x_m - d;
     if x_m - place < d {

@@ -23,27 +23,26 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions at which the last relay tries to receive Rx well enough. Only for traffic in both
+/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only for data in both
 /// directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of points of an interference field that are evaluated per call. It limits the number of targets per
-/// call, which is at least one.
+/// Maximum number of points of an interference field that one call evaluates. One target may need more.
 const POINTS_AT_ONCE: usize = 128;
 
-/// Relay from which a pass along the chain arrives, as its message describes it.
+/// Previous relay of a pass along the chain, as its message describes it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Behind {
-    /// Lateral offset, altitude and power of that relay.
+    /// Lateral offset, altitude and power of the previous relay.
     pub relay: Station,
-    /// Upsilon, the mean inverse interference power, measured at that relay, 1/W. `None` to use the mission's
-    /// interference field. Only passes toward Tx use it.
+    /// Upsilon, the mean inverse interference power that the previous relay has measured, 1/W. `None` to use the
+    /// mission's interference field. Only passes toward Tx use it.
     pub measured_per_w: Option<f32>,
 }
 
 impl Behind {
-    /// Returns a sending relay with this altitude and power, above the line Tx-Rx. It has no measured interference.
+    /// Returns a previous relay with this altitude and power, above the line, without a measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -56,13 +55,13 @@ impl Behind {
 /// the farthest x, in the direction of the pass, that meets the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
-    /// Mission of the chain.
+    /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
     /// Relay from which the pass arrives; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
     pub index: u16,
-    /// Lateral offset, altitude and power of the relay.
+    /// Lateral offset, altitude and transmit power of this relay.
     pub own: Station,
     /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
     /// interference field.
@@ -229,7 +228,7 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay that lets it take the smallest x. The hop's receiver is at x from `low` to
+    /// Returns the hop from this relay for which its own x can be smallest. The hop's receiver is at x from `low` to
     /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
@@ -430,13 +429,13 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of one pass of target SIRs along the chain (a sweep): slacks, and a target to commit. The slack for a
-/// target is the maximum length of a chain that meets it, less the distance from Tx to Rx. It is below 0 if the
-/// target is missed.
+/// Result of a sweep: slacks, and the target that the chain commits to, if any. A sweep is one pass of target SIRs
+/// along the chain. The slack for a target is the maximum length of a chain that meets it, less the distance from Tx
+/// to Rx. It is below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index of the target that the relays are to use; `None` if the search goes on. It is an index in the pass's
-    /// list of targets (ladder). The relays then take their positions for that target.
+    /// Index, in the pass's list of targets, of the target that the relays commit to. They then take their positions
+    /// for it. `None` if the search goes on.
     pub commit: Option<u8>,
     /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
     /// meets the target.
@@ -444,7 +443,8 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the result of a pass of `ladder`. `slacks` are the chain's spare lengths for its `targets`.
+    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's spare lengths for its
+    /// `targets`.
     ///
     /// The highest target that is met is committed in two cases. The next higher one is missed and within the
     /// mission's tolerance of it. Or the ladder has no other target, as in the paper's Algorithm 1.
@@ -510,8 +510,8 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reach of every relay, and calls `visit` with each relay's index and reach, m. A reach is the
-    /// farthest x in the direction of the pass at which the relay meets the target.
+    /// Computes the reach of every relay, and calls `visit` with its index and reach, m. A reach is the farthest x in
+    /// the direction of the pass at which the relay meets the target.
     ///
     /// Returns the chain's spare length and the x of the last relay, m; `None` if a hop cannot meet the target. The
     /// spare length is the maximum length of a chain that meets the target, less the distance from Tx to Rx. It is

@@ -10,8 +10,8 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR on which the chain has agreed, with the list of targets (ladder) that contained it. The ladder is that
-/// of the last pass along the chain.
+/// Target SIR on which the chain has agreed. It has also the list of targets (ladder) of the last pass, which
+/// contained it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
@@ -19,7 +19,7 @@ pub struct Agreed {
     pub ladder: Ladder,
     /// Index of the committed target SIR in the ladder, the list of targets.
     pub commit: u8,
-    /// Committed target, linear SIR.
+    /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
     /// Upper bound, linear: no chain at these altitudes meets this target SIR. `None` with the paper's fixed step,
     /// whose passes do not try all chains, and for traffic in both directions.
@@ -28,8 +28,8 @@ pub struct Agreed {
     pub sweeps: u32,
 }
 
-/// Solver for a whole chain in one program, without messages. It computes a few hops per call. Its size does not
-/// depend on N.
+/// Solver for the positions of a whole chain in one program, without messages between relays. It computes a few hops
+/// per call. Its size does not depend on N, the number of relays.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
@@ -162,8 +162,8 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for `target`; `None` if some relay has none. `plain` is true if every relay
-/// must take the farthest x that meets the target.
+/// Returns the position of relay `index` for the target SIR `target`. `None` if some relay has no position. `plain`
+/// is true if every relay must take the farthest x that meets the target.
 fn placed(
     mission: &Mission,
     target: f32,

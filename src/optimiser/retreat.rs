@@ -59,7 +59,7 @@ use crate::sir::{Sender, square};
 /// Relative rounding error by which the squared length of a backward hop may exceed its maximum.
 const ROUNDING: f32 = 4e-6;
 
-/// Number of f32 steps by which a computed hop is shortened, at most, until it meets its target.
+/// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.
 const ULPS: u8 = 8;
 
 /// Hop toward Rx in an interference field, from which a pass toward Tx computes the sender's x. It is prepared for
@@ -70,15 +70,15 @@ pub struct Retreat<'a> {
     /// receiver over the field's largest Upsilon, with the interference power I. For the hop to Rx A includes Upsilon
     /// at Rx, and `quiet` is 1.
     gain: f32,
-    /// Squared difference in altitude of sender and receiver, m^2.
+    /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x that the hop's sender may take, m.
+    /// Smallest x that the sender of this hop may take, m from Tx.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from the receiver to the sender; `None` for traffic in one direction. Its gain is for the field's
-    /// largest Upsilon = E[1/I], divided by r, the required ratio of backward to forward SIR. The second value is the
-    /// interference at the sender.
+    /// Backward hop from the receiver to the sender, and the interference at the sender. `None` for data in one
+    /// direction. Its gain is for the field's largest Upsilon = E[1/I], divided by r, the required ratio of backward
+    /// to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
@@ -241,7 +241,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the x of [`Retreat::reach`] for the traffic toward Rx only; `None` if there is none.
+    /// Returns the x of [`Retreat::reach`] for data toward Rx only; `None` if there is none.
     fn onward(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let room = from_m - self.end_m;
         if room < self.least_step {
@@ -285,7 +285,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the hop of [`Retreat::longest`] for both directions. `there` is that for the traffic toward Rx only.
+    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the one for data toward Rx
+    /// only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,
@@ -347,7 +348,7 @@ impl<'a> Retreat<'a> {
         Some(from_m)
     }
 
-    /// Returns the hop with the smallest [`sender`](Self::sender) among the receivers of [`least`].
+    /// Returns the hop with the smallest x of its sender, by the search of [`least`] over the receiver's x.
     #[inline(never)] // one copy for both directions and for one
     fn searched(
         &self,
@@ -404,13 +405,13 @@ impl<'a> Retreat<'a> {
 /// Hop along the line: the x of its receiver and the x of its sender.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Step {
-    /// x of the hop's receiver, m.
+    /// x of the receiver of this hop, m from Tx.
     pub to_m: f32,
-    /// x of the hop's sender, m.
+    /// x of the sender of this hop, m from Tx.
     pub from_m: f32,
 }
 
-/// Interference at the receiver of a hop, as a function of its x.
+/// Interference at a hop's receiver, as a function of the receiver's x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
     /// Same interference at every x, as measured. The value is Upsilon, the mean inverse interference power, over the
@@ -432,7 +433,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the ratio of Upsilon at `x_m` to the largest Upsilon of the interference field. Upsilon is the mean
+    /// Returns Upsilon at `x_m` as a fraction of the largest Upsilon of the interference field. Upsilon is the mean
     /// inverse interference power, E[1/I].
     pub fn quiet(self, x_m: f32) -> f32 {
         match self {
@@ -468,13 +469,14 @@ impl<'a> HopInterference<'a> {
 /// Part of the line in which Upsilon = E[1/I], the mean inverse interference power, is linear in x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
-    /// Smallest x, m.
+    /// Smallest x of this part of the interference field, m.
     start_m: f32,
-    /// Largest x, m.
+    /// Largest x of this part of the interference field, m.
     end_m: f32,
-    /// Upsilon at the smallest x over the field's largest Upsilon.
+    /// Upsilon at the part's smallest x, as a fraction of the field's largest. Upsilon is the mean inverse
+    /// interference power.
     level: f32,
-    /// Change of `level` per metre.
+    /// Change of `level` per metre of x.
     slope: f32,
 }
 

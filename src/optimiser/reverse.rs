@@ -48,7 +48,7 @@ use crate::place::CrossSection;
 use crate::root::sqrt;
 use crate::sir::{in_noise, square, transmitter_gain};
 
-/// Maximum squared length of a hop in the computation, m^2, which prevents infinite numbers.
+/// Limit of the squared length of a hop in the computation, m^2, so that no number becomes infinite.
 const MOST_SQUARED: f32 = 1e18;
 
 /// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
@@ -97,8 +97,8 @@ impl Back {
         })
     }
 
-    /// Returns SIR / r of a backward hop received at `x_m`, times its squared length, m^2. r is the required ratio of
-    /// backward to forward SIR. Divided by a target, the result is the hop's maximum squared length.
+    /// Returns SIR / r of a backward hop received at `x_m`, multiplied by its squared length, m^2. r is the required
+    /// ratio of backward to forward SIR. Divided by a target, the result is the hop's maximum squared length.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;

@@ -39,7 +39,7 @@ pub enum Schedule {
     },
 }
 
-/// Error: the chain meets no target SIR above 1e-12 of its upper bound.
+/// Error: the chain meets no target SIR above 1e-12 of the upper bound.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Infeasible;
@@ -57,8 +57,8 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation at which the cubic one is used. It is a fraction of the gap
-/// between two targets. Both interpolate the target at which the chain's spare length is 0.
+/// Maximum difference of cubic and linear interpolation up to which the cubic one is used. It is a fraction of the
+/// gap between two targets. Both yield the target at which the chain has no spare length.
 const BEND: f32 = 0.25;
 
 /// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. The bracket is the
@@ -77,7 +77,7 @@ pub struct Search {
     tolerance: f32,
     /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
     ceiling: f32,
-    /// First target of the fixed-step schedule, and upper bound of the bracketed one: the paper's gamma_0.
+    /// First target of the fixed-step schedule, and upper bound of the bracketed one: gamma_0 of the paper.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
@@ -92,8 +92,8 @@ pub struct Search {
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,
-    /// Bisection for a target that all relays accept. `None` until a relay has refused the position that the next
-    /// relay requires.
+    /// Bisection for a target that all relays accept. `None` until a relay has refused a target, because it cannot
+    /// take its required position.
     trials: Option<StandTrials>,
     /// True for a mission with traffic in both directions.
     both_ways: bool,
@@ -371,7 +371,7 @@ impl Search {
         targets.get(usize::from(due)).copied()
     }
 
-    /// Records that all relays accepted `target`; returns true if the search is over.
+    /// Records that all relays accepted the target SIR `target`; returns true if the search is over.
     pub fn accept(&mut self, target: f32) -> bool {
         let own = Ladder::single(target).plainly(self.plain);
         let Some(trials) = &mut self.trials else {

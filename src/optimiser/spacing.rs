@@ -46,14 +46,14 @@ use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position that a relay requires of the previous relay of the pass, for its hop to meet the target.
+/// Position of the previous relay that lets this relay's hop meet the target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
-    /// Previous node required at its farthest x that meets the target. Also returned for Tx and Rx, which cannot
+    /// The previous node must take its farthest x that meets the target. Also returned for Tx and Rx, which cannot
     /// move.
     AtReach,
-    /// Previous relay required at this x, m, which is short of its farthest x that meets the target.
+    /// The previous relay must take this x, m, which is short of its farthest x that meets the target.
     At(f32),
 }
 
@@ -82,10 +82,10 @@ pub struct Hop {
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
-    /// Maximum x that the hop's receiver may take, m.
+    /// Largest x that the receiver of this hop may take, m from Tx.
     end_m: f32,
-    /// Maximum x of the receiver and maximum x of the sender, m. Each leaves enough space for the minimum separation
-    /// of the relays from there to Rx.
+    /// Maximum x of the receiver and of the sender, m. They leave the relays from there to Rx their minimum
+    /// separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
@@ -360,7 +360,7 @@ impl Hop {
         (self.before(place) >= 0.0).then_some(place)
     }
 
-    /// Returns the largest x, m, of a sender that keeps the minimum step before a receiver at `place`.
+    /// Returns the largest x, m, at which a sender keeps the minimum separation from a receiver at `place`.
     fn before(&self, place: f32) -> f32 {
         let from = place - self.least_step;
         if place - from < self.least_step || from >= place {
@@ -475,8 +475,8 @@ impl Hop {
 /// Relative rounding error by which a hop's SIR may be below its target when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns the sum `from_m` + `d`, rounded toward `from_m`; `None` if that equals `from_m`. Two relays must never
-/// have the same x.
+/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if that equals `from_m`, since two relays must not
+/// share an x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -492,7 +492,7 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
     (place > from_m).then_some(place)
 }
 
-/// Returns the maximum distance along x, m, from which a relay meets `target` at Rx (`d_max`).
+/// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
 ///
 /// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared
 /// distance), gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above
@@ -505,7 +505,7 @@ pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<
 }
 
 impl Hop {
-    /// Returns true for a hop without noise, and with traffic toward Rx only.
+    /// Returns true for a hop without noise in a chain that carries data toward Rx only.
     pub(super) fn is_simple(&self) -> bool {
         self.is_silent() && self.back().is_none()
     }

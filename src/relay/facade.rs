@@ -759,7 +759,7 @@ impl Relay {
         self.node.stay(now);
     }
 
-    /// Returns the state of this relay's departure at `now`. Takes constant time.
+    /// Returns the state of this relay's departure from the chain at `now`. Takes constant time.
     #[cfg(feature = "departures")]
     pub fn departure(&self, now: Instant) -> Departure {
         self.node.departure(now)

@@ -10,7 +10,7 @@ use crate::wire::frame::{FrameBuf, Opened};
 use crate::wire::message::Message;
 use crate::wire::session::{Checked, Rival, Sender, Session};
 
-/// Number of heartbeat requests to a silent neighbour after which a handshake requests a reply.
+/// Number of unanswered heartbeat requests to a neighbour after which a handshake requests a reply.
 ///
 /// The reply shows if the neighbour has mistaken another node with this relay's number for this relay.
 const QUESTIONS: u16 = 4;
@@ -182,7 +182,7 @@ pub(super) fn poll_transmit(
     endpoint.transmit(to, &message, frame, node.stats_mut())
 }
 
-/// Schedules a handshake to node `to` if `message` to that node makes one necessary.
+/// Schedules a handshake to node `to` if `message`, which is sent to it, makes one necessary.
 fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Message) {
     if let Message::Heartbeat { request: ask, .. } = message
         && *ask != 0

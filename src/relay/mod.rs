@@ -29,7 +29,7 @@ pub enum Port {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmit {
-    /// Port to send through.
+    /// Port (serial link or radio) through which the frame must be sent.
     pub port: Port,
     /// Length in bytes, delimiter included; at most [`MAX_FRAME`](crate::wire::frame::MAX_FRAME).
     pub len: usize,

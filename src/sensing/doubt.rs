@@ -45,22 +45,20 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of the measurements' errors, in units of the variance that the operator expects. With a larger
-/// variance the search for a faulty relay starts.
+/// Maximum variance of the measurements' errors, over the variance that the operator expects. Above it the search for
+/// a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Square of the deviation, in standard deviations, from which on a measurement shows a faulty relay. The exclusion
-/// of that relay has to reduce the fit's residual by at least this many variances. A relay that checks its own
-/// measurements uses the same limit.
+/// Squared deviation, in variances, from which on a measurement shows a faulty relay. The exclusion of that relay
+/// must reduce the fit's residual by as much.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit to all measurements for which a faulty relay is searched. The exclusion of the faulty
-/// relay has to lower the residual by at least as much. A measurement that is wrong by some 15 % causes this
-/// residual.
+/// Minimum residual of the fit to all measurements for which a faulty relay is searched. The residual is the sum of
+/// squared relative errors. A measurement that is wrong by some 15 % causes it.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio that singles out one faulty relay: the second smallest variance over the smallest. Each is the
-/// variance of a fit that excludes one relay. With a smaller ratio it remains unknown which relay is faulty.
+/// Minimum ratio of the second smallest variance to the smallest that singles out one faulty relay. Each is the
+/// variance of a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
 /// Maximum variance of a fit whose measurements count as consistent with each other. It is the variance of the
@@ -79,12 +77,12 @@ const AGAIN: (f64, f64) = (25.0, 0.1);
 /// any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions with which a faulty relay can be found ([`Sums::count`]). Older ones count
-/// less.
+/// Minimum number of measured positions ([`Sums::count`]. Older ones count less) with which a faulty relay can be
+/// found.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. With a larger ratio the
-/// rounding of the sums hides that relay's measurement.
+/// Maximum ratio of the mean weight of all positions to that of one relay's position. Above it rounding hides that
+/// relay's measurement in the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -109,16 +107,16 @@ pub(crate) struct Trial {
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
-    /// Residual of the fit without the node `best`: the sum of the squared relative errors.
+    /// Residual of the fit without the node `best`: sum of the squared relative errors.
     seen_best: f32,
-    /// Smallest variance of the relative errors among the fits that each exclude one node. It belongs to the fit that
-    /// excludes the node `best`.
+    /// Smallest variance of relative errors among the fits that each leave out one node. It is that without the node
+    /// `best`.
     least: f32,
-    /// Second smallest variance of the relative errors among the fits that each exclude one node.
+    /// Second smallest variance of relative errors among the fits that each leave out one node.
     second: f32,
 }
 
-/// Use of the measurements that were just collected, as the search for a faulty relay decides.
+/// Use to be made of the measurements just collected, as decided by the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the measurements of this sensing pass for the interference estimate.
@@ -140,7 +138,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node that the next collection of measurements leaves out, 0 for none.
+    /// Node whose measurements the next collection along the chain leaves out; 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Normal => 0,
@@ -237,8 +235,7 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Ratio of a relay's measurement to the estimate, or its inverse, above which the relay checks itself. Such a
-/// measurement has so little weight in the sums that the leader's search would not find it.
+/// Ratio of a relay's measurement to the estimate, or its inverse, above which the relay checks itself.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if the measurement at `place` is absurd, so that the relay excludes itself. It is then far off
@@ -307,9 +304,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than its errors explain. The squared difference is
-/// compared with two limits: `deviations` times the variance `unsure`, and `least`. The larger limit counts. The
-/// difference is (ratio - 1 / ratio) / 2.
+/// Returns true if a ratio of powers differs from 1 by more than its errors explain. The squared difference ((ratio -
+/// 1 / ratio) / 2)^2 must exceed `deviations` times the variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -326,7 +322,7 @@ const APART: (f64, f64) = (49.0, 0.174);
 /// faulty.
 const FEWEST_FOR_ENDS: u16 = 3;
 
-/// Level measured at Tx or Rx over the expected level, with the relative variance of this ratio.
+/// Level measured at Tx or Rx divided by the expected level, and the relative variance of this ratio.
 #[derive(Clone, Copy, Debug)]
 struct EndLevel {
     ratio: f64,

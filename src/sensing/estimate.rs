@@ -27,7 +27,7 @@ use crate::time::{Duration, Instant};
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum InterferenceEstimate {
-    /// Estimate not changed by measurements: the interference that the mission configures.
+    /// Interference as the mission configures it; measurements have not changed it.
     #[default]
     Mission,
     /// Unknown interference; the relays take this spacing along the line Tx to Rx in order to measure it.
@@ -95,65 +95,62 @@ impl Spread {
 pub struct NumberedEstimate {
     /// Sequence number of the estimate, 0 for the initial one.
     pub number: u16,
-    /// Interference estimate with this number.
+    /// Interference estimate that has this sequence number.
     pub estimate: InterferenceEstimate,
 }
 
-/// Mean square relative change of the interference that is too small for a new estimate. A changed level at Rx can
-/// justify one all the same.
+/// Mean square relative change of the interference below which a new estimate is not adopted.
 const WORTH: f64 = 1e-5;
 
-/// Mean square relative change of the interference up to which a new estimate is only a refinement. A refinement is
-/// adopted if it is based on more information. A larger change may mean that the interference itself has changed.
+/// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
+/// may mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to that due to chance, for a stationary source. With a smaller
-/// ratio the new estimate can only be a refinement.
+/// Minimum ratio of an estimate's mean square change to that by chance, for a stationary source. Below it the new
+/// estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to that due to chance, for a moving source. With a smaller ratio
-/// the new estimate can only be a refinement.
+/// Minimum ratio of an estimate's mean square change to that by chance, for a moving source. Below it the new
+/// estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to that due to chance, in a settled chain. A chain is settled
-/// after [`REFINED`] refinements; the source is stationary. A larger ratio shows another interferer: the new estimate
-/// is adopted, and may be refined again.
+/// Minimum ratio of an estimate's mean square change to that by chance that shows another interferer. It is for a
+/// chain that has settled (after [`REFINED`] refinements).
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance. With a larger one
-/// the track is discarded, and the interferer's position is not predicted.
+/// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance. Above it the
+/// position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
-/// Minimum factor by which the measurements' information must grow to be worth a refined estimate. Information is the
-/// number of measured positions, divided by the variance of a single position's error.
+/// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
+/// measured positions over the variance of one position's error.
 const LEARNED: f64 = 1.1;
 /// Number of refined estimates of a stationary interferer after which the chain counts as settled. It then gets no
 /// new estimate unless the interference changes.
 const REFINED: u8 = 4;
 
-/// Time that drones need to fly a few metres to new positions. The position of a moving interferer is predicted this
+/// Time that drones are assumed to need to fly a few metres. The position of a moving interferer is predicted this
 /// far ahead, plus half the interval between two collections of measurements.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Minimum mean square relative error of measurements that contradicts an estimated source. The relays then treat the
-/// interference as unknown.
+/// Minimum mean square relative error of measurements that contradicts the estimated source. The relays then treat
+/// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Minimum mean square error of measurements that contradicts the mission's interference. It is in units of the
-/// variance that the operator expects of a measurement. The relays then treat the interference as unknown.
+/// Minimum mean square error of measurements that contradicts the mission's interference. It is a multiple of the
+/// variance that the operator expects. The relays then treat it as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information (certainty): number of measured positions over the variance of one position's error.
+    /// Information in the measurements: number of positions over the variance of one position's error.
     information: f64,
-    /// Mean square relative error that the current estimate is expected to have.
+    /// Expected mean square relative error of the current estimate.
     chance: f64,
-    /// Number of new estimates adopted for the same interferer, which [`REFINED`] limits. With settings for a moving
-    /// interferer, an estimate with a large change resets the number to 0.
+    /// Number of estimates adopted for the same interferer, limited by [`REFINED`].
     refined: u8,
     track: Track,
 }
@@ -443,7 +440,7 @@ const CERTAIN: f32 = 16.0;
 /// again.
 const ELSEWHERE: f32 = 49.0;
 
-/// Kalman filter along one axis: the interferer's position, m, and velocity, m/s, with covariance.
+/// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     at: f32,

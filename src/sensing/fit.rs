@@ -28,12 +28,11 @@ pub enum Unfit {
     Contradiction,
 }
 
-/// Weight of the expected measurement error in the estimated variance, in measured positions. The operator states the
-/// expected error. The variance is that of the relative error of one measured position.
+/// Weight of the operator's expected error in the estimated variance, in measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. With less, they do not
-/// show on which side of the line Tx to Rx the source is.
+/// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. Below it they do not
+/// show on which side of the line the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -53,13 +52,13 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit has all four unknowns. False without the last one, which tells on which side of the line the
-    /// source is.
+    /// True if the fit determines all four unknowns. False if the last one is left out, which tells the source's side
+    /// of the line.
     full_rank: bool,
 }
 
-/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
-/// separate the unknowns. The limit is above the rounding errors of f32 sums over some hundred positions.
+/// Minimum pivot of the matrix factorisation, relative to the first one. Below it the measured positions cannot
+/// separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -113,14 +112,14 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the last unknown. Its inverse is the unknown's variance, for measurements of variance 1.
+    /// Pivot of the fit's last unknown. Its inverse is that unknown's variance, for measurements of variance 1.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last
     }
 
-    /// Returns the variance of the fit at a position with these `terms`, for measurements of variance 1. It is r^T
-    /// G^-1 r, with r the terms, and G the matrix of the fit.
+    /// Returns the variance of the fitted value at a position, for measurements of variance 1. It is r^T G^-1 r, with
+    /// the position's `terms` r and the fit's matrix G.
     fn variance(&self, terms: [f64; 4]) -> f64 {
         let [da, db, dc, dd] = self.diagonal;
         let [a, b, c, d] = self.forward(terms);
@@ -136,9 +135,9 @@ pub struct Fit {
     products: [f64; 10],
     right: [f64; 4],
     factor: Factor,
-    /// Estimated variance of the relative error of one measured position.
+    /// Variance of the relative error of one measured position, as estimated from the fit.
     variance: f64,
-    /// Variance of one measured position's relative error, as the operator expects it.
+    /// Variance of the relative error of one measured position, as the operator expects it.
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
@@ -148,7 +147,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Fits a source to `sums`; `relative_error` is the expected relative error of one measurement.
+    /// Fits a source to the measurements in `sums`; `relative_error` is the expected one of a measurement.
     ///
     /// About 6 000 instructions on a Cortex-M4F, in software f64.
     ///
@@ -247,7 +246,7 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Information (certainty): number of measured positions over the variance of one position's error.
+    /// Returns the information in the measurements: positions over the variance of one position's error.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }
@@ -266,7 +265,7 @@ impl Fit {
         self.mean_square_difference(&self.coefficients, others)
     }
 
-    /// Returns the mean square relative error that the fitted interference is expected to have.
+    /// Returns the expected mean square relative error of the fitted interference.
     pub(crate) fn chance(&self) -> f64 {
         let unknowns = if self.factor.full_rank { 4.0 } else { 3.0 };
         unknowns * self.variance / self.count

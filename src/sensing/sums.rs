@@ -16,10 +16,10 @@ use crate::time::{Duration, Instant};
 /// in the units of [`sensing`](crate::sensing).
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
-/// Interference level measured at Tx or at Rx.
+/// Mean interference power that was measured at Tx or at Rx, and the number of its measurements.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Level {
-    /// Mean interference, W; 0 without a measurement.
+    /// Mean interference power at this ground station, W; 0 without a measurement.
     pub power_w: f32,
     /// Number of measurements in the mean; the older they are, the less they count.
     pub count: f32,
@@ -66,7 +66,7 @@ pub(crate) fn is_power(power_w: f32) -> bool {
     power_w.to_bits() == 0 || is_level(power_w)
 }
 
-/// Returns true if `power_w` is in the measurable range of interference, W.
+/// Returns true if `power_w` is within the measurable range of interference power, [`MEASURED_W`].
 pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
@@ -75,7 +75,8 @@ pub(crate) fn is_level(power_w: f32) -> bool {
 /// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
-/// Returns the four terms of the position `at` for the fit of a source. `distance_m` is the distance from Tx to Rx.
+/// Returns the four terms of the position `at`. A source's inverse interference there is a linear combination of
+/// them. `distance_m` is the distance from Tx to Rx.
 pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     let half = 0.5 * distance_m;
     let (u, t, z) = (at.x_m / half - 1.0, at.y_m / half, at.altitude_m / half);
@@ -89,7 +90,7 @@ pub(crate) const UNIT_W: f32 = 1e-12;
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
 const V: (f32, f32) = (1e-18, 1e18);
 
-/// Converts an expected v = 1e-12 W / I to f32; `None` outside of the measurable range.
+/// Converts an expected v = 1e-12 W / I (I is the interference power) to f32. `None` outside of the measurable range.
 pub(crate) fn expected_v(v: f64) -> Option<f32> {
     let (least, most) = (f64::from(V.0), f64::from(V.1));
     #[expect(
@@ -149,8 +150,7 @@ pub struct Sums {
     pub(crate) numbers: [f32; SUMS],
 }
 
-/// Limit of each sum, which keeps it finite. Measurements do not reach it within two Tx-Rx distances of the line Tx
-/// to Rx.
+/// Limit of each sum of measurements, which keeps it finite.
 const MOST: f32 = 1e38;
 
 fn within(sum: f32) -> f32 {
@@ -158,7 +158,7 @@ fn within(sum: f32) -> f32 {
 }
 
 impl Sums {
-    /// Sums without any measured position.
+    /// Sums before any measurement: all of them are zero.
     pub const NONE: Self = Self {
         numbers: [0.0; SUMS],
     };
@@ -201,7 +201,7 @@ impl Sums {
         }
     }
 
-    /// Reduces the weight of all measurements by the factor `share`, and raises their age by `seconds`.
+    /// Multiplies the weight of all measurements in the sums by `share`, and adds `seconds` to their age.
     pub(crate) fn fade(&mut self, share: f32, seconds: f32) {
         let [.., count, _, age] = &mut self.numbers;
         *age += *count * seconds;
@@ -210,13 +210,13 @@ impl Sums {
         }
     }
 
-    /// Number of measured positions in the sums; older ones count less.
+    /// Returns the number of measured positions in the sums; older ones count less.
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
     }
 
-    /// Mean number of measurements per measured position.
+    /// Returns the mean number of measurements per measured position.
     pub(crate) fn measured(&self) -> f32 {
         let [.., count, measured, _] = self.numbers;
         if count > 0.0 { measured / count } else { 0.0 }
@@ -227,7 +227,7 @@ impl Sums {
         weight
     }
 
-    /// Mean age of the measurements, s.
+    /// Returns the mean age of the measurements in the sums, s.
     pub fn age_s(&self) -> f32 {
         let [.., count, _, age] = self.numbers;
         if count > 0.0 { age / count } else { 0.0 }
@@ -242,7 +242,7 @@ impl Sums {
         (self.age_s() * 1e6) as u64
     }
 
-    /// Returns true if all sums are finite, and sums of squares are not negative.
+    /// Returns true if a relay can have sent these sums. All are finite, and sums of squares are not negative.
     pub(crate) fn is_sound(&self) -> bool {
         let [aa, .., vv, count, measurements, age] = self.numbers;
         self.numbers.iter().all(|number| number.is_finite())
@@ -267,7 +267,7 @@ pub(crate) struct Listener {
     heard: Average,
 }
 
-/// Terms of a relay's current position, and v = 1e-12 W / I measured there.
+/// Terms of a relay's current position for the fit, and v = 1e-12 W / I measured there. I is the interference power.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) terms: Terms,
@@ -354,7 +354,7 @@ impl Listener {
     }
 }
 
-/// Returns the fraction of a measurement's weight that remains after `age`, 1 to 0.
+/// Returns the fraction of a measurement's weight, 1 to 0, that remains at the age `age`.
 pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
     libm::exp2f(-(age.as_micros() as f32 / half_life.as_micros() as f32))
 }
@@ -362,11 +362,11 @@ pub(crate) fn left(age: Duration, half_life: Duration) -> f32 {
 /// Exponentially weighted mean of measurements, whose weight halves in each half-life.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Average {
-    /// Weighted mean of the measurements; 0 without any.
+    /// Weighted mean of the measured values; 0 without any.
     pub(crate) mean: f32,
     pub(crate) weight: f32,
     pub(crate) last: Instant,
-    /// Mean age of the measurements at the time `last`, weighted like their mean, s.
+    /// Mean age of the measurements as of the time `last`, s, weighted like the mean.
     pub(crate) behind_s: f32,
 }
 

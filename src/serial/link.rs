@@ -47,7 +47,7 @@ pub(crate) const fn byte_time(baud: u32) -> Duration {
     Duration::from_micros(10_000_000_u64.div_ceil(baud))
 }
 
-/// Serial port with its transmit queue, and its driver-enable pin if it has one.
+/// Serial port of a relay with its transmit queue, and its driver-enable pin if it has one.
 ///
 /// The pin is high from before the first byte of a frame until the last bit of the last queued frame has left, and low otherwise.
 /// An [`Nb`](super::Nb) port reports that; for an [`Io`](super::Io) port it is computed from the byte time, conservatively: every
@@ -63,8 +63,8 @@ pub struct SerialLink<P, D = NoPin> {
     clock: MonotonicClock,
     /// Time at which the port last accepted a byte, or at which a byte was queued in the empty queue.
     moved_at: Instant,
-    /// Number of bytes that the last poll has written. Their transmission time is counted from the next poll on,
-    /// because the exact time of writing is unknown.
+    /// Number of bytes written by the last poll. Their transmission time counts from the next poll on, because the
+    /// exact time of writing is unknown.
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
@@ -145,7 +145,7 @@ impl<P: SerialPort, D: OutputPin> SerialLink<P, D> {
 }
 
 impl<P, D> SerialLink<P, D> {
-    /// Returns the counters since the link was created.
+    /// Returns the counters of received bytes and errors since the link was created.
     pub fn stats(&self) -> &SerialStats {
         &self.stats
     }
@@ -162,17 +162,17 @@ impl<P, D> SerialLink<P, D> {
 }
 
 pub(super) trait FrameLink {
-    /// Passes at most [`READ_LIMIT`] received bytes to `relay`, which takes them as bytes from `port`.
+    /// Passes up to [`READ_LIMIT`] received bytes to `relay`, as bytes from its port `port`.
     fn receive(&mut self, now: Instant, port: Port, relay: &mut Relay);
     /// Returns true if one more frame of any length fits into the transmit queue.
     fn has_room(&self) -> bool;
     /// Queues a frame for sending. If the frame does not fit, it is dropped and counted.
     fn queue(&mut self, now: Instant, frame: &[u8]);
-    /// Counts a frame that the relay addresses to a port which this driver does not have.
+    /// Counts a frame that was dropped because it is for a port that this driver does not have.
     fn unrouted(&mut self);
     /// Writes as many queued bytes as the port accepts, and updates the driver-enable pin.
     fn transmit(&mut self, now: Instant);
-    /// Returns the time of this link's next poll, later than `now`; `None` if it has nothing to do.
+    /// Returns the time by which this link must be polled again, later than `now`. `None` if it has nothing to do.
     fn wake(&self, now: Instant) -> Option<Instant>;
 }
 
@@ -267,16 +267,16 @@ impl<P: SerialPort, D: OutputPin> FrameLink for SerialLink<P, D> {
 pub struct SerialStats {
     /// Number of bytes lost because they were not read in time.
     pub overrun: u32,
-    /// Number of bytes received without a stop bit.
+    /// Number of bytes that the serial port received without a stop bit (framing error).
     pub framing: u32,
-    /// Number of bytes received with the wrong parity.
+    /// Number of bytes that the serial port received with the wrong parity bit.
     pub parity: u32,
-    /// Number of bytes received with noise on the line.
+    /// Number of bytes that the serial port received with noise on the line.
     pub noise: u32,
-    /// Number of reads that failed for another reason.
+    /// Number of reads from the serial port that failed for another reason.
     pub other: u32,
-    /// Number of failed writes to the port, plus failed checks if all bytes have left the port. The check precedes
-    /// the change of the driver-enable pin to low. Failed writes are repeated.
+    /// Number of failed writes to the port, plus failed checks if all bytes have left the port. Failed writes are
+    /// repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,

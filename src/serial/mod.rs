@@ -119,9 +119,9 @@ use link::FrameLink;
 /// Ports of a relay with two links, one to each neighbour; full duplex unless a link has a pin.
 #[derive(Debug)]
 pub struct Pair<U, D, UPin = NoPin, DPin = NoPin> {
-    /// Link toward the transmitter.
+    /// Serial link to the neighbour toward the transmitter.
     pub upstream: SerialLink<U, UPin>,
-    /// Link toward the receiver.
+    /// Serial link to the neighbour toward the receiver.
     pub downstream: SerialLink<D, DPin>,
 }
 
@@ -148,7 +148,7 @@ impl<U: SerialPort, D: SerialPort, UPin: OutputPin, DPin: OutputPin> Pair<U, D, 
 /// The modem controls the access to the channel; this crate only keeps relays from retransmitting at the same times.
 #[derive(Debug)]
 pub struct Shared<P, Pin = NoPin> {
-    /// Link to the shared channel.
+    /// Serial link to the modem of the channel that all nodes share.
     pub channel: SerialLink<P, Pin>,
 }
 
@@ -163,8 +163,7 @@ impl<P: SerialPort, Pin: OutputPin> Shared<P, Pin> {
     }
 }
 
-/// Defines the method `poll` for the ports of one kind of wiring. It is no trait method, because a firmware would
-/// have to import the trait as well.
+/// Defines the method `poll` for the ports of one kind of wiring.
 macro_rules! polled {
     ([$($of:tt)*] $ports:ty) => {
         impl<$($of)*> $ports {

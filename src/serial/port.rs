@@ -12,11 +12,11 @@ pub enum Fault {
     Overrun,
     /// Byte without a stop bit: another baud rate, a break, a loose wire.
     Framing,
-    /// Byte with the wrong parity bit.
+    /// The serial port received a byte with the wrong parity bit.
     Parity,
-    /// Byte sampled on a noisy line.
+    /// The serial port sampled a byte on a noisy line.
     Noise,
-    /// Receive error of another or an unknown kind.
+    /// The serial port reported a receive error of another or an unknown kind.
     Other,
 }
 
@@ -94,7 +94,7 @@ where
     }
 }
 
-/// Converts the result of an `nb` call. `None` stands for `WouldBlock`: the call would have to wait.
+/// Converts the result of an `nb` call. `None` stands for `WouldBlock`, which means that the call would have to wait.
 fn ready<S, T>(result: nb::Result<T, S::Error>) -> Result<Option<T>, Fault>
 where
     S: embedded_hal_nb::serial::ErrorType,

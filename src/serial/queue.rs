@@ -85,7 +85,7 @@ pub const fn queue_depth(baud: u32, longest: Duration) -> usize {
 }
 
 /// Trigger of a UART's interrupt, so that the interrupt handler starts to send. It is a closure, or a type of the
-/// firmware if the port's type has to be named.
+/// firmware.
 pub trait Pend {
     /// Makes the interrupt handler run: `NVIC::pend`, or the UART's flag for an empty data register.
     fn pend(&mut self);
@@ -155,7 +155,7 @@ pub struct InterruptEnd<'q> {
     received: Producer<'q, AtomicU16>,
     outgoing: Consumer<'q, AtomicU8>,
     lost: &'q AtomicU32,
-    /// True after bytes were lost, until a [`Fault::Overrun`] is queued in their place.
+    /// True from the loss of bytes until a [`Fault::Overrun`] has been queued in their place.
     gap: bool,
 }
 

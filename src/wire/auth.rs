@@ -6,7 +6,7 @@
 
 use super::blake2s::mac;
 
-/// Length of a frame's authentication tag, bytes.
+/// Length of the authentication tag at the end of a signed frame, bytes.
 pub const TAG: usize = 8;
 
 /// True if the crate is built with the feature `auth`. Without it no frame carries an authentication tag.
@@ -63,7 +63,7 @@ impl defmt::Format for Key {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Auth {
-    /// Secret key of the network.
+    /// Secret key that authenticates the frames of the network.
     pub key: Key,
     /// Start counter of this relay, from 1, larger at every start. A number in flash that is incremented before use, or the seconds
     /// of a clock that never runs backward. If an epoch is reused, frames recorded in it are accepted again.
@@ -91,8 +91,8 @@ impl Auth {
     }
 }
 
-/// Nonces of the sender and the receiver of a frame. The upper half of a nonce is the node's epoch (start counter);
-/// the lower half counts up from a random number that the node draws at its start.
+/// Nonces of a frame's sender and receiver. The upper half of a nonce is the node's epoch (start counter); the lower
+/// half counts up from a random number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) struct Nonces {
     pub(crate) sender: u64,
@@ -128,13 +128,14 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay window of one sender: its newest accepted frame counter, and which of the 63 below are used.
+/// Replay protection for one sender. It has the newest accepted frame counter, and which of the 63 counters below
+/// were accepted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
     /// Largest accepted frame counter of the sender, plus one; 0 before any.
     next: u32,
-    /// Bit set of accepted frame counters: bit i stands for `next` - 1 - i.
+    /// Accepted frame counters, as bits: bit i stands for `next` - 1 - i.
     taken: u64,
 }
 

@@ -8,7 +8,7 @@
 
 const BLOCK: usize = 64;
 
-/// Initial state of BLAKE2s: 32 bits of the fractional part of the first eight primes' square roots.
+/// Initial state of BLAKE2s: 32 fractional bits of the square roots of the first eight primes.
 const START: [u32; 8] = [
     0x6A09_E667,
     0xBB67_AE85,
@@ -36,7 +36,7 @@ const ORDER: [[[u8; 8]; 2]; 10] = [
 ];
 
 /// Returns the eight-byte keyed BLAKE2s digest of `first` followed by `second`. Together they have fewer than 2^32
-/// bytes. Work: one block for the key, and one per 64 bytes.
+/// bytes.
 pub(crate) fn mac(key: &[u8; 32], first: &[u8], second: &[u8]) -> [u8; 8] {
     let mut state = START;
     let [parameters, ..] = &mut state;

@@ -13,9 +13,9 @@ use super::frame::MAX_DECODED;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
-    /// Length above the maximum length of a frame.
+    /// The received frame is longer than the maximum.
     Oversized,
-    /// Delimiter inside a COBS block: the end of the frame is missing.
+    /// A delimiter came inside a COBS block: the end of the frame is missing.
     Truncated,
 }
 

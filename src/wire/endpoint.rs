@@ -10,24 +10,23 @@ use super::session::{Checked, Session};
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 
-/// Frame to send: its destination and its length.
+/// Frame that is ready to send: its destination and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
-    /// Node number of the destination.
+    /// Node number of the frame's destination.
     pub(crate) to: u16,
-    /// Length of the frame, bytes.
+    /// Length of the encoded frame, bytes.
     pub(crate) len: usize,
 }
 
-/// End of one node's links: checks received frames, and addresses, numbers and signs the node's own. It has the node
-/// number, the frame counter, and the authentication sessions.
+/// Endpoint of one node: checks received frames, and addresses, numbers and signs those that it sends. It has the
+/// node number, the frame counter, and the authentication sessions.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,
     node: u16,
     counter: u32,
-    /// Authentication sessions with other nodes. `None` if this node does not sign; without the feature `auth` the
-    /// type is uninhabited.
+    /// Authentication sessions with other nodes, if this node signs. The array is empty without the feature `auth`.
     session: [Option<Session>; AUTH as usize],
 }
 
@@ -50,8 +49,8 @@ impl Endpoint {
         }
     }
 
-    /// Parses a frame that the deframer has decoded. Returns an intact frame of this network; anything else is
-    /// counted in `stats`.
+    /// Parses a frame that the deframer has decoded. Returns it if it is intact and of this network; anything else is
+    /// counted in `stats` and dropped.
     pub(crate) fn open<'a>(
         &self,
         decoded: Result<&'a [u8], DeframeError>,
@@ -71,7 +70,7 @@ impl Endpoint {
     }
 
     /// Checks the authentication tag of `frame`. Counts every result but a valid new message in `stats`. `None` if
-    /// this node does not sign.
+    /// this node does not use authentication.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -163,7 +162,7 @@ impl Endpoint {
         }
     }
 
-    /// Schedules an authentication handshake to node `to`.
+    /// Schedules an authentication handshake to node `to`, by which both learn each other's nonce.
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = self.session_mut() {
             session.greet(to);

@@ -28,7 +28,7 @@ const HANDSHAKE: u16 = 0x2000;
 /// Buffer for one encoded frame, of the maximum length.
 pub type FrameBuf = [u8; MAX_FRAME];
 
-/// Header of a frame.
+/// Header of a frame: numbers of the network, the sender, the destination and the frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
@@ -42,7 +42,7 @@ pub struct Header {
     pub counter: u32,
 }
 
-/// Reason why a frame is rejected.
+/// Reason why a received frame is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -102,8 +102,8 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the bytes of the buffer `out` into which a frame's body is written. The first and the last byte of the
-/// buffer are kept free for the COBS code byte and the delimiter.
+/// Returns the part of the buffer `out` into which a frame's body is written. It is after the COBS code byte and the
+/// header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }

@@ -23,11 +23,12 @@ use crc::{CRC_32_ISCSI, Crc, Table};
 /// a table a full sweep, for which the CRC is computed twice, is far above its budget of instructions.
 pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI);
 
-/// Largest valid node number; 4095 is reserved for a broadcast.
+/// Largest valid node number; 4095 is reserved for broadcasts.
 pub const MAX_NODE: u16 = 4094;
 
 /// Number of nearest nodes on one side that may become the neighbour and are sent hellos.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Maximum length on the wire of the frame of a sweep message with sixteen target SIRs, bytes.
+/// Maximum length on the wire of a sweep message with its frame, bytes. A sweep is a pass of up to sixteen target
+/// SIRs.
 pub const MAX_SWEEP: usize = 100 + auth::TAG_ROOM;

@@ -29,10 +29,10 @@ use super::auth::{Auth, Key, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
 use crate::time::{Duration, Instant};
 
-/// Sender of a frame that bears this relay's own node number.
+/// Actual sender of a frame that bears this relay's own node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
-    /// The relay itself: the frame is an echo of its own.
+    /// The relay itself: the received frame is an echo of one that it sent.
     Itself,
     /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
     Unknown,
@@ -74,7 +74,7 @@ const WENT_BACK: u8 = 5;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Peer {
     node: u16,
-    /// True if a handshake to this node is due.
+    /// True if an authentication handshake to this node must be sent.
     handshake: bool,
     /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only until
     /// the node has proved its presence.
@@ -82,27 +82,27 @@ struct Peer {
     /// True if the node has repeated this relay's nonce. That proves that the node is present, and that both nodes
     /// know each other's nonce.
     proven: bool,
-    /// Value of `Session::clock` when this entry was used last.
+    /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
     /// Time of the last frame that proved the node present. A handshake with a larger nonce than all before counts,
     /// too.
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
-    /// Largest nonce that the node has sent; 0 before any.
+    /// Largest nonce that this node has sent; 0 before any.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
 }
 
-/// Counter of consecutive handshakes that a node sent with an outdated nonce. It detects that the node's epoch went
-/// back, or that the node restarted in the same epoch.
+/// Counts consecutive handshakes of a node with an outdated nonce. Several show that the node's epoch went back, or
+/// that it restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
-    /// Frame counter of the last outdated handshake, plus one.
+    /// Frame counter of the last handshake with an outdated nonce, plus one.
     next: u32,
-    /// Number of outdated handshakes in a row with rising frame counters.
+    /// Number of consecutive handshakes with an outdated nonce and rising frame counters.
     times: u8,
 }
 
@@ -149,16 +149,16 @@ pub(crate) struct Session {
     last_number: u32,
     /// Claim of another node to this relay's node number, as shown by a handshake; `None` once it is read.
     rival: Option<Rival>,
-    /// Number of uses of table entries so far, wrapping. It finds the least recently used entry.
+    /// Number of uses of session table entries so far, wrapping. It orders the entries by their last use.
     clock: u32,
     /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
     peers: heapless::Vec<Peer, PEERS>,
-    /// Number of the lease renewal for which this relay has shown its nonce last.
+    /// Number of the lease renewal in which this relay last sent its nonce in a handshake.
     shown: Option<u16>,
 }
 
-/// Result of the authentication of a received frame.
+/// Result of authenticating a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
     /// Valid message that was not received before. It proves that its sender is present. `first` is true if the
@@ -229,8 +229,8 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`, once for each lease renewal `number`. It shows this relay's nonce,
-    /// by which another node with this relay's number can detect the duplicate.
+    /// Schedules a handshake to the known node `to`, once in each lease renewal `number`. It shows this relay's
+    /// nonce, so that another node with this relay's number detects the duplicate.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;
@@ -342,7 +342,7 @@ impl Session {
         Checked::Fresh { first }
     }
 
-    /// Authenticates a handshake; `None` if its tag is wrong.
+    /// Checks the authentication tag of a handshake; `None` if the tag is wrong.
     fn check_handshake(
         &mut self,
         now: Instant,
@@ -489,7 +489,7 @@ impl Session {
     }
 }
 
-/// Splits a nonce into its lower half, a number, and its upper half, the epoch.
+/// Splits a nonce into its lower half (a number) and its upper half (the epoch), in this order.
 const fn halves(nonce: u64) -> [u32; 2] {
     let [a, b, c, d, e, f, g, h] = nonce.to_le_bytes();
     [

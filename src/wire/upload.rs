@@ -139,7 +139,7 @@ impl Upload {
         })
     }
 
-    /// Version of the upload, from 1; the larger one is newer.
+    /// Version of the uploaded mission, from 1; the larger version is newer.
     pub const fn version(&self) -> u16 {
         self.version
     }

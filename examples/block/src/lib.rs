@@ -105,7 +105,7 @@ pub const LEN: usize = 392;
 /// Maximum number of points of a configuration block for the distribution of the interference along x.
 pub const MAX_POINTS: usize = 16;
 
-/// Number of bytes covered by the block's CRC: all except the CRC itself.
+/// Number of bytes that the block's CRC covers: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
 /// Maximum value of `probe_after_ms` in a block: silence of a neighbour before a heartbeat request, ms.

@@ -13,10 +13,10 @@ use super::BAUD;
 /// Default silence of a neighbour, ms, after which a heartbeat is requested. It applies if the block's value is 0.
 const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
-/// Checked content of a configuration block.
+/// Checked content of a configuration block, which holds all settings of one relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
-    /// Network and index of this relay.
+    /// Network number and index of this relay.
     pub identity: Identity,
     /// Mission shared by all relays.
     pub mission: Mission,
@@ -24,7 +24,7 @@ pub struct Config {
     pub profile: Profile,
     /// True if the relay keeps its configured altitude when the method chooses altitudes.
     pub hold_altitude: bool,
-    /// Placement method that the leader runs.
+    /// Placement method that the leader of the chain runs.
     pub method: Method,
     /// Settings for measuring the interference at the relay, if the block gives its distribution along x. `None` for
     /// no measurement.
@@ -104,7 +104,7 @@ impl core::fmt::Debug for Secret {
 /// Channel parameters as stored in a configuration block. A [`Channel`] does not keep these numbers.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChannelNumbers {
-    /// Carrier frequency, Hz.
+    /// Carrier frequency of the radio channel, Hz.
     pub carrier_hz: f64,
     /// Excess loss with line of sight, as a factor.
     pub excess_los: f64,
@@ -130,55 +130,57 @@ impl ChannelNumbers {
     }
 }
 
-/// Fault of a configuration block.
+/// Fault because of which a configuration block is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfigError {
-    /// Blank configuration block: all bits one, as after an erase, or all zero.
+    /// The configuration block is blank: all bits one, as after an erase, or all zero.
     Blank,
-    /// Wrong first bytes: the block does not begin with [`MAGIC`](super::MAGIC).
+    /// The first bytes are wrong: the block does not begin with [`MAGIC`](super::MAGIC).
     Magic,
-    /// Wrong format version of the block, or wrong length for that version.
+    /// The format version of the block is unknown, or its length is wrong for that version.
     Version,
-    /// Wrong CRC: the block was cut short or damaged.
+    /// The CRC is wrong: the block was cut short or damaged.
     Crc,
-    /// Index of the relay is not within 1 to the number of relays.
+    /// The index of the relay is not within 1 to the number of relays.
     Index,
-    /// Altitude or power of this relay out of range.
+    /// The altitude or power of this relay is out of range.
     Profile,
-    /// Flag for keeping this relay's altitude is neither 0 nor 1.
+    /// The flag for keeping this relay's altitude is neither 0 nor 1.
     Hold,
     /// Unknown placement method. Or a method other than align although the block gives the interference as a
     /// distribution along x.
     Method,
-    /// Parameters of the method adjust out of range, or not 0 with another method.
+    /// The parameters of the method adjust are out of range, or not 0 with another method.
     Adjust,
-    /// Settings for measuring the interference out of range, or a maximum power but no number of samples.
+    /// The settings for measuring the interference are out of range. Or they have a maximum power, but no number of
+    /// samples.
     Measure,
-    /// Settings for estimating an unknown interferer out of range. Or the block has these settings, and gives the
-    /// interference as a distribution along x.
+    /// The settings for estimating an unknown interferer are out of range. Or the block has them although it gives
+    /// the interference as a distribution along x.
     Listen,
-    /// Error: both the joint method with an unknown interferer and traffic from receiver to transmitter.
+    /// The block has the joint method with an unknown interferer and traffic from receiver to transmitter.
     Reverse,
-    /// Error: the block gives fitted slots, but not the joint method or no known interferer.
+    /// The block has fitted slots without the joint method or without a known interferer. Fitted slots are as long as
+    /// each hop needs.
     Fitted,
-    /// Error: the block gives an interferer, but also the interference as a distribution along x.
+    /// The block has both an interferer and the interference as a distribution along x.
     Interferer,
-    /// Number of points of the interference's distribution along x exceeds the capacity of a block.
+    /// The interference's distribution along x has more points than a block can have.
     Points,
-    /// Error: bytes after the last point of the interference's distribution along x are not 0.
+    /// Bytes after the last point of the interference's distribution along x are not 0.
     Unused,
-    /// Error: a signing key without an epoch, an epoch without a key, or an epoch of 4294967295.
+    /// The block has a signing key without an epoch, an epoch without a key, or the epoch 4294967295.
     Secret,
-    /// Maximum speed out of range, or given without the positions of transmitter and receiver.
+    /// The maximum speed is out of range, or given without the positions of transmitter and receiver.
     Speed,
-    /// Error: a signing key for the autopilot, but no autopilot: the block has no Tx and Rx positions.
+    /// The block has a signing key for the autopilot, but no autopilot: it lacks the Tx and Rx positions.
     AutopilotKey,
-    /// Silence of a neighbour after which a heartbeat is requested exceeds the maximum.
+    /// The silence of a neighbour after which a heartbeat is requested exceeds its maximum.
     Silence,
-    /// Parameter of the interference's distribution along x out of range.
+    /// A parameter of the interference's distribution along x is out of range.
     Field(FieldError),
-    /// Parameter of the channel out of range.
+    /// A parameter of the channel is out of range.
     Channel(ChannelError),
-    /// Parameter of the mission out of range.
+    /// A parameter of the mission is out of range.
     Mission(MissionError),
 }

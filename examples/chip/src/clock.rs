@@ -209,7 +209,7 @@ pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     clocks
 }
 
-/// Sets the wait states of the flash and enables its caches; returns true once the wait states apply.
+/// Sets the flash's wait states and enables its caches; returns true once the wait states apply.
 fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     let prefetch = if chip.read(Register::ChipId) & 0xFFFF_0FFF == NO_PREFETCH {
         0

@@ -27,7 +27,7 @@ const HSE_BYPASS: u32 = 1 << 18;
 /// 2 ms.
 const START_POLLS: u32 = 200_000;
 
-/// Divisor of the crystal's clock (HSE) for the measurement of its period: field RTCPRE of RCC_CFGR.
+/// Divisor of the crystal's clock HSE before its period is measured: field RTCPRE of RCC_CFGR.
 const DIVISOR: u32 = 31;
 const DIVIDED: u32 = DIVISOR << 16;
 

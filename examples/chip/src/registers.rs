@@ -52,10 +52,10 @@ pub enum Register {
 
 /// Access to the chip's registers, or to a mock of them in RAM.
 pub trait Registers {
-    /// Returns the value of `register`.
+    /// Returns the value of the hardware register `register`.
     fn read(&mut self, register: Register) -> u32;
 
-    /// Writes the value of `register`.
+    /// Writes `value` to the hardware register `register`.
     fn write(&mut self, register: Register, value: u32);
 
     /// Clears the bits of `clear` in `register`, then sets the bits of `set`.

@@ -2,23 +2,23 @@
 
 use crate::registers::{Register, Registers};
 
-/// Bit RMVF of RCC_CSR, which clears all recorded causes of a reset.
+/// Bit RMVF of RCC_CSR: clears the recorded causes of a reset.
 const FORGET: u32 = 1 << 24;
 
-/// The cause of the last reset.
+/// Cause of the last reset of the microcontroller.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Reset {
-    /// Reset by switching the power on.
+    /// The power was switched on.
     Power,
-    /// Reset because the supply voltage was too low.
+    /// The supply voltage was too low.
     Brownout,
-    /// Reset pin: a button, or a debug probe.
+    /// The reset pin was pulled by a button or a debug probe.
     Pin,
-    /// Software reset, by the program or a debug probe.
+    /// The program or a debug probe requested the reset.
     Software,
-    /// Watchdog not fed: the relay's loop hung, or its clock stopped.
+    /// The watchdog was not fed: the relay's loop hung, or its clock stopped.
     Watchdog,
-    /// Unknown cause, or an emulator.
+    /// The cause is unknown, as in an emulator.
     #[default]
     Unknown,
 }
@@ -46,7 +46,7 @@ impl Reset {
         }
     }
 
-    /// Returns the cause in words.
+    /// Returns the reset cause in words, for the log.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Power => "power-on reset",

@@ -20,7 +20,7 @@ pub const BLANK: u32 = u32::MAX;
 /// Number of words of a record in addition to its payload: its sequence number and its CRC.
 pub const OVERHEAD: usize = 2;
 
-/// Maximum number of attempts to write one record, each at another place. Flash cells may be worn.
+/// Maximum number of attempts to write one journal record. Each is at another place, because flash cells may be worn.
 const TRIES: usize = 4;
 
 /// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
@@ -66,9 +66,9 @@ impl<F: Flash> Flash for &mut F {
 /// Action of [`Journal::append`] when both sectors are full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum WhenFull {
-    /// Refuse to store the record.
+    /// The new record is refused.
     Refuse,
-    /// Erase the sector that does not have the newest record, and store the record there.
+    /// The sector without the newest record is erased, and the new record stored there.
     Erase,
 }
 
@@ -125,7 +125,7 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// Erases each used sector that does not have the newest record. Called at a start, so that in flight a whole
+    /// Erases the used sectors that do not have the newest record. Called at a start, so that in flight a whole
     /// sector of records can be stored before the next erase.
     pub fn tidy(&mut self) {
         let found = self.found();

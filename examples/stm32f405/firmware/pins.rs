@@ -28,7 +28,7 @@ pub(crate) struct Pins {
     pub(crate) clock: Clock,
     /// Port at USART2, to the neighbour toward the transmitter or to the radio.
     pub(crate) first: Port,
-    /// UART of the autopilot.
+    /// UART to which the autopilot is connected.
     pub(crate) uart: Uart,
     #[allow(dead_code, reason = "the driver enable of a radio")]
     pub(crate) pa1: PA1,

@@ -1,7 +1,7 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Largest number of bytes that the splitter stores between two frame delimiters. The longest frame has 149 bytes, so
-/// more bytes are noise, of which only the start is kept.
+/// Largest number of bytes that the splitter stores between two frame delimiters. More bytes are noise, of which only
+/// the start is kept.
 pub const MOST: usize = 1_024;
 
 /// Bytes of a stream from one frame delimiter to the next: usually a frame. The delimiter at the end is included.
@@ -53,7 +53,7 @@ impl FrameSplitter {
         Ok(())
     }
 
-    /// Returns the incomplete piece at the end of the stream, if any.
+    /// Returns the incomplete piece at the end of the stream; `None` if the stream ends with a delimiter.
     pub fn rest(&self) -> Option<Piece<'_>> {
         (self.len > 0).then_some(Piece {
             bytes: &self.bytes,

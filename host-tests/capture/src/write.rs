@@ -59,7 +59,7 @@ pub struct Frame<'a> {
     pub len: usize,
     /// Direction of the frame, relative to the node that writes the capture.
     pub direction: Direction,
-    /// Comment on the frame; empty for none.
+    /// Comment on the frame in the capture; empty if there is none.
     pub comment: &'a str,
 }
 

@@ -15,7 +15,7 @@ pub const MOST_BAUD: u32 = 10_000_000;
 pub struct Failure {
     /// Exit status: 1 if the request cannot be met, 2 if the input is wrong.
     pub status: u8,
-    /// Error message, one line.
+    /// Error message of the command, one line.
     pub line: String,
 }
 

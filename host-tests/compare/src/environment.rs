@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Default folder of Python's virtual environment, inside the target folder.
+/// Default folder of the Python virtual environment, inside the target folder.
 pub(crate) const USUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/compare");
 
 const REQUIREMENTS: &str = include_str!("../rivals/requirements.txt");

@@ -140,7 +140,7 @@ fn solve(options: &Options) -> Result<Results, Failure> {
     })
 }
 
-/// Solves one problem with this crate, and then with every other solver.
+/// Solves one problem with this crate, and then with every other solver (rival).
 ///
 /// Each other solver reports when it first reaches the SIR of this crate's chain.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {

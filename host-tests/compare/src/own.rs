@@ -20,7 +20,7 @@ use crate::results::{Answer, Mark, Run, Solution};
 /// Relative tolerance of the SIR that this crate aims for, the same as in `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
 
-/// Number of timed batches, of which the median counts.
+/// Number of timed batches, of which the median time is used.
 const BATCHES: usize = 5;
 /// Minimum duration of a timed batch. It is far above the resolution of the processor clock, some milliseconds.
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
@@ -74,8 +74,8 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// Computes the relays' positions from the mission alone by the joint method, as every relay does. The search runs
-/// from every starting point of the method.
+/// Computes the relays' positions from the mission alone by the joint method. It uses all of the method's initial
+/// chains.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));

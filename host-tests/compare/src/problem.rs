@@ -24,7 +24,7 @@ pub(crate) struct Problem {
     pub(crate) relays: u16,
 }
 
-/// True optima (linear SIR) for each kind of problem and number of relays, to nine or ten digits.
+/// Optima (linear SIR) of the problems, for each kind and number of relays, to nine or ten digits.
 ///
 /// An independent program has computed the values.
 const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [

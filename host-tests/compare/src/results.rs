@@ -21,7 +21,7 @@ pub(crate) struct Versions {
     pub(crate) nlopt: String,
 }
 
-/// Problem with the runs of every solver; this crate's runs come first.
+/// Placement problem with the results of all solvers; this crate's results come first.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Solved {
     pub(crate) problem: Problem,
@@ -43,7 +43,7 @@ pub(crate) enum Answer {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Solution {
-    /// Total processor time of the solver, s.
+    /// Total processor time that the solver took, s.
     pub(crate) time_s: f64,
     /// Number of chains that the solver evaluated; `None` for solvers that do not evaluate chains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -52,10 +52,10 @@ pub(crate) struct Solution {
     pub(crate) sir: f64,
     /// Position of every relay (x, y and altitude, m), from the transmitter on.
     pub(crate) chain: Chain,
-    /// First chain during the run within [`crate::score::GOOD`] of the optimum, if any.
+    /// First chain in the solver's run whose SIR is within [`crate::score::GOOD`] of the optimum, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) good: Option<Mark>,
-    /// First chain during the run that is as good as this crate's, if any.
+    /// First chain in the solver's run that is as good as this crate's, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) level: Option<Mark>,
     /// True if the time limit ended the solver's run.

@@ -139,7 +139,7 @@ impl Rivals {
         }
     }
 
-    /// Kills the Python process and returns the last line of its standard error.
+    /// Kills the Python process and returns the last line of its standard error, for an error message.
     fn last_words(&mut self) -> String {
         _ = self.child.kill();
         let mut text = String::new();

@@ -21,17 +21,17 @@ const SIR_SLACK: f64 = 1e-5;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
     Count(usize),
-    /// Relay that is not between transmitter and receiver: its index from 1, and its x, m.
+    /// A relay is not between transmitter and receiver: its index from 1, and its x, m.
     Outside(usize, f64),
-    /// Relay outside the lateral range: its index from 1, and its y, m.
+    /// A relay is outside the lateral range: its index from 1, and its y, m.
     Side(usize, f64),
-    /// Relay outside the range of altitudes: its index from 1, and its altitude, m.
+    /// A relay is outside the range of altitudes: its index from 1, and its altitude, m.
     Altitude(usize, f64),
-    /// Relay with a smaller x than the relay before it: the relay's index, from 1.
+    /// A relay has a smaller x than the relay before it: its index, from 1.
     Order(usize),
-    /// Relay too close to the relay before it: its index from 1, and their distance, m.
+    /// A relay is too close to the relay before it: its index from 1, and their distance, m.
     Separation(usize, f64),
-    /// Wrong SIR: that reported by the solver, and that computed from its chain.
+    /// The SIR is wrong: that reported by the solver, and that computed from its chain.
     Sir(f64, f64),
 }
 
@@ -101,7 +101,7 @@ fn rounded(chain: &[[f64; 3]]) -> Vec<[f64; 3]> {
 
 pub(crate) struct Score {
     pub(crate) sir: f64,
-    /// SIR (linear) of the worst hop if positions are rounded to f32, as a relay's setpoints are.
+    /// SIR (linear) of the worst hop if positions are rounded to f32, as in a relay's setpoints.
     pub(crate) flown: f64,
     /// Processor time until the first chain that is good enough, s; `None` if there was none.
     pub(crate) good_after_s: Option<f64>,

@@ -12,7 +12,7 @@ use crate::format::{Field, Kind, Layout};
 use crate::range::{Numbers, bounds, has_room, targets};
 use crate::value::{Fields, Value};
 
-/// Fields with their range in an ordinary mission. Half of the draws of such a field are from this range.
+/// Fields of messages with their range in an ordinary mission. Half of the draws of such a field are from this range.
 const ORDINARY: [(&str, f64, f64); 13] = [
     ("anchor", 0.25, 4.0),
     ("altitude_m", 15.0, 400.0),
@@ -63,7 +63,7 @@ impl<'s> Draw<'s> {
         self.byte().is_multiple_of(parts)
     }
 
-    /// Draws a number from 0 to 1, both inclusive.
+    /// Draws a number from 0 to 1 inclusive.
     fn part(&mut self) -> f64 {
         f64::from(u32::from_le_bytes(self.bytes())) / f64::from(u32::MAX)
     }
@@ -189,7 +189,8 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws the name of a proposed view (membership of the chain): its number, 1 or more, and proposer.
+    /// Draws the name of a proposed view: its number, at least 1, and its proposer. A view is a membership of the
+    /// chain.
     fn view(&mut self) -> u32 {
         let most = 0x003F_FFFF;
         let number = match self.byte() % 8 {

@@ -3,7 +3,8 @@
 use uav_relay::CRC_32C;
 use uav_relay::wire::frame::Header;
 
-/// Returns the header and body of a frame, without tag and CRC. `flags` is the top nibble of the second word.
+/// Returns the header and body of a frame as bytes, without tag and CRC. `flags` is the top nibble of the second
+/// word.
 ///
 /// Node numbers are not checked. Bits beyond their 12 valid ones overwrite other bits of the header, so that tests
 /// can build invalid frames.

@@ -52,8 +52,8 @@ fn is_between(range: &str, number: f64) -> bool {
     (least..=most).contains(&number) || zero && number == 0.0
 }
 
-/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`. Returns true if 0 is allowed in addition, and the
-/// bounds.
+/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`. Returns true if 0 is allowed besides
+/// the bounds, and the two bounds.
 pub fn bounds(range: &str) -> (bool, f64, f64) {
     let first = range.split(';').next().unwrap_or_default();
     let (zero, rest) = ["`00000000` or ", "0 or "]
@@ -101,7 +101,7 @@ impl<'f> Numbers<'_, 'f> {
         }
     }
 
-    /// Returns true if the named number is an integer 0 or an f32 whose bits are all 0.
+    /// Returns true if the number of the field `name` is exactly 0. It is an integer 0, or an f32 with all bits 0.
     fn is_zero(&self, name: &str) -> bool {
         let number = self.get(name);
         number == 0.0 && number.is_sign_positive()

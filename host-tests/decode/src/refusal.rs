@@ -5,17 +5,17 @@ use std::fmt;
 /// Reason for rejecting a frame: the first one that a receiver would find.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Refusal {
-    /// Stream that ends before the frame's delimiter.
+    /// The stream ends before the frame's delimiter.
     Unended,
-    /// Frame that exceeds the largest length. The number is its length on the wire, bytes.
+    /// The frame exceeds the largest length. The number is its length on the wire, bytes.
     Oversized(usize),
-    /// Delimiter inside a COBS run: the frame was cut short.
+    /// A delimiter came inside a COBS run: the frame was cut short.
     Truncated,
-    /// Frame too short for header and CRC, or for the tag. The number is its length without COBS, bytes.
+    /// The frame is too short for header and CRC, or for the tag. The number is its length without COBS, bytes.
     Short(usize),
-    /// Wrong CRC: the received CRC and the computed CRC.
+    /// The CRC is wrong: the received CRC and the computed CRC.
     Crc(u32, u32),
-    /// Unknown version of the frame format, or unknown flags: both values.
+    /// The version of the frame format or the flags are unknown: both values.
     Version(u8, u8),
     /// Unknown tag, the byte that tells the kind of message.
     UnknownTag(u8),

@@ -10,18 +10,18 @@ use crate::value::Value;
 /// Result of verifying the authentication tag of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TagCheck {
-    /// Tag of the frame is right.
+    /// The authentication tag of the frame is right.
     Right,
-    /// Tag of the frame is wrong.
+    /// The authentication tag of the frame is wrong.
     Wrong,
-    /// Tag not checked: the network key is not known.
+    /// The tag was not checked, because the network key is not known.
     NoKey,
-    /// Tag not checked: the handshake of the two nodes was not captured.
+    /// The tag was not checked, because the handshake of the two nodes was not captured.
     NoHandshake,
 }
 
 impl TagCheck {
-    /// Returns the result as a text for people.
+    /// Returns the result of the tag's check as a text for people.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Right => "tag right",

@@ -24,7 +24,7 @@ pub enum Value<'f> {
     Double(f64),
     /// Boolean value.
     Bool(bool),
-    /// Flags: the bits, and the names of all flags.
+    /// Flags: their bits in one byte, and the names of all flags.
     Flags(u8, &'f [String]),
     /// Enumeration: the value, and its name if it has one.
     Word(u8, Option<&'f str>),
@@ -112,7 +112,7 @@ impl<'a, 'de> IntoDeserializer<'de> for &'a Fields<'_> {
     }
 }
 
-/// Returns the names of the flags that are set in `bits`; `bit 7` for a flag without a name.
+/// Returns the names of the flags that are set in `bits`; `bit 7` stands for a flag without a name.
 pub(crate) fn set(bits: u8, names: &[String]) -> Vec<String> {
     let set = (0..8).filter(|bit| bits >> bit & 1 == 1);
     let name = |bit: usize| match names.get(bit) {

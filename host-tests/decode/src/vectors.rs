@@ -46,13 +46,13 @@ pub struct Frame {
 /// Header of a valid frame.
 #[derive(Clone, Copy, Deserialize, Debug)]
 pub struct Header {
-    /// Network number.
+    /// Number of the network in the frame's header.
     pub network: u16,
-    /// Node number of the sender.
+    /// Node number of the frame's sender.
     pub sender: u16,
-    /// Node number of the destination.
+    /// Node number of the frame's destination.
     pub destination: u16,
-    /// Counter of the sender's frames.
+    /// Counter of the sender's frames, as in the header.
     pub counter: u32,
 }
 
@@ -88,9 +88,9 @@ pub struct Ladder {
 /// Test vector: a byte stream that is rejected or has no effect.
 #[derive(Deserialize, Debug)]
 pub struct Rejected {
-    /// Reason why the stream is rejected.
+    /// Reason why the stream is rejected or has no effect, in words.
     pub what: String,
-    /// Names of the counters that the stream increments at a receiver.
+    /// Names of the receive counters that the stream increments at a relay.
     pub counted: Vec<String>,
     /// Bytes of the stream, with the delimiter.
     #[serde(deserialize_with = "hex")]

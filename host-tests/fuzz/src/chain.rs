@@ -12,15 +12,15 @@ use super::input::Input;
 use super::setting;
 use super::watch::{Sent, Watched};
 
-/// Maximum number of fuzzed operations in one run. It limits the run's duration: each takes some milliseconds.
+/// Maximum number of fuzzed operations in one run, because each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of frames in transit to one relay. A further frame displaces the oldest one.
+/// Maximum number of simulated frames in transit to one relay. A further frame displaces the oldest one.
 const MAX_IN_TRANSIT: usize = 24;
 
-/// Maximum number of rounds in one operation. A round delivers a frame to each relay.
+/// Maximum number of rounds in one operation. In a round each relay receives a frame.
 const MAX_ROUNDS: u8 = 128;
 
 /// Tolerance for the minimum separation of two relays, as a fraction of the distance from Tx to Rx. Positions are f32
@@ -162,7 +162,7 @@ impl Chain {
         }
     }
 
-    /// Delays the oldest frame in transit to relay `at`, so that all others overtake it.
+    /// Delays the oldest frame in transit to relay `at`: all others overtake it.
     fn delay_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()

@@ -2,7 +2,8 @@
 
 use uav_relay::Stats;
 
-/// Returns the number of received frames with a valid CRC. Each such frame is in exactly one of the summed counters.
+/// Returns the number of received frames with a valid CRC, as a sum of counters. Each such frame is in exactly one of
+/// the summed counters.
 ///
 /// `key` is true if the relay has a signing key. It then rejects unsigned frames, and their counter is added. Without
 /// a key it accepts them, and they are in the counters of accepted frames.

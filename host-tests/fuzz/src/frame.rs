@@ -21,7 +21,7 @@ use super::watch::NETWORK;
 
 const CHECK: usize = 4;
 
-/// Byte of fuzzer input that selects signed frames in `setting::of_chain`.
+/// Value of a byte of fuzzer input that makes `setting::of_chain` select signed frames.
 const SIGNS: u8 = 8;
 
 /// Fuzz target. Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
@@ -202,7 +202,7 @@ fn check_round_trip(plain: &[u8], wire: &[u8]) {
     }
 }
 
-/// Checks that a flipped bit in a frame is detected. The bytes of the CRC determine which bit is flipped.
+/// Checks that the CRC detects a flipped bit in a frame. The bytes of the CRC determine which bit is flipped.
 fn check_flipped_bit(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;

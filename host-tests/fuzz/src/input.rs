@@ -16,12 +16,12 @@ impl<'a> Input<'a> {
         Self { rest: bytes }
     }
 
-    /// Returns true at the end of the input.
+    /// Returns true if all bytes of the fuzz input have been read.
     pub const fn is_empty(&self) -> bool {
         self.rest.is_empty()
     }
 
-    /// Returns the bytes not read yet.
+    /// Returns the bytes of the fuzz input that have not been read yet.
     pub const fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -37,17 +37,17 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Reads two bytes as a little-endian number.
+    /// Reads two bytes as a little-endian number; missing bytes count as 0.
     pub const fn word(&mut self) -> u16 {
         u16::from_le_bytes([self.byte(), self.byte()])
     }
 
-    /// Reads four bytes as a little-endian number.
+    /// Reads four bytes as a little-endian number; missing bytes count as 0.
     pub const fn long(&mut self) -> u32 {
         u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])
     }
 
-    /// Reads a byte; returns true if it is odd.
+    /// Reads a byte of the fuzz input; returns true if it is odd.
     pub const fn flag(&mut self) -> bool {
         self.byte() % 2 == 1
     }

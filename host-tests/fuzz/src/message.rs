@@ -115,7 +115,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the profiles of up to eight relays to the message, as in a Gather. Their indices mostly rise.
+    /// Appends profiles (altitude and power) of up to eight relays to the message. Their indices mostly rise.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -164,9 +164,7 @@ impl Body<'_, '_> {
         self.small(0, 0xFE);
     }
 
-    /// Appends the first fields of a Proposal or Decision to the message.
-    ///
-    /// They are the mission, the view and a relay's index in the view.
+    /// Appends the first fields of a Proposal or Decision: mission, view, and a relay's index in the view.
     fn call(&mut self) {
         let MissionId { digest, version } = self.mission_id();
         self.word(digest);

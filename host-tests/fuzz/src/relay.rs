@@ -67,7 +67,7 @@ struct TestFrame {
     counter: ExpectedCounter,
 }
 
-/// Statistics counter in which the tested relay must count a frame.
+/// Statistics counter in which the tested relay must count a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum ExpectedCounter {
     Counted,
@@ -391,7 +391,8 @@ impl Bench {
     }
 }
 
-/// Returns the number of frames counted as accepted or rejected. `key` is true if the relay has a signing key.
+/// Returns the number of received frames that the relay has counted as accepted or rejected. `key` is true if it has
+/// a signing key.
 fn frames(stats: &Stats, key: bool) -> u64 {
     let broken = [stats.oversized, stats.truncated, stats.crc];
     let broken: u64 = broken.into_iter().map(u64::from).sum();

@@ -95,7 +95,7 @@ fn look_at_field(field: &Field) {
     }
 }
 
-/// Checks that the mission's numbers are finite; their ranges are checked by `Mission::try_new`.
+/// Checks that the numbers of a mission from a scenario file are finite.
 fn look_at_mission(mission: &Mission) {
     let config = mission.config();
     let numbers = [

@@ -63,7 +63,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the paper's scenario with `relays` relays, changed in one respect, which `kind` selects.
+/// Returns the paper's scenario with `relays` relays and one change, which `kind` selects. `None` for no such kind.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,

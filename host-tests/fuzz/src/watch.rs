@@ -41,11 +41,11 @@ pub struct Sent {
     pub bytes: Vec<u8>,
 }
 
-/// Relay under test, and its state at the last check.
+/// Relay under test, with its state at the last check of its rules.
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
-    /// Node number of the relay.
+    /// Node number of the relay under test.
     node: u16,
     /// Number of relays in the mission.
     all: u16,

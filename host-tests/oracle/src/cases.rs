@@ -37,7 +37,7 @@ pub struct Params {
     /// Interferer's lateral offset from the line Tx-Rx, metres.
     #[serde(rename = "Y")]
     pub y: f64,
-    /// Tx-Rx distance, metres.
+    /// Distance from Tx to Rx, metres.
     #[serde(rename = "D")]
     pub d: f64,
     /// Altitude of all relays, metres.
@@ -68,7 +68,7 @@ pub struct Case {
     pub args: Value,
     /// Result of the function: one value, or an object of named values.
     pub out: Value,
-    /// Relative accuracy of the result.
+    /// Relative accuracy of the result, as a tolerance for comparisons.
     pub rtol: f64,
     /// Name of the case, unique in the file.
     pub id: String,
@@ -99,7 +99,7 @@ pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
 }
 
 impl Case {
-    /// Returns the case's scenario as a link with `n` relays, all at the same altitude.
+    /// Returns the scenario of this case as a link with `n` relays, all at the same altitude.
     pub fn link(&self, n: usize) -> Link {
         let p = &self.params;
         Link {
@@ -128,38 +128,38 @@ impl Case {
         self.args.get("N")?.as_u64()?.try_into().ok()
     }
 
-    /// Returns the argument `name` as a number.
+    /// Returns the argument `name` of this case as a number; `None` if it is not one.
     pub fn arg(&self, name: &str) -> Option<f64> {
         number(self.args.get(name)?)
     }
 
-    /// Returns the argument `name` as a list of numbers.
+    /// Returns the argument `name` of this case as a list of numbers; `None` if it is not one.
     pub fn arg_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.args.get(name)?)
     }
 
-    /// Returns the result if it is one number.
+    /// Returns the result of this case if it is a single number.
     pub fn value(&self) -> Option<f64> {
         number(&self.out)
     }
 
-    /// Returns the result if it is one list.
+    /// Returns the result of this case if it is a list of numbers.
     pub fn values(&self) -> Option<Vec<f64>> {
         list(&self.out)
     }
 
-    /// Returns the named value `name` of the result as a number.
+    /// Returns the part `name` of the case's result as a number; `None` if it is not one.
     pub fn part(&self, name: &str) -> Option<f64> {
         number(self.out.get(name)?)
     }
 
-    /// Returns the named value `name` of the result as a list of numbers.
+    /// Returns the part `name` of the case's result as a list of numbers; `None` if it is not one.
     pub fn part_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.out.get(name)?)
     }
 }
 
-/// Reads a JSON number, or a word for a value that JSON cannot represent.
+/// Reads a JSON number, or a word such as "inf" for a value that JSON cannot represent.
 fn number(value: &Value) -> Option<f64> {
     match value.as_str() {
         Some("nan") => Some(f64::NAN),

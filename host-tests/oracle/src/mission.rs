@@ -129,7 +129,8 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
     Mission::try_new(config).ok()
 }
 
-/// Carrier frequency, Hz, at which (4 pi f / c)^2 is 1, so that excess losses equal path-loss factors.
+/// Carrier frequency at which the free-space factor (4 pi f / c)^2 is 1, Hz. Excess losses then equal path-loss
+/// factors.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
 /// Rounds every number of `link` to the f32 of relays, so that only a relay's arithmetic is tested.

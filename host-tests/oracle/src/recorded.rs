@@ -38,7 +38,7 @@ pub struct Optimum {
 /// Recorded placement problem with its best known chain.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Test that draws this problem, and the test's random stream, such as `joint_method own 7`.
+    /// Name of the test that draws this problem, with its random stream, such as `joint_method own 7`.
     pub set: String,
     /// Link, and the corridor in which its relays choose positions. In the link the relays are at the lowest
     /// altitude.
@@ -139,7 +139,7 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a placement problem in f32. They identify the problem in the recorded file.
+/// Returns all parameters of a placement problem in f32, by which it is found in the recorded file.
 ///
 /// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {

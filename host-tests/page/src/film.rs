@@ -20,7 +20,7 @@ const FRAMES: usize = 20_000;
 
 #[derive(Serialize)]
 pub(crate) struct FilmTold {
-    /// Pictures of the chain in order of time, one for each time at which something changed.
+    /// Pictures of the chain in order of time: one for each time at which something has changed.
     stands: Vec<StandTold>,
     /// Frames that were sent, each with its time in s, sender's index, and direction.
     ///
@@ -52,7 +52,7 @@ struct StandTold {
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
-    /// New interference estimate of the relays, if they measure the interference.
+    /// New interference estimate of the relays at this time. `None` without a change, or if they measure nothing.
     believed: Option<InterferenceEstimate>,
 }
 

@@ -22,7 +22,7 @@ use film::FilmTold;
 
 const NAME: &str = "the page";
 
-/// Number of simulator events between two checks of the limit on virtual time.
+/// Number of simulator events between two checks that the run is not longer than permitted.
 const HAPPENINGS: u64 = 20_000;
 
 /// Longest run, s of virtual time: a longer one is an error, so that the page stays responsive.

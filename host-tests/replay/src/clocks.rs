@@ -12,19 +12,20 @@ use uav_relay_capture::Direction;
 
 use crate::recording::{Frame, Recording};
 
-/// Time for which one offset is determined, s. Clocks drift by 100 ppm at most, 2 ms in this time.
+/// Time window for which one clock offset is determined, s. Clocks drift by 100 ppm at most: 2 ms in it.
 const WINDOW: f64 = 20.0;
 
-/// Change of the offset between two consecutive frames that is a step of a clock, s. So is as much time backward.
+/// Change of the clock offset between two consecutive frames that counts as a step of a clock, s. Also a backward
+/// jump by as much.
 const STEP: f64 = 2.0;
 
-/// Largest time between files without a common frame, and between two frames of a flight, s.
+/// Largest time between two files without a common frame, and between two frames of one flight, s.
 const APART: f64 = 3_600.0;
 
 /// Relation of a file's clock to that of the first file.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
-    /// Name of the file.
+    /// Name of the capture file.
     pub name: String,
     /// Number of frames that connect the clocks; `None` for the first file.
     pub common: Option<usize>,
@@ -32,7 +33,8 @@ pub struct Alignment {
     pub offset_s: [f64; 2],
 }
 
-/// Offsets of a file's clock from one frame of the file on, s: each at a time of that clock.
+/// Part of a file, from one frame on, in which the offset of the file's clock is known. Each offset, s, is at a time
+/// of that clock.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -50,7 +52,8 @@ impl Segment {
     }
 }
 
-/// Bounds of an offset in one window, s, and the offsets by frames that were received in both files.
+/// Bounds of the clock offset in one time window, s. It also has the offsets by frames that were received in both
+/// files.
 #[derive(Default)]
 struct Window {
     times: Vec<f64>,
@@ -86,7 +89,7 @@ impl Window {
     }
 }
 
-/// Frames of a file that occur once in it, by their bytes.
+/// Returns the frames that occur exactly once in a file, by their bytes.
 fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     let mut known = HashMap::new();
     for (index, frame) in frames.iter().enumerate() {
@@ -96,7 +99,8 @@ fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     known
 }
 
-/// Frames of aligned files: time by the reference clock, and direction. Sent frames replace received ones.
+/// Frames of aligned files by their bytes: time by the reference clock, and direction. Sent frames replace received
+/// ones.
 type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
 
 fn add(aligned: &mut Aligned, frames: &[Frame]) {
@@ -109,14 +113,14 @@ fn add(aligned: &mut Aligned, frames: &[Frame]) {
     }
 }
 
-/// Frames of all files.
+/// Frames of all files, merged by time.
 #[derive(Clone, Debug)]
 pub struct Merged {
     /// Frames, sorted by the clock of the first file, each once.
     pub frames: Vec<Frame>,
-    /// Relations of the clocks, in the order of the files.
+    /// Relation of each file's clock to that of the first file, in the order of the files.
     pub files: Vec<Alignment>,
-    /// Warnings, one line each.
+    /// Warnings about the captured files, one line each.
     pub warnings: Vec<String>,
 }
 
@@ -198,7 +202,8 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     })
 }
 
-/// Removes steps of a clock: more than [`STEP`] backward or [`APART`] forward. The clock after the last step counts.
+/// Removes steps of a file's clock: more than [`STEP`] backward or [`APART`] forward. The clock after the last step
+/// is kept.
 ///
 /// Returns a description of them; `None` for no step.
 fn without_steps(frames: &mut [Frame]) -> Option<String> {
@@ -250,7 +255,7 @@ fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
     }
 }
 
-/// Checks that a file without common frames is of the time `span` of the others, by its own clock.
+/// Checks that a file without common frames is from the time `span` of the others, by its own clock.
 fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     let times = file.frames.iter().map(|frame| frame.at);
     let [first, last] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
@@ -279,7 +284,7 @@ fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
         .unwrap_or(to)
 }
 
-/// Converts the times of a file to the reference clock.
+/// Converts the frame times of a file to the reference clock. Returns the relation of the two clocks.
 fn align(file: &mut Recording, aligned: &Aligned, common: Option<usize>) -> Alignment {
     let own = once(&file.frames);
     let mut windows: Vec<(usize, Vec<Window>)> = Vec::new();

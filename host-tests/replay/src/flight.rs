@@ -13,19 +13,20 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two computed snapshots, s. Alarms compare times of seconds, so it is the same in a flight of any duration.
+/// Time between two computed snapshots of a flight, s. Alarms compare times of seconds, so it does not depend on the
+/// flight's duration.
 const PERIOD: f64 = 0.5;
 
-/// Number of stored snapshots, besides the last one. Of a flight with more, only every k-th is stored.
+/// Largest number of stored snapshots besides the last one. Of a longer flight only every k-th is stored.
 const MOST: f64 = 7_200.0;
 
-/// Longest time between two reported positions between which a position is interpolated, s.
+/// Longest time between two reported positions for which a position in between is interpolated, s.
 const GAP: f64 = 5.0;
 
 /// Mission that the chain loaded before flight, as the scenario describes it.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// Mission with all parameters.
+    /// Mission loaded before flight, with all parameters.
     pub mission: Mission,
     /// Relays with an altitude or a power of their own.
     pub profiles: Vec<(u16, Profile)>,
@@ -33,21 +34,22 @@ pub struct Loaded {
     pub axis: Option<Axis>,
 }
 
-/// Time in which a relay did not report.
+/// Period in which a relay did not report.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Loss {
-    /// Number of the relay; 0 for all relays at once.
+    /// Number of the silent relay; 0 if all relays were silent at once.
     pub relay: u16,
-    /// Time of the last report before, s.
+    /// Time of the last report before the silence, s.
     pub from: f64,
-    /// Time of the next report, s; `None` if there is none.
+    /// Time of the first report after the silence, s; `None` if there is none.
     pub until: Option<f64>,
     /// True if another relay has reported the relay as lost.
     pub is_reported: bool,
 }
 
 impl Loss {
-    /// Returns true if a relay was silent only in an outage of all, or up to 5 s before or after it.
+    /// Returns true if the relay was silent only because all relays were. `all` is that outage; up to 5 s before or
+    /// after it count, too.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -57,57 +59,56 @@ impl Loss {
     }
 }
 
-/// Least distance of two relays in the air.
+/// Closest approach of two relays in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
-    /// Distance, m.
+    /// Smallest distance of the two relays in the flight, m.
     pub distance_m: f64,
-    /// Numbers of the relays.
+    /// Numbers of the two relays that came closest.
     pub relays: [u16; 2],
-    /// Time, s.
+    /// Time of the closest approach of two relays, s.
     pub time_s: f64,
 }
 
 /// Recorded flight. Times are in s since its first frame.
 #[derive(Debug, Default)]
 pub struct Flight {
-    /// Time of the first frame, s since 1970.
+    /// Time of the flight's first frame, s since 1970-01-01.
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
     /// Time between two stored snapshots, s. The last one is at the end of the flight.
     pub period: f64,
-    /// Snapshots, each as its difference from the one before.
+    /// Stored snapshots as JSON, each as its difference from the one before.
     pub steps: Vec<Value>,
-    /// Last snapshot.
+    /// Last snapshot of the flight.
     pub last: Snapshot,
-    /// Log of the flight.
+    /// Log of the flight, as the ground station would have shown it.
     pub log: Vec<LogLine>,
-    /// Alarms of the flight.
+    /// Alarms of the flight, as the ground station would have shown them.
     pub alarms: Vec<Alarm>,
-    /// Number of relays.
+    /// Number of relays in the recorded flight.
     pub relays: u16,
-    /// First agreement of all relays, and the shares of the time since then in which they had agreed.
-    ///
-    /// The first share is that of all relays, the second that of as many as the last agreed view had then.
+    /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first all relays
+    /// had agreed, in the second as many as the last agreed view had.
     pub available: Option<(f64, [f64; 2])>,
-    /// Lowest SIR of a known hop since the stored snapshot before, for each stored one, dB.
+    /// Lowest SIR of any known hop since the previous stored snapshot, for each stored snapshot, dB.
     pub worst_db: Vec<Option<f64>>,
-    /// Times in which relays did not report.
+    /// Periods in which relays did not report.
     pub losses: Vec<Loss>,
-    /// Agreed views: time, number of the view, and number of its relays.
+    /// Agreed views (memberships of the chain): time, number of the view, and number of its relays.
     pub views: Vec<(f64, u32, u16)>,
-    /// Least distance of two relays in the air.
+    /// Closest approach of two relays in the air; `None` if there is none.
     pub nearest: Option<Nearest>,
 }
 
-/// Returns the largest number of a relay in the reports; 0 without reports.
+/// Returns the largest relay number in the reports; 0 without reports.
 pub fn largest(frames: &[Frame]) -> u16 {
     let entries = frames.iter().flat_map(entries);
     entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
 }
 
-/// Returns the entries of a frame with their details.
+/// Returns the report entries (states of relays) in a frame with their details. None for other messages.
 fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
     let report = match &frame.message {
         Some(Message::Report(report)) => Some(report),
@@ -167,12 +168,12 @@ impl Flight {
         flight
     }
 
-    /// Returns the time of a stored snapshot, s.
+    /// Returns the time of the stored snapshot with index `step`, s.
     pub fn time_of(&self, step: usize) -> f64 {
         (step as f64 * self.period).min(self.duration)
     }
 
-    /// Finds the agreed views, and the missions that a ground station uploads.
+    /// Records the agreed views, and the missions that a ground station uploads, from all frames.
     fn follow_frames(&mut self, frames: &[Frame]) {
         let mut offered = Vec::new();
         for frame in frames {
@@ -248,20 +249,21 @@ struct Recorder<'a> {
     loaded: Option<&'a Loaded>,
     view: StationView,
     uploads: BTreeMap<u16, Upload>,
-    /// End of the chain from which the last Watch of a station came.
+    /// End of the chain at which the station is that last sent a Watch (request for reports).
     end: Side,
-    /// Number of reports and of frames that have been used.
+    /// Numbers of reports and of frames that have been processed.
     used: [usize; 2],
     received: u32,
     newest: BTreeMap<u16, Report>,
     tracks: BTreeMap<u16, Vec<(f64, Placement)>>,
-    /// Lowest SIR since the last stored snapshot, dB.
+    /// Lowest SIR since the last stored snapshot, dB; `None` if no hop's SIR is known.
     worst_db: Option<f64>,
-    /// Times in which relays do not report now, by relay.
+    /// Periods without a report that have not ended yet, by relay number.
     open: BTreeMap<u16, Loss>,
-    /// Last time when no relay reported.
+    /// Last time at which no relay was reporting its state.
     silent_at: Instant,
-    /// First agreement, and numbers of snapshots: since then, with all relays, with all members.
+    /// Time of the first agreement, s, and three numbers of snapshots since then. They count all snapshots, those
+    /// with all relays agreed, and those with all members agreed.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -376,7 +378,7 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Follows availability and losses.
+    /// Updates the availability and the periods without reports by the snapshot at `now`.
     fn losses(&mut self, flight: &mut Flight, now: f64, snapshot: &Snapshot) {
         let is_fresh = |report: &Report| instant(now).since(report.at) < SILENT_AFTER;
         let reporting: Vec<&Report> = self.newest.values().filter(|it| is_fresh(it)).collect();
@@ -428,7 +430,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Compares the distances of all relays at a time, or of relay `only` from all others.
+    /// Updates the closest approach by the distances of all relays at a time. With `only`, only this relay's
+    /// distances are new.
     fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
@@ -476,7 +479,7 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Returns the text of a station's alarm without what the station knows of received frames. A replay knows only reports.
+/// Removes from a station's alarm what a replay cannot know: the station's received frames.
 fn replayed(text: String) -> String {
     match text.split_once("nothing received from the chain") {
         Some(("", rest)) => {
@@ -522,7 +525,7 @@ fn compact(snapshot: &Snapshot, now: f64) -> Value {
     value
 }
 
-/// Rounds all numbers to two decimals, except small powers and degrees.
+/// Rounds all numbers in a JSON value to two decimals, except small powers and degrees.
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {

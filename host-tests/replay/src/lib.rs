@@ -21,17 +21,17 @@ use uav_relay_scenario::mission::{mission, with_access};
 use flight::{Flight, Loaded};
 use recording::Recording;
 
-/// Tolerance of missions: that of the Linux programs, and the default of the simulator.
+/// Relative tolerance of the SIR in missions, as in the Linux programs and the simulator.
 const TOLERANCE: f64 = 1e-4;
 
 /// Replay of a flight: its page, and lines that describe it.
 #[derive(Debug)]
 pub struct Replay {
-    /// The flight.
+    /// Computed flight that the page shows.
     pub flight: Flight,
-    /// Page as HTML.
+    /// Page of the replay as HTML.
     pub html: String,
-    /// Warnings, one line each.
+    /// Warnings about the input files, one line each.
     pub warnings: Vec<String>,
 }
 

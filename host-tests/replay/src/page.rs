@@ -17,7 +17,7 @@ const BAR: &str = include_str!("../web/bar.html");
 /// Width and height of the chart, and its margins at the left and the bottom, px.
 const CHART: [f64; 4] = [1000.0, 180.0, 44.0, 22.0];
 
-/// Returns the page of a flight as HTML that loads nothing. `name` is the title of the report.
+/// Returns the page of a flight as a single HTML document that loads nothing else. `name` is the title of the report.
 pub fn page(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
     let file = |name: Option<&str>| {
         let mut files = FILES.iter();
@@ -229,7 +229,7 @@ fn loss(loss: &Loss) -> String {
     format!("{}: {whom}, no report {until}{by}", time(loss.from))
 }
 
-/// Draws the SIR of the worst hop over time, with a line at 0 dB.
+/// Draws the SIR of the worst hop over time as SVG, with a line at 0 dB.
 fn chart(flight: &Flight, known: impl Iterator<Item = (usize, f64)> + Clone) -> String {
     let [width, height, left, bottom] = CHART;
     let bounds = known

@@ -20,7 +20,7 @@ pub struct Frame {
     pub direction: Direction,
     /// Bytes of the frame on the wire.
     pub wire: Vec<u8>,
-    /// Addresses of the frame.
+    /// Network, sender, destination and counter of the frame.
     pub header: Header,
     /// Message of the frame; `None` for a handshake, and for a message that no relay accepts.
     pub message: Option<Message>,
@@ -29,15 +29,15 @@ pub struct Frame {
 /// Frames of one capture file, in the order of the file.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Name of the file.
+    /// Name of the capture file.
     pub name: String,
     /// Intact frames of the file's network.
     pub frames: Vec<Frame>,
-    /// Network number of most frames.
+    /// Number of the network that most frames of the file belong to.
     pub network: u16,
     /// Digest of the mission that the chain loaded before flight; `None` if no frame of the file has it.
     pub mission: Option<u16>,
-    /// Fault of the file, after its last readable frame.
+    /// Fault in the file after its last readable frame; `None` if it is intact.
     pub fault: Option<String>,
 }
 
@@ -127,7 +127,7 @@ fn loaded(message: &Message) -> Option<u16> {
     }
 }
 
-/// Returns the most frequent number.
+/// Returns the most frequent of the numbers; `None` without numbers.
 fn most(numbers: impl Iterator<Item = u16>) -> Option<u16> {
     let mut counts = BTreeMap::<u16, usize>::new();
     for number in numbers {

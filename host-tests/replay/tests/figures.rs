@@ -15,7 +15,7 @@ use uav_relay_replay::flight::Flight;
 use uav_relay_replay::recording::{Frame, Recording};
 use uav_relay_replay::{clocks, page};
 
-/// State of a relay that its pilot flies.
+/// State number of a relay whose drone is flown by its pilot.
 const FLOWN: u16 = 4_096;
 
 /// Returns a frame with the report of a relay at `x_m` on the line, at a time in s.
@@ -92,7 +92,7 @@ fn a_near_pass_between_two_snapshots_is_found() {
     assert_eq!(nearest.relays, [1, 2]);
 }
 
-/// Returns the recording of a relay whose frames have these times.
+/// Returns a recording with frames of relay `relay` at these times, s.
 fn recording(relay: u16, times: impl Iterator<Item = f64>) -> Recording {
     let frames = (0..u64::MAX).zip(times).map(|(number, at)| Frame {
         wire: [u64::from(relay).to_le_bytes(), number.to_le_bytes()].concat(),

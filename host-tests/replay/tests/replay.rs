@@ -33,7 +33,8 @@ struct Flown {
     places: BTreeMap<u16, [f64; 2]>,
 }
 
-/// Flies a chain whose ground station at Tx watches: over wires, or on a shared channel. Relay 2 is switched off at `kill_s`.
+/// Simulates a chain whose ground station at Tx requests reports, over wires or on a shared channel. Relay 2 is
+/// switched off at `kill_s`.
 fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown {
     let (mission, _) = mission(&Scenario::default(), relays, 1e-4).unwrap();
     let mut setup = if is_shared {
@@ -78,7 +79,7 @@ fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown
     }
 }
 
-/// Clock of a node: offset, s, drift, and from a time on a step, s.
+/// Clock of a simulated node: offset, s, drift, and a step from some time on, s.
 #[derive(Clone, Copy, Default)]
 struct Clock {
     offset: f64,
@@ -218,7 +219,8 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
     assert!(shown.worst_db.last().unwrap().is_some());
 }
 
-/// Returns the captures of all nodes, by one clock. Relay 2 is switched off at `kill_s`.
+/// Writes the captures of all nodes with one common clock, and returns their paths. Relay 2 is switched off at
+/// `kill_s`.
 fn captures(flown: &Flown, folder: &Path, relays: u16, kill_s: f64) -> Vec<PathBuf> {
     let clock = Clock {
         offset: EPOCH,

@@ -92,7 +92,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if the table also has a key that excludes it, as `power_w` excludes `power_dbm`.
+    /// Rejects `key` if its table also has a key that excludes it, as `power_w` excludes `power_dbm`.
     fn check_exclusive(
         &self,
         path: &str,
@@ -180,7 +180,7 @@ impl Check<'_> {
     }
 }
 
-/// Least Jaro-Winkler similarity, 0 to 1, of a known key that an error message suggests.
+/// Least similarity (Jaro-Winkler, 0 to 1) at which an error message suggests a known key.
 const ALIKE: f64 = 0.8;
 
 /// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if none is similar.

@@ -108,7 +108,7 @@ pub struct Ground {
     pub measurements: Option<String>,
     /// Address and port at which a page shows the chain in a browser.
     pub web: Option<String>,
-    /// File with the password of the page.
+    /// File with the password of the ground station's web page.
     pub web_password: Option<PathBuf>,
     /// True to write log lines as JSON.
     pub json: Option<bool>,

@@ -7,12 +7,13 @@ use core::fmt;
 
 const PREFIX: &str = "udp:";
 
-/// Ports at which PX4's simulation listens for a companion computer, one for each vehicle from 0 to 9.
+/// UDP ports at which PX4's simulation listens for a companion computer: one for each vehicle, 0 to 9.
 const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
-/// Local port to which vehicle 0 of PX4's simulation sends. Each further vehicle sends to the next port.
+/// Local UDP port to which vehicle 0 of PX4's simulation sends. Each further vehicle sends to the next port.
 const PX4_SENDS_TO: u16 = 14_540;
 
-/// Difference of the default local port and the autopilot's port, for ports outside of [`PX4_LISTENS`].
+/// Default difference of the companion's local port and the autopilot's port. It is for ports outside of
+/// [`PX4_LISTENS`].
 const APART: u16 = 1_000;
 
 /// Description of a valid UDP address and its ports, for error messages.

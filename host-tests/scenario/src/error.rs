@@ -6,7 +6,7 @@ use toml::Value;
 
 use crate::endpoint::EndpointError;
 
-/// Length at which an error message cuts a quoted value, characters.
+/// Number of characters to which an error message shortens a quoted value.
 const QUOTED: usize = 60;
 
 /// A mistake in a scenario file; displayed as exactly one line.
@@ -18,7 +18,7 @@ pub struct ScenarioError {
     pub key: Option<String>,
     /// Wrong value as TOML, cut if it is long; `None` if the mistake is not in a value.
     pub value: Option<String>,
-    /// Kind of the mistake.
+    /// Kind of the mistake in the scenario file.
     pub problem: Problem,
     /// Allowed values, for the message: a range with its unit, or the keys that the table may have.
     pub allowed: String,
@@ -54,7 +54,7 @@ pub enum Problem {
     UnknownChoice,
     /// The UDP address of an autopilot is malformed.
     NoEndpoint(EndpointError),
-    /// The number of positions in the plan, or of relays in `[network]`, differs from `plan.uavs`.
+    /// The number of positions in `[plan]`, or of relays in `[network]`, differs from `plan.uavs`.
     OtherNumber,
     /// The file has a single table where a list of tables is required.
     NoList,
@@ -74,7 +74,7 @@ pub enum Problem {
     NoInterference,
     /// Two `[[relay]]` tables have the same index.
     DuplicateRelay,
-    /// A `[[relay]]` table gives the relay neither an altitude nor a power of its own.
+    /// A `[[relay]]` table is useless: it gives the relay neither an altitude nor a power of its own.
     NothingDiffers,
     /// The given distance between Tx and Rx contradicts the one computed from their geographic positions.
     OtherDistance,

@@ -21,7 +21,8 @@ const FINE: usize = 4_000;
 /// Number of steps from Tx to Rx in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both
 /// sides of the line at these positions.
 const ALONG: u32 = 64;
-/// Number of lateral steps in the grid of relay positions that [`Hypothetical::sided`] uses.
+/// Number of lateral steps in a grid of relay positions. [`Hypothetical::sided`] compares an interferer on both sides
+/// of the line at these positions.
 const ASIDE: u32 = 8;
 
 /// Approximate number of points at which the reported error of the fitted interferer is evaluated.
@@ -37,7 +38,8 @@ const FAR: f64 = 30.0;
 /// altitude), so its steps in y_H grow: far from the line each multiplies y_H by about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of local searches that start at points of the grid. Up to as many more start at true interferers.
+/// Largest number of local searches that start at local minima of the grid. Up to as many more start at true
+/// interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -108,7 +110,7 @@ impl Hypothetical {
     }
 }
 
-/// Best position of the hypothetical interferer for a given set of quadrature points ([`Raster`]).
+/// Best position of the hypothetical interferer, for the quadrature points of a [`Raster`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Position x_H of the hypothetical interferer along the line from Tx, m.
@@ -309,7 +311,7 @@ impl Space {
     }
 }
 
-/// Largest width of a quadrature cell, relative to the distance to the nearest interferer.
+/// Largest width of a quadrature cell, as a fraction of the distance to the nearest interferer.
 const WIDEST_STEP: f64 = 0.9;
 
 const TRIES: u32 = 6;
@@ -559,7 +561,8 @@ impl Centre {
     }
 }
 
-/// Returns the ends of grid cells from `low` to `high`, in increasing order. Cells are smaller near the `centres`.
+/// Returns the ends of the grid's cells from `low` to `high`, in increasing order. Cells are smaller near the
+/// `centres`.
 ///
 /// A cell is at most 1.5 times as wide as the smaller of `widest` and `step` (below 1) times the length over which
 /// the function changes there. There are about (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step

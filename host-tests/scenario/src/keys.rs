@@ -27,7 +27,7 @@ pub(super) enum Rule {
     Flag,
     Choice(&'static [&'static str]),
     Text,
-    /// List of at least one text, none of them empty.
+    /// Value of a key that must be a list of at least one text, none of them empty.
     Texts,
     /// Text that names a serial port or the UDP address of an autopilot.
     TtyOrUdp,
@@ -40,7 +40,7 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// The key is required unless its table has at least one of these other keys.
+    /// Required unless the table has at least one of these other keys.
     Unless(&'static [&'static str]),
 }
 

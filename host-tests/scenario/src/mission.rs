@@ -21,14 +21,14 @@ pub enum Refusal {
     NoHypothetical,
     /// The distance from Tx to Rx is too short for that number of relays at their minimum separation.
     NoRoom {
-        /// Number of relays.
+        /// Number of relays for which the distance is too short.
         relays: u16,
-        /// Least separation of two relays, m.
+        /// Minimum separation of two relays, m.
         apart_m: f32,
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The scenario has fitted slots with a table of rate steps, which relays cannot fit.
+    /// The scenario combines fitted slots with a table of rate steps, to which relays cannot fit slots.
     Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
@@ -206,7 +206,7 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
         .collect()
 }
 
-/// Returns the mission as known before the first measurements: equal interference everywhere.
+/// Returns the mission before the first measurements, with equal interference everywhere.
 ///
 /// In a random field, the mean of the inverse interference is set everywhere to the value that it has at Rx. A
 /// mission without a random field is returned unchanged.

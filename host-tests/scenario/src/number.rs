@@ -9,7 +9,7 @@ pub fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// Returns the linear ratio of powers for `db` decibels.
+/// Converts decibels `db` to a linear ratio of powers.
 #[must_use]
 pub fn factor(db: f64) -> f64 {
     10_f64.powf(db / 10.0)

@@ -31,7 +31,7 @@ pub struct Corridor {
 }
 
 impl Corridor {
-    /// Creates limits without lateral freedom: the vertical plane from Tx to Rx, between two altitudes, m.
+    /// Creates limits without lateral offsets: the vertical plane from Tx to Rx, between two altitudes, m.
     pub const fn plane(least_m: f64, most_m: f64) -> Self {
         Self {
             least_m,
@@ -283,7 +283,7 @@ impl Scene {
 /// Sender of a signal that a relay receives: its position, its power and the path-loss factor.
 #[derive(Debug, Clone, Copy)]
 pub struct Sender {
-    /// Position of the sender.
+    /// Position of the node that sends over the hop.
     pub at: Place,
     power_w: f64,
     factor: f64,

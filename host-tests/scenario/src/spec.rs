@@ -128,7 +128,7 @@ pub struct ListenSpec {
 }
 
 impl ListenSpec {
-    /// Returns the measurement settings with defaults filled in, for a chain of `uavs` relays.
+    /// Returns the measurement settings of a chain of `uavs` relays; missing ones have their defaults.
     pub fn of(&self, uavs: u16) -> Listen {
         let default = if self.following {
             Listen::following(uavs)
@@ -200,7 +200,8 @@ impl Noise {
         self.receiver_w() / factor(relays.min(rx))
     }
 
-    /// Returns true if the mission's noise power is too high for the receivers with more antenna gain.
+    /// Returns true if the mission's noise power is too high for some receivers. This is so if the antenna gains of
+    /// relays and Rx differ.
     ///
     /// A mission has a single noise power for all receivers, which is right for the lowest antenna gain.
     pub fn is_uneven(&self) -> bool {

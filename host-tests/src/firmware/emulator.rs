@@ -23,10 +23,10 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Choice of the speed of an emulated drone's clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Life {
-    /// Clock of the drone runs [`SPEED`] times as fast as the wall clock.
+    /// The drone's clock runs [`SPEED`] times as fast as the wall clock.
     #[default]
     Fast,
-    /// Clock of the drone runs in real time.
+    /// The drone's clock runs in real time.
     Real,
 }
 

@@ -11,7 +11,7 @@ use uav_relay::MAX_FRAME;
 use super::emulator::SPEED;
 use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 
-/// Maximum number of bytes without a frame delimiter; a longer sequence is forwarded in pieces.
+/// Maximum number of bytes without a frame delimiter that the links collect before they forward them.
 const LONGEST: usize = 2 * MAX_FRAME;
 
 #[derive(Clone, PartialEq, Eq, Debug)]

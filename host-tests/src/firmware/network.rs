@@ -18,7 +18,7 @@ use uav_relay_sim::simulator::faults::Injected;
 /// Timeout of a write to a drone's socket that has accepted only the first bytes of a frame.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Size of a port's send buffer in the kernel, bytes: some four frames with their overhead.
+/// Size of the kernel's send buffer of a drone's port, bytes: some four frames with their overhead.
 const WAITING: usize = 16_384;
 
 /// Running network of emulated drones. It ends on drop, or when the drones' sockets are closed.

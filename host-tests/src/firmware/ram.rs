@@ -10,7 +10,7 @@ use super::journal::{BLANK, Flash};
 pub struct Ram {
     /// Content of each flash sector, in words of 32 bits.
     pub sectors: [Vec<u32>; 2],
-    /// Number of word writes and erases until power fails. Power fails during the last of these.
+    /// Number of word writes and erases after which power fails, in the middle of the last one.
     ///
     /// 0 while the power is off; `None` if power does not fail.
     pub power: Option<usize>,
@@ -23,7 +23,7 @@ pub struct Ram {
 
 enum Power {
     On,
-    /// Power that fails in the middle of the operation: only a random part of the bits changes.
+    /// Power fails in the middle of the operation, so that only a random part of the bits changes.
     Fails,
     Off,
 }

@@ -15,7 +15,7 @@
 //! All lengths are in metres: with the effective earth radius a, the earth rises by d1 d2 / 2a between two points. The ground is that of
 //! average land (relative permittivity 22, 0.003 S/m), and the polarisation is vertical; above 100 MHz both have little effect.
 
-/// Effective radius of the earth, m: 4/3 of its radius.
+/// Effective radius of the earth for radio propagation, m: 4/3 of its real radius.
 pub const EARTH_M: f64 = 8.5e6;
 
 /// Speed of light, m/s.
@@ -27,7 +27,7 @@ pub type Point = [f64; 2];
 /// Electrical properties of the ground, and the polarisation of the antennas.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Surface {
-    /// Relative permittivity of the ground.
+    /// Relative permittivity of the ground, for the diffraction loss.
     pub permittivity: f64,
     /// Conductivity of the ground, S/m.
     pub conductivity: f64,
@@ -80,7 +80,8 @@ pub fn knife_edge_db(v: f64) -> f64 {
     6.9 + 20.0 * ((over * over + 1.0).sqrt() + over).log10()
 }
 
-/// Returns the loss of the Bullington construction, dB. Ends and points are heights above the sea, m.
+/// Returns the loss of the Bullington construction (one equivalent knife edge), dB. Ends and points are heights above
+/// the sea, m.
 fn bullington_db(
     profile: impl Iterator<Item = Point> + Clone,
     length: f64,

@@ -18,13 +18,13 @@ use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
-/// Heights of the earth's surface, m. Other values in a file are holes.
+/// Range of valid heights of the earth's surface, m. Other values in an elevation file mark holes.
 const HEIGHTS: std::ops::RangeInclusive<f64> = -500.0..=9000.0;
 
-/// Largest difference of two cell sizes of one grid, as a fraction of the size.
+/// Largest relative difference of two files' cell sizes with which they still belong to one grid.
 const SAME_CELL: f64 = 1e-6;
 
-/// Largest distance of a file's heights from the nodes of the grid, as a fraction of a cell.
+/// Largest deviation of a file's heights from the nodes of the grid, as a fraction of a cell.
 const ALIGNED: f64 = 0.02;
 
 /// Metres per degree of latitude, for the size of cells and the text of errors.
@@ -40,7 +40,7 @@ pub enum System {
     Geographic,
     /// Easting and northing, m, in a zone of the Universal Transverse Mercator projection.
     Utm {
-        /// Number of the zone, 1 to 60.
+        /// Number of the UTM zone, 1 to 60.
         zone: u8,
         /// True in the southern hemisphere, where northings begin at 10 000 km.
         south: bool,
@@ -89,13 +89,13 @@ impl std::fmt::Display for System {
     }
 }
 
-/// Part of a grid that one file has.
+/// Part of the elevation grid that one file contains.
 struct Tile {
     file: String,
     system: System,
     /// Size of a cell, in the units of the coordinate system: to the east and to the south.
     cell: [f64; 2],
-    /// Coordinates of the north-west height.
+    /// Coordinates of the tile's north-west height, east then north.
     corner: [f64; 2],
     /// Column and row of the north-west height in the whole grid.
     at: [i64; 2],
@@ -106,10 +106,10 @@ struct Tile {
     nodata: Option<f32>,
 }
 
-/// Height of one node of the grid.
+/// Height at one node (point) of the terrain grid, or why there is none.
 enum Node<'a> {
     Height(f64),
-    /// The node is in this file, which has no height there but this value.
+    /// The node is in this file, which has this invalid value instead of a height there.
     Hole(&'a Tile, f32),
     Outside,
 }
@@ -244,9 +244,8 @@ impl Tile {
         read.map_err(|problem| format!("{name}: {problem}"))
     }
 
-    /// Returns column and row of the tile's north-west height in a grid.
-    ///
-    /// The error is the property in which the grids differ.
+    /// Returns column and row of this tile's north-west height in the grid of another tile. The error is the property
+    /// in which the two grids differ.
     fn place_in(
         &self,
         system: System,
@@ -300,7 +299,7 @@ impl Tile {
         Node::Height(height)
     }
 
-    /// Returns the coordinates of the north-west and south-east heights.
+    /// Returns the coordinates of the tile's north-west and south-east heights.
     fn corners(&self) -> [[f64; 2]; 2] {
         let [west, north] = self.corner;
         let east = west + self.cell[0] * (self.columns - 1) as f64;
@@ -380,7 +379,7 @@ fn srtm_corner(name: &str) -> Option<[f64; 2]> {
     Some([lon, lat])
 }
 
-/// Reads a GeoTIFF file.
+/// Reads a tile of terrain heights from a GeoTIFF file.
 fn geotiff(path: &Path) -> Result<Tile, String> {
     let said = |error: tiff::TiffError| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;
@@ -478,7 +477,7 @@ fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
     Some(value.split_once('<')?.0.trim())
 }
 
-/// Converts the values of a picture to heights.
+/// Converts the decoded values of a GeoTIFF picture to heights.
 #[expect(clippy::cast_possible_truncation, reason = "heights are far smaller")]
 fn numbers(values: DecodingResult) -> Result<Vec<f32>, String> {
     Ok(match values {

@@ -33,7 +33,7 @@ pub struct Ground<'a> {
     terrain: &'a Terrain,
     axis: Axis,
     step_m: f64,
-    /// Antennas of Tx and Rx.
+    /// Antennas of Tx and Rx, with their heights.
     pub ends: [Node; 2],
 }
 
@@ -42,9 +42,9 @@ pub struct Ground<'a> {
 pub struct Node {
     /// Distance from Tx along the line to Rx, m.
     pub x_m: f64,
-    /// Lateral position, m; positive to the right.
+    /// Lateral position of the antenna, m; positive to the right of the line.
     pub y_m: f64,
-    /// Height above the mean sea level, m.
+    /// Height of the antenna above the mean sea level, m.
     pub amsl_m: f64,
 }
 
@@ -57,7 +57,7 @@ pub struct Profile {
     pub points: Vec<Point>,
 }
 
-/// State of the line of sight of a hop.
+/// State of the line of sight of a hop: clear, grazing or blocked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
@@ -72,13 +72,13 @@ pub enum State {
 /// Clearance of a hop at its worst obstacle.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Clearance {
-    /// State of the line of sight.
+    /// State of the line of sight of this hop.
     pub state: State,
     /// Distance of the obstacle from the first antenna along the hop, m.
     pub along_m: f64,
     /// Height of the line of sight above the obstacle, m; below 0 if the hop is blocked.
     pub clearance_m: f64,
-    /// Clearance that a clear hop has at this place, m.
+    /// Clearance that a clear hop needs at this obstacle, m.
     pub required_m: f64,
 }
 

@@ -21,11 +21,11 @@ pub struct HopReport {
     pub required_m: f64,
     /// Distance of the obstacle from Tx along the line to Rx, m.
     pub obstacle_x_m: f64,
-    /// Lateral position of the obstacle, m.
+    /// Lateral position of the worst obstacle, m.
     pub obstacle_y_m: f64,
-    /// Latitude of the obstacle, degrees.
+    /// Latitude of the worst obstacle, degrees.
     pub obstacle_lat_deg: f64,
-    /// Longitude of the obstacle, degrees.
+    /// Longitude of the worst obstacle, degrees.
     pub obstacle_lon_deg: f64,
     /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; the same in both directions.
     pub diffraction_db: f64,
@@ -62,7 +62,7 @@ pub struct TerrainReport {
     pub terrain_sir: f64,
     /// SIR of the worst hop with the diffraction losses, dB.
     pub terrain_sir_db: f64,
-    /// Profiles of the hops, for pictures.
+    /// Terrain profiles of the hops, for pictures.
     #[serde(skip)]
     pub profiles: Vec<Profile>,
 }
@@ -70,7 +70,7 @@ pub struct TerrainReport {
 /// SIRs of a chain in free space, linear, by hop from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 pub struct FreeSpace<'a> {
-    /// SIRs in the direction to Rx.
+    /// SIRs of the hops in the direction to Rx, linear.
     pub sirs: &'a [f64],
     /// SIRs in the direction to Tx; empty if they are unknown.
     pub sirs_back: &'a [f64],

@@ -3,7 +3,7 @@
 use uav_relay::{Phase, ViewId};
 use uav_relay_sim::simulator::watch::{ObservedState, groups, has_agreed};
 
-/// Returns the observed state of a relay with a valid position, in membership view `view`. It is relay `index` of
+/// Returns the state of a relay with a valid position, as observed in membership view `view`. It is relay `index` of
 /// `relays`.
 fn seen(view: u32, relays: u16, index: u16) -> ObservedState {
     ObservedState {

@@ -26,7 +26,7 @@ fn losing(share: f64, burst: f64) -> Setup {
     setup
 }
 
-/// Returns the minimum, median, 99th percentile and maximum of times in seconds as text.
+/// Formats minimum, median, 99th percentile and maximum of times, s.
 fn spread(mut times: Vec<f64>) -> String {
     times.sort_by(f64::total_cmp);
     let at = |share: f64| times[((times.len() - 1) as f64 * share).round() as usize];

@@ -21,7 +21,7 @@ use uav_relay_sim::simulator::medium::{Access, Agenda, AirCounts, AirEvent, Medi
 /// Test bench: a radio channel with its own clock, and the frames completed on the channel.
 struct Bench {
     medium: Medium,
-    /// Receivers of each node's frames: `hearers[n]` has the nodes that receive node n.
+    /// Nodes that receive each node: `hearers[n]` are those that receive node n.
     hearers: Vec<Vec<usize>>,
     due: BinaryHeap<Reverse<(Instant, u64, usize, u8)>>,
     order: u64,
@@ -90,8 +90,8 @@ impl Bench {
         }
     }
 
-    /// Processes all remaining events. Returns each frame's sender and receivers in order of completion, and the
-    /// channel's counters.
+    /// Processes all remaining events. Returns each frame's sender and receivers in the order in which the frames
+    /// end, and the channel's counters.
     fn end(mut self) -> (Vec<(usize, Vec<usize>)>, AirCounts) {
         self.go_on(Instant::from_micros(u64::MAX));
         let sent = self.sent.into_iter();

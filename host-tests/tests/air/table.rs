@@ -9,7 +9,7 @@ use uav_relay_sim::simulator::setup::Setup;
 
 use super::*;
 
-/// Returns the simulation setup of eight relays on a CSMA channel of 57 600 baud.
+/// Returns the simulation setup of eight relays on a CSMA channel of 57 600 baud, without losses.
 fn usual() -> Setup {
     let mut setup = Setup::on_air(mission(8), Access::Csma);
     setup.link.baud = 57_600;

@@ -90,9 +90,9 @@ struct Vehicle {
     given_at: Cell<Instant>,
     place: Cell<Placement>,
     told: RefCell<Vec<(Instant, Placement)>>,
-    /// Commands of a ground station that the autopilot has yet to forward to the companion.
+    /// Commands of a ground station that the simulated autopilot has not forwarded to the companion yet.
     commands: RefCell<VecDeque<MavMessage>>,
-    /// Results of the ground station's commands, as the companion answers them.
+    /// Results with which the companion has answered the ground station's commands.
     results: RefCell<Vec<u32>>,
 }
 
@@ -199,7 +199,8 @@ fn point(target: &SET_POSITION_TARGET_GLOBAL_INT_DATA) -> Geodetic {
     }
 }
 
-/// Creates relay 1 of `relays` relays with a motion guard, between surveyed positions of Tx and Rx.
+/// Creates relay 1 of `relays` relays, between surveyed positions of Tx and Rx. It has a motion guard (collision
+/// avoidance).
 fn relay(relays: u16) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
@@ -216,7 +217,7 @@ fn relay(relays: u16) -> Relay {
     fixtures::relay(mission, 1, settings)
 }
 
-/// State of relay and autopilot that the firmware task of the test has observed.
+/// State of relay and autopilot as the test's firmware task has last observed it.
 #[derive(Default)]
 struct Observed {
     events: Vec<AutopilotEvent>,

@@ -41,11 +41,11 @@ pub(crate) struct Drone {
     pub(crate) setpoint: Option<Placement>,
     pub(crate) events: Vec<(Instant, Event)>,
     pub(crate) rejected: u32,
-    /// Counters of the upstream or shared port, and of the downstream port.
+    /// Counters of the upstream or shared port, then of the downstream port.
     pub(crate) counted: [SerialStats; 2],
 }
 
-/// Result of a simulated chain: the outputs of each relay, and the frames on each serial line.
+/// Result of a simulated chain: recorded outputs of each relay, and the frames on each serial line.
 pub(crate) struct Flown {
     pub(crate) drones: Vec<Drone>,
     /// Frames on each wire: first the wires toward Rx, then those toward Tx. A shared channel is one entry.

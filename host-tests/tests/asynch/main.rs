@@ -81,7 +81,7 @@ fn the_guide_has_the_code_of_this_test() {
     }
 }
 
-/// Returns the indices of the serial lines whose frames or times differ between two runs.
+/// Returns the indices of the serial lines on which the frames or their times differ between two runs.
 fn differing(one: &Flown, other: &Flown) -> Vec<usize> {
     let lines = one.lines.iter().zip(&other.lines);
     let all = lines.enumerate().filter(|(_, (one, other))| one != other);

@@ -18,13 +18,13 @@ use crate::chain::relay;
 use crate::time::Time;
 use crate::wire::{BAUD, BYTE_TIME, Rx, Tx, WriterFault, line};
 
-/// Test writer that accepts only part of the bytes of a write, or blocks for ever, or fails.
+/// Simulated port writer that accepts only part of the bytes of a write, or blocks for ever, or fails.
 #[derive(Default)]
 struct Taker {
     taken: Rc<RefCell<Vec<u8>>>,
-    /// Number of writes that still complete; the next one blocks for ever.
+    /// Number of further writes that complete; the next one after them blocks for ever.
     writes: Rc<Cell<usize>>,
-    /// Interval of failing writes: every n-th write fails, where n is this number; 0 if none fails.
+    /// Interval of failing writes: every n-th write fails, with this n; 0 if none fails.
     fails: usize,
     done: usize,
 }
@@ -41,7 +41,7 @@ impl Taker {
 
 struct Silent;
 
-/// Reader that never waits: it always has a byte or an error.
+/// Simulated port reader that never waits: it always has a byte or an error.
 struct Flood {
     fails: bool,
 }
@@ -92,7 +92,7 @@ impl Read for Flood {
     }
 }
 
-/// Polls the runner of a relay's ports once in each millisecond of `millis`, then drops it.
+/// Polls `runner`, which runs a relay's ports, once in each millisecond of `millis`, then drops it.
 fn run_for(time: &Time, millis: std::ops::Range<u64>, runner: impl Future) {
     let (mut pool, mut cx) = (LocalPool::new(), Context::from_waker(Waker::noop()));
     let mut runner = pin!(runner);

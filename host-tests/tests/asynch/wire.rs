@@ -21,13 +21,13 @@ pub(crate) const BYTE_TIME: Duration = Duration::from_micros(87);
 /// Frame with the arrival time of its last byte.
 pub(crate) type TimedFrame = (Instant, Vec<u8>);
 
-/// Behaviour of a port's writer: correct or with a fault.
+/// Behaviour of a simulated port writer: correct or with a fault.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum WriterFault {
     None,
-    /// Fault: `write` never completes, from the first byte on.
+    /// `write` never completes, from the first byte on.
     Stuck,
-    /// Fault: bytes take their transmission time, but reach no reader.
+    /// Bytes take their transmission time, but reach no reader.
     Cut,
 }
 

@@ -7,7 +7,8 @@ use uav_relay::{Instant, Phase, Side, Wiring};
 use super::kinds::{Attack, Attacker, KINDS, Kind, raised};
 use super::net::{Net, ScheduledEvent};
 
-/// Scheduled events of the run, with times in ms: reboots, restarted agreements and mission uploads.
+/// Scheduled events of the attack test, each with its time in ms. They are reboots, restarted agreements and mission
+/// uploads.
 const DEEDS: [(u64, ScheduledEvent); 11] = [
     (6_000, ScheduledEvent::Reboot(4)),
     (6_500, ScheduledEvent::Restart),
@@ -123,7 +124,7 @@ fn under_attack(wiring: Wiring, count: u64) {
     }
 }
 
-/// Returns the number of attacks: the environment variable `COUNT`, or a million.
+/// Returns the number of attacks to simulate: the environment variable `COUNT`, or a million.
 fn count() -> u64 {
     std::env::var("COUNT")
         .ok()

@@ -10,7 +10,7 @@ fn key() -> [u8; 32] {
     std::array::from_fn(|byte| u8::try_from(byte).unwrap())
 }
 
-/// Returns the signed frame of test vector `name` twice: decoded without its CRC, and as on the wire.
+/// Returns the signed frame of the test vector `name`: decoded without its CRC, and as on the wire.
 fn worked(name: &str) -> (Vec<u8>, Vec<u8>) {
     let mut signed = Vectors::load().unwrap().signed.into_iter();
     let mut vector = signed.find(|vector| vector.name == name).unwrap();

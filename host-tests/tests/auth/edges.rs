@@ -42,8 +42,8 @@ impl Link {
         self.deliver(&handshake.signed(&KEY, nonces))
     }
 
-    /// Sends a signed heartbeat with the given frame counter to relay 2. Returns the name of the only statistics
-    /// counter that the heartbeat increments there, if any.
+    /// Sends relay 2 a signed heartbeat with this frame counter. Returns the name of the only statistics counter that
+    /// it increments, if any.
     fn send_with_counter(&mut self, counter: u32) -> Option<&'static str> {
         let mut frame = Plain::new(NETWORK, 1, 2, SIGNED, counter);
         frame.0.extend([3, 0, 0, 0, 0, 0, 0]);

@@ -158,7 +158,7 @@ fn a_silent_neighbour_is_lost_despite_replays() {
     assert!((15_000..15_100).contains(&lost_after), "{lost_after}");
 }
 
-/// Returns the time in ms until relay 1 declares its silent neighbour lost, during replays.
+/// Returns the time, ms, until relay 1 reports its silent neighbour as lost in spite of replays.
 ///
 /// An attacker replays the handshakes of `recorded` to relay 1. The second value is the number of handshakes that
 /// relay 1 accepts.

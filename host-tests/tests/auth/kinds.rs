@@ -79,7 +79,7 @@ impl Kind {
     }
 }
 
-/// Frame to inject: its receiver, its bytes, and the receiver's counter that it must increment.
+/// Frame that the attacker sends, with its receiver and the receiver's counter that it must increment.
 pub(crate) struct Attack {
     pub(crate) to: u16,
     pub(crate) port: Port,
@@ -87,7 +87,7 @@ pub(crate) struct Attack {
     pub(crate) raises: &'static str,
 }
 
-/// Returns the counters of received frames by which attacks are judged, with their names.
+/// Returns the receive counters by which attacks are judged, with their names.
 pub(crate) fn counters(stats: &Stats) -> [(&'static str, u32); 12] {
     [
         ("received", stats.received),

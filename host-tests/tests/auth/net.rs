@@ -11,7 +11,7 @@ use uav_relay::{
 
 pub(crate) const KEY: [u8; 32] = *b"the members of network 7 have it";
 
-/// Time that a frame takes between neighbours.
+/// Time that a simulated frame takes between neighbours.
 const ON_THE_WAY: Duration = Duration::from_millis(10);
 
 /// Returns an upload of mission version `version`. Each version places the interferer elsewhere.
@@ -42,13 +42,13 @@ pub(crate) struct RecordedFrame {
 /// Scheduled event of the simulation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum ScheduledEvent {
-    /// Event: the relay of this index reboots without the mission upload that it had stored.
+    /// The relay of this index reboots and loses the mission upload that it had stored.
     Reboot(u16),
-    /// Event: the relay of this index reboots with the mission upload that it had stored.
+    /// The relay of this index reboots and keeps the mission upload that it had stored.
     Resume(u16),
-    /// Event: the ground station at this end uploads a mission of this version.
+    /// The ground station at this end uploads a mission of this version.
     Upload(Side, u16),
-    /// Event: the leader restarts the agreement on positions.
+    /// The leader restarts the agreement on positions.
     Restart,
 }
 
@@ -73,7 +73,7 @@ pub(crate) struct Net {
     ///
     /// The sender's count is that of the time when it sent the frame.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
-    /// Indices of frames whose sender signed them before it learned of the receiver's last start.
+    /// Indices of recorded frames that were signed before their sender knew of the receiver's last start.
     outdated: BTreeSet<usize>,
     /// Frames in transit: arrival time, and index of the frame.
     in_transit: VecDeque<(Instant, usize)>,
@@ -287,7 +287,7 @@ impl Net {
         }
     }
 
-    /// Delivers bytes to a relay. Returns the number of frames that it sends in response.
+    /// Delivers bytes to relay `to`. Returns the number of frames that it sends in response.
     pub(crate) fn deliver_bytes(&mut self, to: u16, port: Port, wire: &[u8]) -> usize {
         let now = self.now;
         self.relay(to).handle_bytes(now, port, wire);
@@ -348,8 +348,7 @@ impl Net {
         });
     }
 
-    /// Returns the bits of each relay's setpoint and target SIR, for exact comparison. A relay without these has
-    /// `None`.
+    /// Returns each relay's setpoint and target SIR as bits, for exact comparison. `None` for a relay without them.
     pub(crate) fn bits(&self) -> Vec<Option<([u32; 3], u32)>> {
         self.relays
             .iter()

@@ -8,7 +8,7 @@ use uav_relay::{Event, Side};
 use crate::signed::{OTHER, OURS, keyed};
 use crate::vehicle::{LinkMessage, SYSTEM, Vehicle};
 
-/// MAVLink system and component id of QGroundControl.
+/// MAVLink system and component number of QGroundControl.
 const STATION: [u8; 2] = [255, 190];
 
 const FROM: Address = Address {
@@ -28,8 +28,8 @@ fn command(to: [u8; 2], relays: [f32; 2], confirmation: u8) -> MavMessage {
     })
 }
 
-/// Returns the results and recipients of all answers to `MAV_CMD_USER_1`. By this command an operator reports that
-/// the drone of a lost relay is gone.
+/// Returns results and recipients of the companion's answers to `MAV_CMD_USER_1`. By this command an operator reports
+/// lost drones as gone.
 fn answers(vehicle: &Vehicle) -> Vec<(u32, [u8; 2])> {
     let said = vehicle.received.iter();
     said.filter_map(|(_, said)| match said {

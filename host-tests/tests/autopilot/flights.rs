@@ -19,16 +19,16 @@ const STEP: Duration = Duration::from_millis(20);
 /// Duration of a flight, s.
 const FLIGHT_S: u64 = 240;
 
-/// Longest time until the autopilot link knows the vehicle's mode. A heartbeat comes each second, at most 2 s late.
+/// Longest time until the autopilot link must know the vehicle's mode. Heartbeats come each second, at most 2 s late.
 const KNOWN_WITHIN: Duration = Duration::from_millis(3_100);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Fault {
     None,
-    /// Fault: the cable keeps all bytes, and delivers all of them when the fault ends.
+    /// The cable keeps all bytes, and delivers all of them when the fault ends.
     Withhold,
     Cut,
-    /// Fault: the cable delays the bytes by the given time in µs.
+    /// The cable delays the bytes by this time, µs.
     Delay(u64),
 }
 
@@ -81,7 +81,7 @@ impl Cable {
     }
 }
 
-/// Companion under test: the autopilot link that is polled, or the asynchronous runner.
+/// Companion computer under test: the autopilot link that is polled, or the asynchronous runner.
 enum Companion {
     Polled(Box<Autopilot>),
     Async(Runner),
@@ -95,7 +95,7 @@ struct Flight {
     to: Cable,
     from: Cable,
     companion: Option<Companion>,
-    /// Time of the companion's last start.
+    /// Time at which the companion program was last started.
     started: Instant,
     /// Time at which the companion starts again; `None` while it runs.
     starts_at: Option<Instant>,
@@ -367,7 +367,7 @@ impl Flight {
     }
 }
 
-/// Simulates a random flight. Returns its violations, how often setpoint control was engaged, and true if the
+/// Simulates a random flight. Returns the violated rules, how often setpoint control was engaged, and true if the
 /// asynchronous runner flew it.
 fn fly(seed: u64) -> (Vec<String>, u32, bool) {
     let mut flight = Flight::new(seed);

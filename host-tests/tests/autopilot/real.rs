@@ -23,9 +23,9 @@ const RESUMES: Duration = Duration::from_millis(1_200);
 /// Longest time until the companion knows of a PX4's failsafe: heartbeat interval and link delay.
 const KNOWN_WITHIN: Duration = Duration::from_millis(1_300);
 
-/// Time for which an ArduCopter keeps a velocity without new targets.
+/// Time for which an ArduCopter keeps flying at its target velocity without new targets.
 const VELOCITY: Duration = Duration::from_millis(3_000);
-/// Time for which an ArduCopter navigates without GPS.
+/// Time for which an ArduCopter navigates after the loss of GPS.
 const RECKONS: Duration = Duration::from_millis(8_000);
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -154,7 +154,7 @@ pub(crate) struct Real {
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,
     sequence: u8,
-    /// Time at which the current failsafe began.
+    /// Time at which the autopilot's present failsafe began.
     fell_at: Instant,
     /// Time at which the companion sent the newest target.
     sent_at: Instant,

@@ -16,7 +16,7 @@ const STAMP: u64 = 37_527_840_000_000;
 /// Signing key of the simulated autopilot, with its time stamps.
 pub(crate) struct Key {
     bytes: [u8; 32],
-    /// Signing time stamp at the autopilot's start.
+    /// Signing time stamp at the simulated autopilot's start.
     zero: u64,
     /// Signing time stamp of the last frame sent.
     last: u64,
@@ -49,7 +49,7 @@ impl Key {
         frame
     }
 
-    /// Returns true if a frame of the companion has a valid signature.
+    /// Returns true if a frame of the companion has a valid signature by the autopilot's key.
     pub(crate) fn believes(&mut self, frame: &[u8]) -> bool {
         let Some((covered, tag)) = frame.split_last_chunk::<6>().filter(|_| frame[2] == 1) else {
             return false;

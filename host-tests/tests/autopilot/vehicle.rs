@@ -86,11 +86,11 @@ impl Target {
 /// Flight modes with PX4's and ArduCopter's numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Mode {
-    /// Flight mode: the pilot flies by the sticks.
+    /// The pilot flies the drone by the sticks.
     Position,
-    /// Flight mode: the autopilot holds, flies its mission or returns.
+    /// The autopilot holds the position, flies its mission or returns.
     Hold,
-    /// Flight mode OFFBOARD (PX4) or GUIDED (ArduCopter): the companion's targets are followed.
+    /// OFFBOARD (PX4) or GUIDED (ArduCopter): the drone follows the companion's targets.
     Companion,
 }
 
@@ -108,7 +108,7 @@ pub(crate) struct Vehicle {
     pub(crate) mode: Mode,
     pub(crate) place: Placement,
     pub(crate) setpoint: Option<Placement>,
-    /// Target that the vehicle is following.
+    /// Target that the simulated vehicle is flying to; `None` without one.
     goal: Option<Target>,
     pub(crate) mute: bool,
     pub(crate) takes_targets: bool,
@@ -173,7 +173,7 @@ impl Vehicle {
         vehicle
     }
 
-    /// Takes off under the pilot's control.
+    /// Simulates the take-off under the pilot's control.
     pub(crate) fn fly_off(&mut self) {
         self.run(2_000);
         self.armed = true;
@@ -183,13 +183,13 @@ impl Vehicle {
         self.run(2_000);
     }
 
-    /// Chooses OFFBOARD or GUIDED, as the pilot does.
+    /// Simulates the pilot's choice of OFFBOARD or GUIDED.
     pub(crate) fn engage(&mut self) {
         self.mode = Mode::Companion;
         self.run(1_100);
     }
 
-    /// Reboots the autopilot on the ground.
+    /// Simulates a reboot of the autopilot on the ground.
     pub(crate) fn reboot(&mut self) {
         self.began = self.now;
         self.armed = false;
@@ -208,7 +208,8 @@ impl Vehicle {
         self.drive();
     }
 
-    /// Flies for one step and sends messages to the link. The link answers in [`drive`](Self::drive) or [`answer`](Self::answer).
+    /// Simulates one time step of the flight, and sends messages to the link. The link answers in
+    /// [`drive`](Self::drive) or [`answer`](Self::answer).
     pub(crate) fn step_without_exchange(&mut self) {
         self.now = Instant::from_micros(self.now.as_micros() + STEP_MS * 1_000);
         let ms = self.now.as_micros() / 1_000;
@@ -242,7 +243,7 @@ impl Vehicle {
         }
     }
 
-    /// Receives the frames and events of the autopilot link.
+    /// Collects the frames and events of the autopilot link.
     pub(crate) fn answer(&mut self) {
         while let Some(frame) = self.link.poll_transmit(self.now) {
             self.receive(&frame);

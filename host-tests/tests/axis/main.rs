@@ -7,7 +7,7 @@ use serde::Deserialize;
 use uav_relay::Geodetic;
 use uav_relay::flight::axis::Axis;
 
-/// Pairs of the length of a line and the largest permitted error of x and y on the line, both in m.
+/// Pairs of a line's length, m, and the largest permitted error of x and y on such a line, m.
 const ALLOWED: [(f64, f64); 3] = [(1e3, 1e-3), (1e4, 1e-3), (1e5, 5e-3)];
 
 const LINES: usize = 10_000;
@@ -58,7 +58,8 @@ impl Beside {
         (line, length)
     }
 
-    /// Returns the crate's errors of the line's length and of the point's x and y, m. Rounding to f32 does not count.
+    /// Returns the crate's errors for this line and point, m: length of the line, x and y of the point. Rounding to
+    /// f32 does not count.
     fn off(&self) -> [f64; 3] {
         let axis = self.axis();
         let place = axis.place(ground(self.lat, self.lon)).unwrap();
@@ -118,7 +119,7 @@ fn around(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// Draws a line of `length` metres anywhere on earth, and a point up to 500 m beside the line.
+/// Draws a line of `length` metres anywhere on earth, and a point up to 500 m beside it.
 fn beside(rng: &mut ChaCha8Rng, length: f64) -> Beside {
     let tx = [
         unit(rng.random_range(-89.9..89.9)),
@@ -248,8 +249,8 @@ fn away_by_geodesics(line: &Line, length: f64, lat: f64, lon: f64) -> f64 {
         .fold(f64::MAX, f64::min)
 }
 
-/// Pairs (d, e): points up to d m from the line's middle may have the relative error e. The error is that of a
-/// point's distance from the line.
+/// Largest permitted relative errors of a point's distance from a line, as pairs (d, e). The error e is for points up
+/// to d metres from the line's middle.
 const ALLOWED_AWAY: [(f64, f64); 3] = [(1e5, 1e-6), (1e6, 2e-5), (2.0004e7, 2e-3)];
 
 #[test]

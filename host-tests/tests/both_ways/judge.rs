@@ -1,6 +1,6 @@
 //! Judge of chains with a way back: a grid search in f64, refined. It shares no code with the crate.
 
-/// Reference chain: relays at one altitude above the line from Tx (x = 0) to Rx.
+/// Chain of the tests' reference model: relays at one altitude above the line from Tx (x = 0) to Rx.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chain {
     /// Distance from Tx to Rx, m.
@@ -31,7 +31,7 @@ pub(crate) struct Chain {
 /// Number of equal intervals in the grid of the first search.
 const GRID: usize = 300;
 
-/// Number of grid points around a relay's position in the refinement; odd, to include the position.
+/// Number of grid points in a refinement around a relay's position. Odd, so that the position is one of them.
 const WINDOW: usize = 15;
 
 impl Chain {
@@ -49,7 +49,7 @@ impl Chain {
         own.copied().unwrap_or(self.altitude_m)
     }
 
-    /// Returns the power of interference plus noise at `node`, which is at x = `x`, W.
+    /// Returns the power of interference plus noise that `node` receives at x = `x`, W.
     fn disturbance_w(&self, node: usize, x: f64) -> f64 {
         if let [first, .., last] | [first @ last] = self.field.as_slice() {
             // With noise each point has 1 / (I + N), and lines between.
@@ -175,8 +175,7 @@ impl Chain {
         points
     }
 
-    /// Improves the positions `start` by searches in a window around each. The windows shrink when they no longer
-    /// help.
+    /// Improves the positions `start` by grid searches around each. The grids become finer when they no longer help.
     ///
     /// Returns the SIR of the worst hop, and the positions. The SIR of a hop is the smaller of forward SIR and
     /// backward SIR / `reverse`.

@@ -24,7 +24,7 @@ use super::scenes::{ENDS, adversarial, in_noise, log_uniform, mission, narrow, u
 
 type Draw = fn(&mut ChaCha8Rng, [f64; 2], f64) -> Chain;
 
-/// Returns the index and the profile (altitude and power) of each relay.
+/// Returns the index and the profile (altitude and power) of each relay of `chain`.
 fn profiles(chain: &Chain) -> Vec<(u16, Profile)> {
     let profile = |index: usize| {
         let own = chain.altitudes_m.get(index - 1);
@@ -53,8 +53,8 @@ fn with_separation(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     chain
 }
 
-/// Numbers of scenes: all, those with an SIR within 1e-4 of the judge's, and those with one within 5 %. `worst` is
-/// the smallest ratio of the SIR to the judge's, an independent search.
+/// Counts of scenes: all, and those with an SIR within 1e-4 and within 5 % of the reference search's. `worst` is the
+/// smallest ratio to it.
 #[derive(Debug, Default)]
 struct Tally {
     all: usize,
@@ -64,8 +64,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Compares the SIR at the agreed positions of `chain` with that at the judge's positions. The mission has one
-    /// direction if `one_way`. The judge is an independent search.
+    /// Adds a scene: compares the SIR at the relays' agreed positions with that of the reference search. The mission
+    /// has one direction if `one_way`.
     fn add(&mut self, chain: &Chain, one_way: bool) {
         let (mut chain, mut known) = (chain.clone(), chain.clone());
         if one_way {
@@ -105,8 +105,8 @@ impl Tally {
     }
 }
 
-/// Compares Algorithm 1 with the judge in random scenes, for both directions and for one. `change` modifies each
-/// scene; `what` names the change in the output. The judge is an independent search.
+/// Compares Algorithm 1 with the reference search (the judge) in random scenes. Scenes are for both directions and
+/// for one. `change` modifies each scene; `what` names the change in the output. The judge is an independent search.
 ///
 /// For both directions the scenes must be within 1e-4 of the judge's SIR if `is_exact`, else at least 80 % of them
 /// within 5 %.

@@ -16,7 +16,7 @@ pub(crate) const NLOS: f64 = 7_020.0 * 123.0;
 /// Pairs of the powers of Tx and Rx, W: both strong, both weak, and a strong Tx with a weak Rx.
 pub(crate) const ENDS: [[f64; 2]; 3] = [[80.0, 80.0], [1.0, 1.0], [80.0, 1.0]];
 
-/// Rounds a number to f32, the precision of the relays.
+/// Rounds a number to f32, the precision in which relays compute.
 pub(crate) fn narrow(value: f64) -> f64 {
     f64::from(value as f32)
 }

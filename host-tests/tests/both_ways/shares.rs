@@ -1,6 +1,6 @@
 //! Shares of a judge's values: worst, percentiles, and a line for the table.
 
-/// List of ratios, one for each random scene: the tested SIR over that of the reference search.
+/// List of one ratio for each random scene: the tested SIR over that of the reference search.
 #[derive(Debug, Default)]
 pub(crate) struct Shares(Vec<f64>);
 
@@ -10,7 +10,7 @@ impl Shares {
         self.0.push(share);
     }
 
-    /// Returns the ratio below which `percent` of the scenes are.
+    /// Returns the ratio that `percent` per cent of the scenes do not reach.
     pub(crate) fn percentile(&self, percent: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);

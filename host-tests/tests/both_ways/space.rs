@@ -20,7 +20,7 @@ use super::space_judge::{Place, Space};
 /// Lowest and highest altitude of the relays in all scenes, m.
 const BAND_M: [f64; 2] = [20.0, 300.0];
 
-/// Draws the random scene `number`; returns the name of its kind, and the scene. Kinds differ in three ways: with or
+/// Draws the random scene `number`, and returns it after the name of its kind. Kinds differ in three ways: with or
 /// without lateral offsets; with r, the required ratio of backward to forward SIR, 1 or random; with or without
 /// noise. The interferer is near the line Tx-Rx if `wild`.
 fn scene(rng: &mut ChaCha8Rng, number: usize, wild: bool) -> (String, Space) {
@@ -108,8 +108,8 @@ fn joint(mission: &Mission) -> Vec<Placement> {
     places
 }
 
-/// Prints worst value, first percentile and median of `shares`, by kind of scene and for all kinds. A share is the
-/// method's SIR divided by the judge's. The shares are sorted, the worst one first.
+/// Prints the worst value, first percentile and median of `shares`, by kind of scene and for all. A share is the
+/// method's SIR divided by that of the reference search.
 fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     let all: Vec<f64> = shares.values().flatten().copied().collect();
     shares.insert("all".to_owned(), all);
@@ -126,8 +126,8 @@ fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     }
 }
 
-/// Returns ratios for random scenes, the worst first: the joint method's SIR divided by the judge's. The judge is an
-/// independent search. The interferer is near the line Tx-Rx if `wild`.
+/// Returns the joint method's SIR over that of a reference search, for random scenes, worst first. The interferer is
+/// near the line Tx-Rx if `wild`.
 fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut seeds = generator(seed);
@@ -169,8 +169,9 @@ fn the_joint_method_is_near_the_best_places_next_to_an_interferer() {
     near_the_best_places(3311, 12, true);
 }
 
-/// Checks scenes in which relay 1 has one local optimum above the interferer, and one beyond it. The judge found the
-/// SIR of each; without an initial chain that keeps relay 1 above the interferer the method misses it by up to 10 %.
+/// Checks that the joint method finds the better of two local optima of relay 1. They are above the interferer and
+/// beyond it. The judge found the SIR of each; without an initial chain that keeps relay 1 above the interferer the
+/// method misses it by up to 10 %.
 #[test]
 fn the_joint_method_finds_the_chain_above_the_interferer() {
     type Scene = (u16, f64, f64, f64, [f64; 3], f64);

@@ -23,12 +23,12 @@ pub(crate) struct Space {
     pub(crate) band_m: [f64; 2],
 }
 
-/// Numbers of points of the first grid along x, y and h. The first row is for relays that may leave the line
-/// sideways, the second one for relays above the line.
+/// Numbers of grid points along x, y and h in the first search. The first row is for relays that may leave the line
+/// sideways, the second one for relays above it.
 const GRID: [[usize; 3]; 2] = [[36, 9, 5], [64, 1, 10]];
 
-/// Numbers of points of a search window along x, y and h. The first row is for relays that may leave the line
-/// sideways, the second one for relays above the line.
+/// Numbers of grid points along x, y and h in a refinement. The first row is for relays that may leave the line
+/// sideways, the second one for relays above it.
 const WINDOW: [[usize; 3]; 2] = [[5, 5, 5], [7, 1, 7]];
 
 impl Space {
@@ -40,7 +40,7 @@ impl Space {
         self.lateral_m[0] >= self.lateral_m[1]
     }
 
-    /// Returns the power of interference plus noise at `node`, which is at (x, y, h), W.
+    /// Returns the power of interference plus noise that `node` receives at the position (x, y, h), W.
     fn disturbance_w(&self, node: usize, [x, y, h]: Place) -> f64 {
         let [power_w, xi, yi] = self.chain.interferer;
         let is_on_ground = node == 0 || node > self.relays();

@@ -24,7 +24,7 @@ const ROUNDS: u16 = 6;
 /// Numbers of grid points along x and in altitude that the reference search tries for a relay.
 const GRID: [usize; 2] = [240, 25];
 
-/// Returns the power of interference plus noise at `node`, which is at the given position, W.
+/// Returns the power of interference plus noise that `node` receives at the position (x, h), W.
 fn disturbance_w(chain: &Chain, node: usize, [x, h]: Place) -> f64 {
     let [power_w, xi, yi] = chain.interferer;
     let on_ground = node == 0 || node > chain.relays();
@@ -60,7 +60,7 @@ fn value(chain: &Chain, places: &[Place]) -> f64 {
     hops.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the best position of relay `node` between its neighbours, and the lower SIR of its two hops.
+/// Returns the best position of relay `node` between its neighbours, and the SIR of its worse hop.
 ///
 /// The position is found by a grid search with altitudes within `altitudes_m`.
 fn turn(chain: &Chain, places: &[Place], node: usize, altitudes_m: [f64; 2]) -> (Place, f64) {

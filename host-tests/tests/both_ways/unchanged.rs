@@ -12,7 +12,7 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Relay as ReferenceRelay};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Number of random scenarios whose results are hashed.
+/// Number of random scenarios whose results enter the recorded hash.
 const SCENARIOS: u32 = 1_000;
 
 /// FNV-1a hash of the target SIRs, numbers of sweeps and positions of all scenarios with one direction.
@@ -60,7 +60,7 @@ fn places_of_one_direction_are_equal_to_the_bit() {
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }
 
-/// Runs the simulated chain `setup`, and adds its positions and number of messages to `hash`.
+/// Runs the simulated chain `setup`, and adds its positions and number of messages to the hash `hash`.
 fn add_flown(hash: &mut u64, setup: Setup) {
     let outcome = settle(setup);
     for place in setpoints(&outcome) {

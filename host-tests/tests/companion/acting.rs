@@ -12,7 +12,7 @@ use crate::process::{LIMIT, Relay};
 use crate::web::{address, connect, snapshots};
 use crate::with_source;
 
-/// Page of a station, as a browser uses it.
+/// Web page of a ground station, as a browser uses it.
 struct Page {
     address: String,
     token: String,
@@ -26,12 +26,13 @@ impl Page {
         Self { address, token }
     }
 
-    /// Returns the newest snapshot.
+    /// Returns the newest snapshot that the page has received.
     fn newest(&self) -> Value {
         snapshots(&self.address).next().unwrap()
     }
 
-    /// Sends a task, with `change` made to the request. Returns the status and the answer.
+    /// Sends the page's request for a task, in which the text `change[0]` is replaced by `change[1]`. Returns status
+    /// and answer.
     fn sends(&self, path: &str, body: &Value, change: [&str; 2]) -> (u16, String) {
         let (own, body, token) = (&self.address, body.to_string(), &self.token);
         let length = body.len();
@@ -67,7 +68,7 @@ impl Page {
         );
     }
 
-    /// Returns the state of the tasks once it is at `stage`.
+    /// Waits until the tasks are at `stage`, and returns their state.
     fn until(&self, stage: &str) -> Value {
         let begun = Instant::now();
         let mut states = snapshots(&self.address).map(|mut it| it["desk"].take());

@@ -7,10 +7,10 @@ use crate::flying::Flight;
 use crate::peer::{Peer, RX, ReceivedMessage, Site, TX, apart_m, between_m, on_earth, text};
 use crate::process::Relay;
 
-/// Part of the log line about a drone far from its line: the likely cause that the companion suggests.
+/// Part of the companion's log line about a drone far from its line: the suggested cause.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
-/// Drone, and its relay, which is configured with positions of Tx and Rx that are far from the drone.
+/// Test scene: a drone, and its relay, which has positions of Tx and Rx far from the drone.
 struct Apart {
     drone: Peer,
     relay: Relay,

@@ -11,7 +11,7 @@ use crate::binary::{companion, ground};
 
 const PAGE: &str = include_str!("../../../examples/LINUX.md");
 
-/// Replacement for `socat pty,..,link=A pty,..,link=B` where socat is not installed.
+/// Python replacement for `socat pty,..,link=A pty,..,link=B`, for computers without socat.
 const SOCAT: &str = r#"
 import os, pty, select, sys, tty
 ends = {}

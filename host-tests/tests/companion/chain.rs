@@ -13,7 +13,7 @@ use crate::process::Relay;
 /// Options of relays that notice the loss of a neighbour within seconds.
 pub(crate) const QUICK: &str = "--probe-after-ms 500 --dead-after-ms 1500";
 
-/// Agreed position and target SIR of a relay, as the f32 bits of x, y, altitude and target.
+/// Agreed position and target SIR of a relay: x, y, altitude and target as f32 bits.
 pub(crate) type Place = [u32; 4];
 
 /// Returns the agreed positions of all relays of a simulated chain, to compare the processes with.
@@ -139,12 +139,12 @@ impl Chain {
         format!("--index {index} --of {of} {ports} {options} {own}")
     }
 
-    /// Waits for the first agreement. Returns the position and target of each relay.
+    /// Waits for the first agreement of the chain. Returns the position and target of each relay.
     pub(crate) fn settled(&mut self) -> Vec<Place> {
         self.relays.iter_mut().map(Relay::settled).collect()
     }
 
-    /// Waits until the relays have agreed on `places`. Other agreements may come first.
+    /// Waits until the relays have agreed on exactly `places`. Other agreements may come first.
     pub(crate) fn settles_at(&mut self, places: &[Place]) {
         assert!(places.len() >= self.relays.len());
         for (relay, place) in self.relays.iter_mut().zip(places) {

@@ -13,8 +13,8 @@ use crate::pty::Pty;
 
 const SITED: &str = "--site-tx 47.4,8.54,420 --site-rx 47.41,8.55,431 --distance 1343.795";
 
-/// Chain of two relay processes without drones. The mission's length equals the distance of Tx and Rx in [`SITED`],
-/// so that the ground station may upload missions with these positions.
+/// Chain of two relay processes without drones, for mission changes. The mission is as long as the distance of Tx and
+/// Rx in [`SITED`].
 struct Bench(Chain);
 
 impl Bench {
@@ -41,7 +41,7 @@ impl Bench {
         Relay::ground(&self.options(version, more))
     }
 
-    /// Waits for the next agreement. Returns the x of both relays, m.
+    /// Waits for the next agreement of the chain. Returns the x of both relays, m.
     fn agreed(&mut self) -> [f64; 2] {
         [0, 1].map(|at| {
             let relay = &mut self.0.relays[at];

@@ -11,7 +11,7 @@ use crate::medium::{Medium, QUIET};
 use crate::peer::Peer;
 use crate::process::{LIMIT, Relay, bits};
 
-/// Sends a command to the status socket. Returns true if it was executed, and the text of the answer.
+/// Sends a command to the status socket of a process. Returns true if it was executed, and the text of the answer.
 fn commanded(socket: impl AsRef<Path>, command: &str) -> (bool, String) {
     let said: Value = serde_json::from_str(&answer(socket, command, false)).unwrap();
     let text = said["text"].as_str().unwrap();
@@ -23,7 +23,7 @@ struct Drones {
     chain: Chain,
     fifos: [String; 3],
     at: [[f32; 3]; 3],
-    /// Log lines of each relay so far.
+    /// Log lines that each relay has printed so far.
     lines: [Vec<String>; 3],
 }
 

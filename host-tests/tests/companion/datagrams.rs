@@ -10,7 +10,7 @@ use crate::process::Relay;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ports {
     pub(crate) port: u16,
-    /// UDP port of the companion.
+    /// UDP port on which the companion program receives.
     pub(crate) local: u16,
 }
 

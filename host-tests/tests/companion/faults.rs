@@ -11,10 +11,10 @@ use crate::chain::Chain;
 use crate::process::LIMIT;
 use crate::reported::{Flown, Page, alarms, relays, restart};
 
-/// Number of faults in the test of `cargo ci`; the variable COUNT replaces it.
+/// Number of faults that the test in `cargo ci` injects; the variable COUNT replaces it.
 const FEW: usize = 7;
 
-/// Time until an alarm, in addition to the time that the chain itself needs to notice the fault, s.
+/// Permitted time until an alarm beyond the time in which the chain itself notices the fault, s.
 const SOON_S: f64 = 2.0;
 
 /// Time that reports wait for an agreement after a loss, s: see `src/docs/flight.md`, Telemetry.
@@ -95,7 +95,7 @@ const SCRIPT: [&[Fault]; 14] = [
     &[("no quorum", 0, 30.0, "critical no quorum")],
 ];
 
-/// Relays of a chain with their drones, and the page of the station.
+/// Test setup: the relays of a chain with their drones, and the web page of the ground station.
 pub(crate) struct Stage {
     pub(crate) chain: Chain,
     pub(crate) flown: Vec<Flown>,
@@ -292,7 +292,7 @@ impl Stage {
         self.flown[relay - 1].relay = restart(&self.chain, relay, more);
     }
 
-    /// The pilot engages the relay's control, again and again until the page shows it.
+    /// Lets the pilot engage the relay's control repeatedly, until the page shows it.
     fn engage(&mut self, relay: usize) {
         let begun = Instant::now();
         let mut turn = 0;
@@ -324,7 +324,7 @@ impl Stage {
     }
 }
 
-/// Returns the relays that a fault concerns.
+/// Returns the numbers of the relays that the fault `what` concerns.
 fn hurt(what: &str, relay: usize) -> std::ops::RangeInclusive<u64> {
     match what {
         "no quorum" => 4..=8,

@@ -242,7 +242,7 @@ fn overrides_by_the_command_line_are_logged_once() {
     }
 }
 
-/// Stops a relay. Returns the replaced values of the scenario file that it has logged.
+/// Stops a relay. Returns the values of the scenario file that options have replaced, by its log.
 fn overrides(mut relay: Relay) -> Vec<String> {
     relay.line("unguarded: ");
     let lines = relay.stopped().into_iter();

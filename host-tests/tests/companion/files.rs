@@ -61,7 +61,7 @@ impl Files {
     }
 }
 
-/// Writes to a FIFO.
+/// Writes `text` to the FIFO at `path`, as a measuring program does.
 pub(crate) fn write(path: impl AsRef<Path>, text: &str) {
     let mut file = File::options().write(true).open(path).unwrap();
     file.write_all(text.as_bytes()).unwrap();
@@ -93,7 +93,7 @@ pub(crate) fn status_of(socket: impl AsRef<Path>) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
 
-/// Queries the status of a process until the condition holds. Returns that status.
+/// Queries the status of a process repeatedly until `is_so` is true for it. Returns that status.
 pub(crate) fn until(socket: impl AsRef<Path>, is_so: impl Fn(&Value) -> bool) -> Value {
     let mut said = Value::Null;
     wait_until(|| {

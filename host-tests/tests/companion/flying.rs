@@ -12,7 +12,7 @@ pub(crate) const ASKED: [(u64, u64); 3] = [(33, 200_000), (245, 500_000), (87, 5
 /// Take-off position along the line, m: about 20 m from the setpoint.
 const START_M: f64 = 380.0;
 
-/// Time for which a test watches for targets. A companion that streams targets sends several in this time.
+/// Time for which a test watches for targets; a companion that streams targets sends several in it.
 const MOMENT: Duration = Duration::from_millis(1_500);
 
 /// Simulated drone in flight and the relay that controls it.
@@ -90,7 +90,8 @@ impl Flight {
         assert_eq!(there.mode(), "companion");
     }
 
-    /// Changes the flight mode, as the pilot or a failsafe does, and waits until the relay has noticed.
+    /// Changes the flight mode, and waits until the relay has released the drone. The change is the pilot's or a
+    /// failsafe's.
     pub(crate) fn is_released_by(&mut self, mode: &str) {
         self.drone.order(&format!("mode {mode}"));
         self.relay

@@ -161,7 +161,7 @@ impl Medium {
         self.cut.store(ttys, Ordering::Relaxed);
     }
 
-    /// Adds the numbers of lost and corrupted bytes to `sums`.
+    /// Adds the numbers of lost and corrupted bytes so far to `sums`.
     pub(crate) fn count(&self, sums: &mut [u64; 2]) {
         sums[0] += self.counts.lost.load(Ordering::Relaxed);
         sums[1] += self.counts.corrupted.load(Ordering::Relaxed);

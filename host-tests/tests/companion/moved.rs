@@ -13,8 +13,7 @@ use crate::process::Relay;
 /// New position of the receiver, about 200 m beyond the old one and to the right, on higher ground.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
-/// Duration for which the drone is observed to stand still after the upload. It is shorter than the motion guard's
-/// wait.
+/// Time for which the drone must stand still after the upload. It is shorter than the motion guard's wait.
 const STANDS: Duration = Duration::from_millis(2_500);
 
 #[test]

@@ -130,7 +130,7 @@ impl ReceivedMessage {
         self.0["type_mask"].as_u64().unwrap() & 0b11_1000 == 0
     }
 
-    /// Returns the position of a target message.
+    /// Returns the target position in a message to the autopilot.
     pub(crate) fn to(&self) -> Site {
         let number = |name: &str| self.0[name].as_f64().unwrap();
         [
@@ -190,7 +190,7 @@ impl Peer {
         writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
     }
 
-    /// Arms and takes off under the pilot's control.
+    /// Arms the simulated drone and takes off under its pilot's control.
     pub(crate) fn takes_off(&mut self) {
         self.order("arm");
         self.order("takeoff");

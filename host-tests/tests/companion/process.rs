@@ -11,7 +11,7 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::binary::{companion, ground};
 
-/// Timeout of any quick action on a busy machine.
+/// Timeout of any action of a process under test, for a busy machine.
 pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 #[derive(Debug)]
@@ -122,7 +122,7 @@ impl Relay {
             .collect()
     }
 
-    /// Waits for the agreement. Returns the f32 bits of x, y, altitude and target SIR.
+    /// Waits for the relay's next agreement. Returns the f32 bits of x, y, altitude and target SIR.
     pub(crate) fn settled(&mut self) -> [u32; 4] {
         let setpoint = bits(&self.line("setpoint: "));
         let target = bits(&self.line("converged: "));

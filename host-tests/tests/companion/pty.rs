@@ -62,7 +62,7 @@ impl Pty {
         }
     }
 
-    /// Fills the buffers for the relay's output until neither the tty nor the kernel accepts more.
+    /// Fills the buffers for the relay's output until neither the tty nor the kernel accepts more bytes.
     pub(crate) fn stuff(&self) {
         let mut idle = 0;
         while idle < 10 {

@@ -27,7 +27,7 @@ const SOON: Duration = Duration::from_secs(2);
 /// A drone flies up to 8 m/s, an age is rounded to 0.1 s by each of up to two relays, and a position to 0.25 m.
 const MOST_ERROR_M: f64 = 2.0 * 0.1 * 8.0 + 0.25;
 
-/// Page of a station, as a browser keeps it open.
+/// Web page of a ground station, as a browser keeps it open.
 pub(crate) struct Page {
     arriving: Receiver<(f64, Value)>,
     pub(crate) last: Value,
@@ -48,7 +48,7 @@ pub(crate) fn has_all(snapshot: &Value) -> bool {
     relays(snapshot).iter().all(|it| it["age_s"].is_number())
 }
 
-/// Returns the texts of the alarms that last, with their urgency.
+/// Returns the texts of the lasting alarms in a page's snapshot, with their urgency.
 pub(crate) fn alarms(snapshot: &Value) -> Vec<String> {
     let all = snapshot["alarms"].as_array().unwrap().iter();
     let lasting = all.filter(|it| it["cleared_s"].is_null());
@@ -79,14 +79,14 @@ impl Page {
         }
     }
 
-    /// Returns the next snapshot and the time of its arrival, s.
+    /// Returns the next snapshot of the page, and the time of its arrival, s.
     pub(crate) fn next(&mut self) -> (f64, Value) {
         let next = self.arriving.recv_timeout(LIMIT).unwrap();
         self.last = next.1.clone();
         next
     }
 
-    /// Waits for a snapshot for which `is_so` is true. Returns the time until then.
+    /// Waits for a snapshot of the page for which `is_so` is true. Returns the time until then.
     pub(crate) fn until(
         &mut self,
         limit: Duration,
@@ -112,7 +112,7 @@ impl Page {
         }
     }
 
-    /// Waits for the alarm that begins with `part`; checks that it comes within `limit`.
+    /// Waits for the alarm that begins with `part`, and checks that it comes within `limit`.
     fn alarms(&mut self, limit: Duration, part: &str) {
         self.until(limit, part, |it| {
             alarms(it).iter().any(|alarm| alarm.contains(part))
@@ -120,7 +120,7 @@ impl Page {
     }
 }
 
-/// Drone with its relay, and the places where it has been.
+/// Simulated drone with its relay process, and the positions at which the drone has been.
 pub(crate) struct Flown {
     pub(crate) drone: Peer,
     pub(crate) relay: Relay,
@@ -134,7 +134,7 @@ impl Flown {
         self.relay.line("autopilot: setpoint control engaged");
     }
 
-    /// Reads the places of the drone up to now.
+    /// Records the positions that the simulated drone has had up to now.
     fn follow(&mut self) {
         let all = self.drone.so_far().into_iter();
         for ReceivedMessage(place) in all.filter(|it| it.is("PLACE")) {

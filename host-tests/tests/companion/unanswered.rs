@@ -9,7 +9,7 @@ use crate::peer::relay;
 use crate::process::Relay;
 use crate::pty::Pty;
 
-/// Greatest delay of a log line on a busy machine, s.
+/// Maximum delay of a log line on a busy machine, s.
 const LATE_S: f64 = 1.5;
 
 struct Unanswered {

@@ -108,8 +108,8 @@ fn a_relay_without_its_upload_is_offered_it_again() {
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Wire {
     Open,
-    /// State of the wire: intact until the next decision on a membership view. That decision cuts the wire, and is
-    /// lost.
+    /// Armed: the wire is intact until the next decision on a membership view. That decision is lost, and cuts the
+    /// wire.
     Armed,
     Cut,
 }

@@ -13,7 +13,7 @@ use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay};
 use crate::pty::Pty;
 
-/// Longest answer of the station's main loop to a status request on a busy machine.
+/// Maximum time to an answer of the station's main loop to a status request, on a busy machine.
 const LATE: Duration = Duration::from_millis(1_500);
 
 /// Returns the address of the page, which the station logs.

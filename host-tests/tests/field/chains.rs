@@ -13,7 +13,7 @@ use super::off;
 /// I is the interference power. With this value, a relay straight above Rx at 20 m has an expected SIR of 0.8 at Rx.
 const UPSILON: f64 = 2_301_379.773_574_951;
 
-/// Returns the paper's multi-hop scenario with constant interference along the line.
+/// Returns the paper's multi-hop chain of `n` relays, with constant interference along the line.
 fn paper(n: usize) -> StochasticLink {
     let link = Link::paper(n);
     StochasticLink {
@@ -115,7 +115,7 @@ fn the_first_feasible_target_is_not_the_optimum() {
     assert!(off(link.backward_best(2000), optimum) < 1e-3);
 }
 
-/// Draws a chain of identical relays with constant interference along the line.
+/// Draws a chain of identical relays with the same interference everywhere on the line.
 fn random_chain(rng: &mut ChaCha8Rng) -> StochasticLink {
     let distance_m = log_uniform(rng, 10.0, 1e5);
     let station = Relay {

@@ -16,7 +16,7 @@ const I_MAX_W: f32 = 3.476_175_5e-7;
 /// Statistics of the estimates of Upsilon, the mean inverse interference, for one pair of Beta shapes.
 #[derive(Default, Debug)]
 struct EstimateStatistics {
-    /// Number of estimates that could be made.
+    /// Number of samples sets from which an estimate could be made.
     made: u32,
     /// Number of estimates within 5 % of the truth.
     close: u32,
@@ -37,7 +37,7 @@ fn estimate(alpha: f64, beta: f64, samples: u32, seed: u64) -> Option<Estimate> 
     estimator.estimate()
 }
 
-/// Returns statistics of [`SEEDS`] estimates, each of `samples` samples. `first` and the Beta shapes alpha and beta
+/// Returns statistics of [`SEEDS`] estimates, each from `samples` random samples. `first` and the Beta shapes
 /// determine the random seeds.
 fn found(alpha: f64, beta: f64, samples: u32, first: u64) -> EstimateStatistics {
     let truth = FieldPoint::beta_upsilon(alpha, beta, f64::from(I_MAX_W)).unwrap_or(f64::INFINITY);

@@ -25,8 +25,8 @@ pub(crate) fn field(d: f64, h: f64, upsilon: Vec<(f64, f64)>) -> StochasticLink 
     }
 }
 
-/// Draws identical relays in a field of interference. The mean inverse interference, Upsilon, is given at one to
-/// twelve points. Its values differ by a factor of up to 300.
+/// Draws a chain of identical relays in a field of interference. Upsilon = E[1/I], given at one to twelve points,
+/// differs by a factor of up to 300.
 fn random_field(rng: &mut impl Rng) -> StochasticLink {
     let d = round(log_uniform(rng, 10.0, 1e5));
     let points = rng.random_range(1..=12);
@@ -48,7 +48,7 @@ fn random_field(rng: &mut impl Rng) -> StochasticLink {
     link
 }
 
-/// Returns the fewest relays that meet `target` (linear SIR) with all relays at grid points.
+/// Returns the fewest relays that meet the linear SIR `target`, with all relays at grid points.
 ///
 /// The grid divides the line into 4000 steps. `longer` is a tolerance: a hop may be longer than `target` permits by
 /// that many steps. Returns 0 if more than `most` relays are needed.

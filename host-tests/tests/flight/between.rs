@@ -5,7 +5,7 @@ use uav_relay_sim::simulator::chain::run;
 
 use super::*;
 
-/// Returns the final setpoints of the relays, x in m.
+/// Returns the x of the relays' final setpoints, m.
 fn ends(outcome: &Outcome) -> Vec<f32> {
     let places = outcome.relays.iter().map(|relay| relay.setpoint.unwrap());
     places.map(|place| place.x_m).collect()

@@ -108,7 +108,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns a flight's first violation, if any, its smallest distance of drones, m, and duration, s.
+/// Returns a flight's first violated rule, if any, its smallest distance of drones, m, and duration, s.
 fn judged(seed: u64) -> (Option<String>, f64, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

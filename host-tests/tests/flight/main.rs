@@ -20,9 +20,9 @@ use uav_relay_sim::simulator::setup::{Partition, Setup};
 
 const SEPARATION_M: f64 = 10.0;
 
-/// Constant error of each drone's reported position, m.
+/// Maximum constant error of each drone's reported position, m.
 const BIAS_M: f64 = 0.5;
-/// Random error of each report of a drone's position, m, in addition to the constant error.
+/// Maximum random error of each report of a drone's position, m, in addition to the constant error.
 const NOISE_M: f64 = 0.5;
 
 /// Rounding error of a position, m: positions are f32 of up to 1 km.

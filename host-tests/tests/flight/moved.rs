@@ -92,7 +92,7 @@ fn flight(seed: u64) -> Setup {
     setup
 }
 
-/// Returns the fault of a flight, if any, and the smallest distance between drones, m.
+/// Returns the violated rule of a random flight, if any, and the smallest distance between drones, m.
 fn judged(seed: u64) -> (Option<String>, f64) {
     let setup = flight(seed);
     let outcome = run(setup.clone()).unwrap();

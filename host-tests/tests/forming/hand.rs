@@ -8,7 +8,7 @@ use uav_relay_oracle::mission::of_link;
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{self, Place};
 
-/// Returns true for a message with which Algorithm 2 ends its last round.
+/// Returns true for a frame with the message by which Algorithm 2 ends its last round.
 pub(crate) fn is_stop(frame: &Frame) -> bool {
     frame.is(|message| matches!(message, Message::Token(token) if token.turn == AdjustStep::Stop))
 }
@@ -61,7 +61,7 @@ impl Chain {
         self.bench.step(Instant::from_micros(u64::MAX));
     }
 
-    /// Runs the chain until `done`, for at most `limit_ms`. Returns the time taken in ms; `None` if too long.
+    /// Runs the chain until `done` is true. Returns the time taken, ms; `None` if it takes longer than `limit_ms`.
     pub(crate) fn until(&mut self, limit_ms: u64, done: impl Fn(&Bench) -> bool) -> Option<u64> {
         let took = self
             .bench
@@ -69,7 +69,7 @@ impl Chain {
         Some(took.as_micros().div_ceil(1000))
     }
 
-    /// Returns the chain's SIR divided by its target, less 1, and the smallest distance of relays in m.
+    /// Returns the fraction by which the chain's SIR exceeds its target, and the relays' least distance, m.
     pub(crate) fn margin(&self) -> (f64, f64) {
         let at = |relay: &Relay| relay.setpoint().unwrap();
         let places: Vec<Place> = self

@@ -14,7 +14,7 @@ mod replay;
 mod seeds;
 mod tools;
 
-/// Heap that counts its allocations. The crate must make none.
+/// Heap that counts its allocations, because the crate under test must make none.
 #[global_allocator]
 static HEAP: Counting = Counting;
 

@@ -5,7 +5,7 @@ use uav_relay_xtask::FUZZ_TARGETS;
 
 use super::corpus;
 
-/// Largest permitted number of files, and of bytes, of all corpora.
+/// Largest permitted number of files, and of bytes, of all fuzz corpora together.
 const MOST: (usize, usize) = (200, 200 << 10);
 
 /// Fuzz targets to run under Miri, which is a thousand times slower, and their numbers of short inputs.

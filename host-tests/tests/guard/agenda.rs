@@ -13,7 +13,7 @@ pub(crate) const ROUGH_S: f64 = 200.0;
 pub(crate) const SLOWEST: f64 = 2.0;
 pub(crate) const FASTEST: f64 = 40.0;
 
-/// Random event of a flight. The first field is the index of the drone.
+/// Random event of a simulated flight. The first field is the index of the drone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum FlightEvent {
     Setpoint(usize, Point),
@@ -22,22 +22,22 @@ pub(crate) enum FlightEvent {
     Mute(usize),
     Unmute(usize),
     Vanish(usize),
-    /// Event: the drone's relay links to another one past a silent relay. The third field is the silent relay, and
-    /// the last one is the new neighbour, if any.
+    /// The drone's relay links to another relay past a silent one. The third field is the silent relay, the last one
+    /// the new neighbour, if any.
     Around(usize, Side, usize, Option<usize>),
     Back(usize, Side, usize),
     Forget(usize, Side),
     Speed(usize, f64),
-    /// Event: the drone's pilot takes control of the drone.
+    /// The drone's pilot takes control of the drone.
     PilotTakesOver(usize),
-    /// Event: the drone's motion guard is informed that its pilot has control.
+    /// The drone's motion guard is informed that its pilot has control.
     GuardLearnsOfPilot(usize),
-    /// Event: the pilot moves the drone across the line. The second field has the axis (1 for y, 2 for altitude),
-    /// true for the positive direction, and the distance, m.
+    /// The pilot moves the drone across the line. The second field has the axis (1 for y, 2 for altitude), true for
+    /// the positive direction, and the distance, m.
     Aside(usize, (usize, bool, f64)),
-    /// Event: the pilot moves the drone along the line, to a fraction of the space between neighbours.
+    /// The pilot moves the drone along the line, to this fraction of the space between its neighbours.
     Along(usize, f64),
-    /// Event: the pilot gives control back to the motion guard.
+    /// The pilot gives control back to the motion guard.
     PilotHandsBack(usize),
 }
 

@@ -36,12 +36,12 @@ const ACCELERATION: f64 = 3.0;
 /// Longest time from a release at full speed until the drone hovers, overshoot included, s.
 const BRAKES_S: f64 = 8.0;
 
-/// Time of the last fault of a flight, s. The flight ends when all drones have arrived.
+/// Time of the last fault of a simulated flight, s. The flight ends when all drones have arrived.
 const ROUGH_S: f64 = 120.0;
-/// Time at which a flight fails if not all drones have arrived, s.
+/// Time by which all drones must have arrived, s; otherwise the flight fails.
 const LAST_S: f64 = 900.0;
 
-/// Line from Tx to Rx: its number, and its direction on the ground. All lines start at the same Tx.
+/// Line from Tx to Rx: its number, and its direction as a vector on the ground. All lines start at the same Tx.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     number: u32,
@@ -155,7 +155,7 @@ impl Drone {
 )]
 #[derive(Debug, Default)]
 struct Report {
-    /// Smallest difference between two drones' distance and the distance required of them, m.
+    /// Smallest margin so far, m: the distance of two drones minus the distance required of them.
     margin_m: f64,
     /// Drones with the smallest margin: their indices, their distance in m, and the time in s.
     nearest: Option<(usize, usize, f64, f64)>,
@@ -373,7 +373,7 @@ impl World {
     }
 }
 
-/// Returns random agreed positions: in order along x, separated, and with y and altitude as permitted.
+/// Draws agreed positions: in order along x, separated, and with y and altitude as permitted.
 fn agreed(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let distance = f64::from(config.geofence.most_x_m);
     let step = f64::from(config.separation_m) * 1.001;
@@ -415,7 +415,7 @@ fn config(rng: &mut ChaCha8Rng, relays: usize) -> GuardConfig {
     }
 }
 
-/// Returns random start positions of drones: anywhere across the line, and close together along it.
+/// Draws start positions of drones: anywhere across the line, and close together along it.
 fn starts(rng: &mut ChaCha8Rng, config: &GuardConfig, relays: usize) -> Vec<Point> {
     let apart = f64::from(config.separation_m);
     let step = apart

@@ -21,7 +21,7 @@ pub(crate) fn length([dx, dy, dh]: Point) -> f64 {
     dx.hypot(dy).hypot(dh)
 }
 
-/// Returns the point `at` + `share` * `way`.
+/// Returns the point at the fraction `share` of the vector `way` from `at`: `at` + `share` * `way`.
 pub(crate) fn along(at: Point, way: Point, share: f64) -> Point {
     [0, 1, 2].map(|part| at[part] + share * way[part])
 }
@@ -49,18 +49,17 @@ pub(crate) struct Drone {
     /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],
     pub(crate) flies: bool,
-    /// True while the drone's radio works.
+    /// True while the radio of the drone works, so that it sends and receives.
     pub(crate) speaks: bool,
     /// True while the pilot flies the drone, so that the guard's setpoint is ignored.
     pub(crate) taken: bool,
-    /// True for each side whose neighbour knows that the pilot flies this drone.
+    /// True for each side whose neighbour has been informed that the pilot flies this drone.
     pub(crate) told: [bool; 2],
     /// Range of x that both neighbours keep clear, because they know that the pilot flies this drone.
     pub(crate) clear: (f64, f64),
     taken_s: f64,
-    /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx.
-    ///
-    /// A reply counts only if it repeats the number.
+    /// Session numbers that this drone's guard last sent to the neighbours toward Tx and Rx. A reply is valid only if
+    /// it repeats the number.
     pub(crate) said: [u16; 2],
     next_report_s: f64,
     next_reminder_s: f64,
@@ -70,9 +69,9 @@ pub(crate) struct Drone {
 /// Timing of the flight controller's position reports.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Board {
-    /// Longest interval between two reports, s.
+    /// Longest interval between two position reports of the drone, s.
     pub(crate) every_s: f64,
-    /// Greatest age of a report on arrival, s.
+    /// Greatest age of a position report on its arrival, s.
     pub(crate) stale_s: f64,
 }
 
@@ -169,7 +168,7 @@ impl Drone {
         }
     }
 
-    /// Tells the guard whether the drone follows setpoints or its pilot flies it.
+    /// Informs the guard whether the drone follows setpoints or its pilot flies it.
     pub(crate) fn is_flown(&mut self, now_s: f64) {
         if let Some(guard) = &mut self.guard {
             guard.control(instant(now_s), !self.taken);
@@ -203,7 +202,7 @@ impl Drone {
         }
     }
 
-    /// Asks the guard for the setpoint, and sends a changed one to the flight controller with a delay.
+    /// Gets the setpoint from the guard, and sends it, if changed, to the flight controller with a delay.
     pub(crate) fn steer(&mut self, rng: &mut ChaCha8Rng, config: &GuardConfig, now_s: f64) {
         let Some(guard) = &mut self.guard else {
             return;

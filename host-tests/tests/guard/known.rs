@@ -45,7 +45,7 @@ fn commit(world: &mut World, places: &[Point]) {
     }
 }
 
-/// Returns the time until all drones have reached their agreed positions, s.
+/// Runs the flight until all drones have reached their agreed positions. Returns the time taken, s.
 fn time(world: &mut World) -> f64 {
     let begun_s = world.now_s;
     while !world

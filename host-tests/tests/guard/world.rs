@@ -23,7 +23,7 @@ pub(crate) struct World {
     medium: Medium,
     pub(crate) faults: Faults,
     pub(crate) board: Board,
-    /// Smallest margin over the permitted distance between two drones so far, m.
+    /// Smallest margin so far, m: the distance of two drones minus the distance that they must keep.
     pub(crate) closest_m: f64,
     pub(crate) steps: u64,
 }
@@ -123,7 +123,7 @@ impl World {
         self.check();
     }
 
-    /// Sends all messages that the guard of drone `k` has pending.
+    /// Sends all pending messages of the guard of drone `k`.
     fn exchange_messages(&mut self, k: usize) {
         let drone = &mut self.drones[k];
         let Some(guard) = &mut drone.guard else {

@@ -55,13 +55,13 @@ fn close_by(relays: usize) -> (Link, Corridor) {
 /// Result of the joint method in a random scenario.
 struct Result {
     of: String,
-    /// SIR of the chain, divided by the optimum.
+    /// SIR of the chain as a fraction of the optimum.
     ratio: f64,
     sweeps: u32,
     bytes: u64,
 }
 
-/// Returns a description of a scene, with lengths as multiples of D, the distance from Tx to Rx.
+/// Describes a random scene as text, with lengths as multiples of the distance from Tx to Rx.
 fn described(link: &Link, corridor: Corridor) -> String {
     let d = link.distance_m;
     format!(
@@ -217,8 +217,8 @@ fn a_relay_that_stops_while_all_compute_is_reported_lost() {
     }
 }
 
-/// Prints the results. Returns the number within 0.1 % of the optimum, the worst and the best ratio, and the sum of
-/// sweeps along the chain.
+/// Prints the results. Returns the number within 0.1 % of the optimum, the worst and the best ratio, and the total
+/// number of sweeps (messages along the chain).
 fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     results.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
     for result in results.iter().take_while(|result| result.ratio < 0.999) {

@@ -9,7 +9,7 @@ use uav_relay_scenario::Scenario;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
 
-/// Largest permitted error of a position on the map, m.
+/// Largest permitted error of a position in the map files, m.
 const ALLOWED_M: f64 = 0.01;
 
 fn best(scenario: &Scenario, relays: u16) -> Plan {

@@ -14,8 +14,8 @@ use super::*;
 /// Latency of a frame, and interval at which the setpoints are observed, ms.
 const STEP_MS: u64 = 10;
 
-/// Longest time that a duplicate relay may keep its setpoint after a frame between the duplicates, ms. Duplicates are
-/// two relays with the same index.
+/// Longest time for which one of two relays with the same index may keep its setpoint, ms. It counts from the first
+/// frame between the two.
 const LIMIT_MS: u64 = 2_000;
 
 /// Longest permitted time in which both duplicate relays have setpoints, ms. The two receive each other, but few
@@ -41,14 +41,14 @@ const MEETING_MS: u64 = 200_000;
 /// Time of observation after two settled chains have come into range, ms.
 const MET_MS: u64 = 60_000;
 
-/// Medium between two duplicate relays and the other relays.
+/// Medium between two relays with the same index and the other relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Medium {
-    /// Medium: a shared channel on which the duplicate relays receive each other.
+    /// A shared channel, on which the two relays with the same index receive each other.
     Shared,
-    /// Medium: links to both neighbours on which the duplicate relays receive each other.
+    /// Links to both neighbours, on which the two relays with the same index receive each other.
     Links,
-    /// Medium: links to both neighbours on which the duplicate relays do not receive each other.
+    /// Links to both neighbours, on which the two relays with the same index do not receive each other.
     HiddenLinks,
 }
 
@@ -73,7 +73,7 @@ struct Case {
     seed: u64,
 }
 
-/// Durations measured in one simulated chain, ms.
+/// Durations measured in one simulated chain with two relays of the same index, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Durations {
     /// Longest time in which both duplicates have setpoints, from `LIMIT_MS` after their first frame on.

@@ -14,7 +14,7 @@ use uav_relay_sim::simulator::faults::OneWayFailure;
 
 use super::*;
 
-/// Time of the requests in these tests, s.
+/// Time at which relays request to leave the chain in these tests, s.
 const AT_S: u64 = 60;
 
 /// Returns the times, s, at which relay `relay` had an event `what`.
@@ -25,14 +25,14 @@ fn times(outcome: &Outcome, relay: u16, what: impl Fn(TimelineEvent) -> bool) ->
         .collect()
 }
 
-/// Returns the time at which relay `relay` may leave, s after its request.
+/// Returns the time from the request of relay `relay` to its permission to leave, s. `None` if it got none.
 fn freed(outcome: &Outcome, relay: u16) -> Option<f64> {
     let times = times(outcome, relay, |what| what == TimelineEvent::MayLeave);
     times.first().map(|at| at - AT_S as f64)
 }
 
-/// Returns the paper's chain of `relays` in which some request to leave. `leaves` has their numbers and endurances,
-/// s.
+/// Returns the setup of the paper's chain of `relays`, some of which request to leave. `leaves` has their numbers and
+/// endurances, s.
 fn departing(relays: u16, leaves: &[(u16, Option<u16>)]) -> Setup {
     let mut setup = paper(relays);
     let leaves = leaves
@@ -375,7 +375,7 @@ fn worst_hop(link: &Link, serving: &[(u16, Point)]) -> f64 {
     sir(&chain(link, places.len()), &places).unwrap_or(0.0)
 }
 
-/// Returns the worst share of the optimum of eight relays after `AT_S`, and its time, s.
+/// Returns the worst SIR after `AT_S` as a share of the optimum of eight relays, and its time, s.
 ///
 /// The data takes the better route: with or without each of the relays `moving`, which join or leave.
 fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
@@ -406,7 +406,8 @@ fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
 
 /// Result of the replacement of one relay in one scene.
 struct Replaced {
-    /// Worst shares of the optimum of eight relays: announced, and as a loss without a spare.
+    /// Worst SIRs as shares of the optimum of eight relays. The first is with an announced replacement, the second
+    /// with a loss without a spare.
     shares: [f64; 2],
     free: Option<f64>,
     text: String,
@@ -460,7 +461,8 @@ fn replaced(link: &Link, rng: &mut ChaCha8Rng, seed: u64) -> Replaced {
     }
 }
 
-/// Replaces a relay in 50 scenes, and prints the worst and the median share of the optimum. Returns the results.
+/// Replaces a relay in each of 50 scenes. Prints the worst and the median SIR as shares of the optimum. Returns the
+/// results.
 fn replaced_in(name: &str, scene: fn(&mut ChaCha8Rng) -> Link) -> Vec<Replaced> {
     let all: Vec<Replaced> = (1..=50)
         .map(|seed| {

@@ -7,8 +7,8 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
 
-/// Returns the time from the last detection of a lost relay to the settled chain, and a pass count. A pass is a round
-/// of messages along the chain. The first `sweeps_before` passes do not count.
+/// Returns the time from the last detection of a lost relay until the chain has settled, and a count. It counts the
+/// passes (messages along the chain) after the first `sweeps_before`.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Returns the relays that continue after a chain of eight is split downstream of relay `after`. They are the majority,
-/// or the half with the leader.
+/// Returns the relays that continue after a chain of eight is split after relay `after`. They are the majority, or
+/// the half with the leader.
 fn goes_on(after: u16) -> Vec<u16> {
     if after >= 4 {
         (1..=after).collect()
@@ -64,7 +64,8 @@ fn a_split_chain_heals() {
     }
 }
 
-/// Returns the largest number of views that one relay accepts while a link goes down and up.
+/// Returns the largest number of views that one relay accepts while a link goes down and up. A view is a membership
+/// of the chain.
 ///
 /// The link is that from relay `after` to the next relay toward Rx. It changes its state every `half` seconds, for ten
 /// minutes of simulated time.

@@ -13,10 +13,10 @@ use super::scenario::{Kind, Scenario};
 use super::tally::Tally;
 use super::wires::{FLIGHT, Flying, Wires, end, message, pass};
 
-/// Relative error by which f32 arithmetic may make a hop miss its target SIR.
+/// Relative error by which f32 rounding may make a hop miss its target SIR.
 pub(crate) const MISS: f64 = 2e-4;
 
-/// Relative error by which f32 arithmetic may make neighbours closer than the minimum separation.
+/// Relative error by which f32 rounding may make neighbours closer than the minimum separation.
 const CLOSE: f64 = 1e-5;
 
 /// Chain of real relays under test, with its clock and a model of each relay.

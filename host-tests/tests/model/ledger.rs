@@ -23,7 +23,7 @@ pub(crate) const MOST_FRAMES: u32 = 9;
 /// Model of one relay: its state as observed since it was switched on.
 #[derive(Debug)]
 pub(crate) struct Ledger {
-    /// Last setpoint; `None` before the first.
+    /// Last setpoint of the relay; `None` before the first.
     pub(crate) place: Option<Place>,
     pub(crate) target: Option<f32>,
     pub(crate) holding: bool,
@@ -32,7 +32,7 @@ pub(crate) struct Ledger {
     ended: Ended,
     refused: u32,
     signs: [Signs; 2],
-    /// Longest lease granted to the relay; it is at least `dead_after`.
+    /// Longest lease granted to the relay so far; at least `dead_after`.
     longest: Duration,
     /// Membership view that the relay has accepted; 0 after each start.
     pub(crate) view: ViewId,

@@ -10,46 +10,42 @@ use proptest::prelude::*;
 /// transit are numbered.
 #[derive(Clone, Debug)]
 pub(crate) enum Operation {
-    /// Operation: the next frame on a line (one direction of a link) arrives.
+    /// The next frame on a line (one direction of a link) arrives.
     Deliver(u8),
-    /// Operation: the next frame on a line (one direction of a link) is lost.
+    /// The next frame on a line (one direction of a link) is lost.
     Drop(u8),
-    /// Operation: the next frame on a line (one direction of a link) arrives twice.
+    /// The next frame on a line (one direction of a link) arrives twice.
     Twice(u8),
-    /// Operation: a frame overtakes frames before it. The fields are the line (direction of a link) and a number that
-    /// selects one to four frames to overtake.
+    /// A frame overtakes frames before it. The fields are the line (direction of a link) and a number that selects
+    /// one to four frames to overtake.
     Overtake(u8, u8),
-    /// Operation: several frames arrive in one read. The fields are the line (direction of a link) and the number of
-    /// frames.
+    /// Several frames arrive in one read. The fields are the line (direction of a link) and the number of frames.
     Burst(u8, u8),
-    /// Operation: the next frame on a line is delayed. The fields are the line (direction of a link) and the delay in
-    /// ms.
+    /// The next frame on a line is delayed. The fields are the line (direction of a link) and the delay, ms.
     Delay(u8, u16),
-    /// Operation: the next frame on a line arrives damaged. The fields are the line (direction of a link) and, for
-    /// each damaged byte, its position and the flipped bits.
+    /// The next frame on a line arrives damaged. The fields are the line (direction of a link) and, for each damaged
+    /// byte, its position and the flipped bits.
     Damage(u8, Vec<(u8, u8)>),
-    /// Operation: the clock advances to the next timer of any relay.
+    /// The clock advances to the next timer of any relay.
     Tick,
-    /// Operation: the clock advances by this many ms. Every timer is served in time, but no frames arrive.
+    /// The clock advances by this many ms. Every timer is served in time, but no frames arrive.
     Wait(u16),
-    /// Operation: the clock advances by this many ms while no main loop runs. Timers are served late.
+    /// The clock advances by this many ms while no main loop runs, so that timers are served late.
     Sleep(u16),
-    /// Operation: the clock advances by this many ms without faults. Frames arrive in order.
+    /// The clock advances by this many ms without faults. Frames arrive in order.
     Flow(u16),
-    /// Operation: a relay reboots. The fields are the relay and its new seed.
+    /// A relay reboots. The fields are the relay and its new seed.
     Reboot(u8, u32),
-    /// Operation: a link is cut. The fields are the link, and the number of bytes of the next frames that still
-    /// arrive.
+    /// A link is cut. The fields are the link, and the number of bytes of the next frames that still arrive.
     Cut(u8, u8),
-    /// Operation: a link that was cut is restored.
+    /// A link that was cut is restored.
     Join(u8),
-    /// Operation: the leader is commanded to restart the agreement.
+    /// The leader is commanded to restart the agreement on positions.
     Restart,
-    /// Operation: a recorded frame arrives again, if the chain signs its frames. The fields are the line (direction
-    /// of a link) and the frame.
+    /// A recorded frame arrives again, if the chain signs its frames. The fields are the line (direction of a link)
+    /// and the frame.
     Replay(u8, u8),
-    /// Operation: a relay measures interference. The fields are the relay, and the power in per cent of the agreed
-    /// power.
+    /// A relay measures interference. The fields are the relay, and the power in per cent of the agreed power.
     Measure(u8, u8),
 }
 

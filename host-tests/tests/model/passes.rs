@@ -43,9 +43,9 @@ const fn next(last: u16) -> u16 {
 pub(crate) enum PassClass {
     Accepted,
     Again,
-    /// Classification: a pass (a message along the chain) that arrives late and is over already.
+    /// Late: the pass (a message along the chain) is already over.
     Late,
-    /// Classification: a pass (a message along the chain) that does not continue the known passes.
+    /// Foreign: the pass (a message along the chain) does not continue the known passes.
     ///
     /// The pass is of another membership view, or from before the leader's reboot, or the relay has missed the pass
     /// before it.

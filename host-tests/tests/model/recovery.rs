@@ -17,7 +17,7 @@ const MOST_VIEWS: u32 = 2;
 const WATCH_MS: u64 = 16_000;
 
 impl World<'_> {
-    /// Runs a chain without faults until it agrees. Returns its agreement.
+    /// Runs a chain without faults until it agrees on positions. Returns the agreement.
     pub(crate) fn calm(&mut self) -> Checked<Calm> {
         let took = self.agree(Duration::from_millis(LONGEST_MS))?;
         let target = self.ledgers[0].target.unwrap_or_default();

@@ -4,19 +4,19 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Relay};
 
-/// Largest permitted relative excess of a target SIR over the optimum, because of f32 rounding.
+/// Largest relative excess of an agreed target SIR over the optimum that f32 rounding may cause.
 const ABOVE: f64 = 1e-4;
 
 /// Reference model of a mission's chain, in f64.
 #[derive(Debug)]
 pub(crate) enum Reference {
-    /// Reference model of a chain with an interferer at a known position.
+    /// Chain with an interferer at a known position.
     Source {
         link: Link,
         /// Highest target SIR within the relays' altitude limits.
         optimum: f64,
     },
-    /// Reference model of a chain in a field of interference.
+    /// Chain in a field of interference (a distribution along x).
     Field(StochasticLink),
 }
 

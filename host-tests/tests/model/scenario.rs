@@ -31,17 +31,17 @@ const SCENES: u64 = 400;
 /// Kind of mission: the leader's optimisation method and its data.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Kind {
-    /// Kind of mission: Algorithm 1, where the leader predicts the target SIR.
+    /// Algorithm 1, where the leader predicts the target SIR.
     Predicted,
-    /// Kind of mission: Algorithm 1 without prediction, where the leader tries target SIRs by messages. Relays may
-    /// have their own altitudes and powers.
+    /// Algorithm 1 without prediction: the leader tries target SIRs by messages. Relays may have their own altitudes
+    /// and powers.
     Tried,
-    /// Kind of mission: Algorithm 1 with free altitudes.
+    /// Algorithm 1 with free altitudes.
     Altitude,
     Adjust,
-    /// Kind of mission: Algorithm 4 in a configured field of interference.
+    /// Algorithm 4 in a configured field of interference.
     Field,
-    /// Kind of mission: Algorithm 4 in a field of interference that the relays measure.
+    /// Algorithm 4 in a field of interference that the relays measure.
     Measured,
 }
 
@@ -56,14 +56,14 @@ impl Kind {
     ];
 }
 
-/// Agreement of a chain without faults.
+/// Agreement that a chain without faults reaches.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Calm {
     /// Agreed x, y and altitude of every relay, as f32 bits.
     pub(crate) places: Vec<[u32; 3]>,
-    /// Agreed target SIR, as f32 bits.
+    /// Target SIR on which the relays agreed, as f32 bits.
     pub(crate) target: u32,
-    /// Virtual time until the agreement, µs.
+    /// Virtual time until the relays agreed, µs.
     pub(crate) took_us: u64,
 }
 

@@ -5,7 +5,7 @@ use uav_relay::{Duration, Instant};
 
 /// Number of unanswered heartbeat requests before a neighbour may be reported as lost.
 pub(crate) const QUESTIONS: usize = 16;
-/// Number of heartbeat intervals after which a late reply no longer proves that the neighbour is alive.
+/// Number of heartbeat intervals after which a reply is too late to prove that the neighbour is alive.
 const OPEN: u32 = 4;
 
 /// Factor on the largest number of heartbeat requests that were ever unanswered at the same time.
@@ -18,17 +18,17 @@ pub(crate) const LONGEST: u32 = 8;
 /// Model of what a relay knows about the life of a neighbour.
 #[derive(Debug)]
 pub(crate) struct Signs {
-    /// Sequence number and time of every heartbeat request to the neighbour.
+    /// Sequence number and time of every heartbeat request that the relay has sent to the neighbour.
     pub(crate) asked: Vec<(u16, Instant)>,
     /// Last time at which the neighbour was certainly alive.
     pub(crate) certainly_alive: Instant,
     /// Last time at which the neighbour may have been alive, by replies and messages that may be late.
     pub(crate) possibly_alive: Instant,
-    /// Time at which the last possible sign of life was received.
+    /// Time at which the last message was received that may prove the neighbour alive.
     pub(crate) last: Instant,
-    /// Number of heartbeat requests since the last certain sign of life.
+    /// Number of heartbeat requests since the neighbour was last certainly alive.
     pub(crate) open: usize,
-    /// Number of heartbeat requests since the last possible sign of life.
+    /// Number of heartbeat requests since the neighbour was last possibly alive.
     pub(crate) open_since_possible: usize,
     /// Largest number of heartbeat requests that were ever unanswered at the same time.
     ///

@@ -16,7 +16,7 @@ pub(crate) struct Tally {
     sequences: BTreeMap<(Kind, bool), u64>,
 }
 
-/// Events, each with the number of sequences among which it must occur at least once.
+/// Events that must occur: each with the number of sequences among which at least one must have it.
 const EXPECTED: [(&str, u64); 18] = [
     ("frames in bursts", 1),
     ("frames delayed", 1),

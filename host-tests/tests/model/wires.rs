@@ -39,9 +39,9 @@ struct Line {
 /// Numbers of complete frames that a receiver got.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ended {
-    /// Number of frames that arrived as they were sent.
+    /// Number of frames that arrived unchanged over the wires.
     pub(crate) intact: u32,
-    /// Number of frames that arrived changed or incomplete; empty ones do not count.
+    /// Number of frames that arrived changed or incomplete; empty frames do not count.
     pub(crate) broken: u32,
 }
 
@@ -217,7 +217,7 @@ impl Wires {
         }
     }
 
-    /// Releases all delayed frames now.
+    /// Releases all delayed frames at `now`, before their time.
     pub(crate) fn hurry_all(&mut self, now: Instant) {
         let late = self.lines.iter_mut().flat_map(|line| &mut line.late);
         late.for_each(|frame| frame.due = now);

@@ -2,11 +2,10 @@
 
 use uav_relay_scenario::scene::Scene;
 
-/// Number of cells of the grid in the first search.
+/// Number of grid cells along the line in the first search.
 const CELLS: u32 = 600;
 
-/// Number of segments into which the line from Tx to Rx is divided. The best chain whose first relay is in a segment
-/// is a candidate.
+/// Number of segments of the line from Tx to Rx. For each the best chain with relay 1 in it is a candidate.
 const PARTS: f64 = 16.0;
 
 /// Number of the best candidates that are refined.
@@ -15,16 +14,16 @@ const CANDIDATES: usize = 4;
 /// Number of grid positions of each relay in a refinement, on either side of its present position.
 const BESIDE: i32 = 40;
 
-/// Half width of the first refinement's grid, as a fraction of the distance from Tx to Rx.
+/// Half width of the first refinement's grid around a relay. It is a fraction of the distance from Tx to Rx.
 const WINDOW: f64 = 0.06;
 
-/// Number of refinements of a candidate, each with a narrower window.
+/// Number of refinements of a candidate chain, each with a narrower grid.
 const REFINEMENTS: u32 = 32;
 
-/// Ratio of the window widths of two successive refinements.
+/// Ratio of the grid widths of two successive refinements.
 const SHRINK: f64 = 0.6;
 
-/// SIR and positions of a chain.
+/// SIR of a chain's worst hop, and the x of its relays, m.
 type BestChain = (f64, Vec<f64>);
 
 /// Returns the SIR of the best chain at altitude `h`; 0 if the separation leaves no chain on the grid.

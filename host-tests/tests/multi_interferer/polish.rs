@@ -11,7 +11,7 @@ use uav_relay_tools::multi_interferer::{Polished, best_common_altitude, optimum,
 use super::above;
 use super::scenes::{level, of_link, scene};
 
-/// Returns relays that are evenly spaced along the line, at altitude `h`.
+/// Returns the positions of relays that are evenly spaced along the line, at altitude `h`.
 fn even(scene: &Scene, h: f64) -> Vec<(f64, f64)> {
     let hops = scene.relays.len() as f64 + 1.0;
     let step = scene.distance_m / hops;

@@ -31,9 +31,9 @@ use uav_relay_scenario::{
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Sources {
-    /// Kind of scene: interferers at any position, also on the line.
+    /// Interferers at any position, also on the line.
     Any,
-    /// Kind of scene: interferers far to the side of the line between Tx and Rx.
+    /// Interferers far to the side of the line between Tx and Rx.
     Aloof,
 }
 

@@ -20,7 +20,7 @@ fn drawn(rng: &mut impl Rng, style: &Style) -> Link {
     })
 }
 
-/// Returns the fraction of noise in the sum of noise and interference at the worst hop.
+/// Returns the noise at the worst hop as a fraction of noise plus interference.
 fn share(link: &Link, x: &[f64]) -> f64 {
     let silent = Link {
         noise_w: 0.0,

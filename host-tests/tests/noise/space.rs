@@ -30,7 +30,7 @@ fn noisy(number: u64, space: bool) -> Scenario {
     .as_relays_know_it()
 }
 
-/// Returns the joint solver's target SIR divided by the recorded optimum; `None` without a chain.
+/// Returns the joint solver's target SIR as a fraction of the recorded optimum; `None` without a chain.
 fn ratio(number: u64) -> Option<f64> {
     let of = noisy(number, number.is_multiple_of(2));
     let (mission, _) = of_link(&of.link, 1e-4)?;

@@ -102,7 +102,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// Returns the fraction by which a plan's SIR is below the SIR of the relays' agreement.
+/// Returns the fraction by which a plan's SIR is below that of the simulated relays' positions.
 ///
 /// The result is -inf without an agreement.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
@@ -188,7 +188,7 @@ fn the_others_take_the_side_of_a_fixed_altitude() {
     }
 }
 
-/// Returns the SIR of a plan divided by the optimum of the reference, for scenario `number`.
+/// Returns the SIR of a plan as a fraction of the reference optimum, for scenario `number`.
 fn over_the_judge(number: u32, optimum: f64) -> f64 {
     let Drawn { link, corridor, .. } = numbered(number);
     let relays = u16::try_from(link.len()).unwrap();

@@ -23,25 +23,25 @@ pub(crate) const OF_THE_CHIP: [&str; 2] = [
     "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be off by 8 %",
 ];
 
-/// Timeout of any step of a test. A fleet has `PATIENCE_A_DRONE` more for each drone.
+/// Timeout of any step of a test with emulated drones. Each drone adds `PATIENCE_A_DRONE`.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
 /// Longest time until a drone has logged its first lines.
 const START: Duration = Duration::from_secs(30);
 
-/// Time added to the timeout for each drone, since all drones share this machine.
+/// Addition to a step's timeout for each drone, since all drones share this machine.
 const PATIENCE_A_DRONE: Duration = Duration::from_secs(10);
 
 /// Firmware image of an emulated drone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Image {
-    /// Image with a UART to each neighbour.
+    /// Firmware with a UART to each neighbour.
     Wires,
-    /// Image with one UART, to a radio on a shared channel.
+    /// Firmware with one UART, to a radio on a shared channel.
     Radio,
-    /// Image with a UART to each neighbour, and with Algorithm 1 only.
+    /// Firmware with a UART to each neighbour, and with Algorithm 1 only.
     Smallest,
-    /// Image with asynchronous ports.
+    /// Firmware with asynchronous ports.
     Asynchronous,
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn image(example: &str) -> PathBuf {
     folder.join(example)
 }
 
-/// Returns the table of log strings of an image, by which its log is decoded.
+/// Returns the log strings of a firmware image, by which its log is decoded.
 fn table(which: Image) -> &'static Table {
     static TABLES: [OnceLock<Table>; 4] = [const { OnceLock::new() }; 4];
     TABLES[which as usize].get_or_init(|| log::table(&image(which.name())))
@@ -265,7 +265,7 @@ impl Fleet {
         self.of_drone(drone).skip(OF_THE_CHIP.len())
     }
 
-    /// Waits until every drone has a setpoint. Returns the f32 bits of the setpoints.
+    /// Waits until every drone has a setpoint. Returns the setpoints as f32 bits.
     pub(crate) fn places(&mut self) -> Vec<[u32; 3]> {
         let drones = u16::try_from(self.drones.len()).unwrap();
         let last = |lines: &[Line], drone| {

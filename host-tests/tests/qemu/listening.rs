@@ -42,7 +42,7 @@ fn scene() -> Scene {
     Scene::new(&known, RELAYS).unwrap()
 }
 
-/// Returns three positions to which the pilot of a drone flies it, to measure there.
+/// Returns the three positions at which a drone measures, to which its pilot flies it.
 fn places(drone: u16) -> [Placement; 3] {
     let x_m = 336.0 * f32::from(drone);
     [[-60.0, 70.0, 30.0], [20.0, -50.0, 45.0], [90.0, 10.0, 60.0]].map(|[x, y_m, altitude_m]| {

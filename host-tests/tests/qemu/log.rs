@@ -11,7 +11,7 @@ use defmt_decoder::{DecodeError, Table};
 pub(crate) struct Line {
     /// Number of the drone that logged the line, 1 to N.
     pub(crate) drone: u16,
-    /// Time in the drone's clock, µs.
+    /// Time of the log line on the drone's clock, µs.
     pub(crate) at: u64,
     pub(crate) text: String,
 }

@@ -10,8 +10,8 @@ use uav_relay_tools::provision::block::Flight;
 use crate::chain::{BAD_DAY, simulated};
 use crate::fleet::{Fleet, Image};
 
-/// Returns a flight of five relays past an interferer at (500, `y_m`) m. Lateral offsets are up to `aside_m`; `held`
-/// is a relay and the altitude that it keeps.
+/// Returns a flight of five relays past an interferer at (500, `y_m`) m. Lateral offsets are up to `aside_m`. `held`
+/// is a relay that keeps its altitude, and that altitude.
 fn past(y_m: f64, aside_m: f64, held: Option<(u16, f64)>, method: Method) -> Flight {
     let own = |(index, altitude)| {
         let own = RelayOverride {

@@ -19,9 +19,9 @@ struct Three {
     fleet: Fleet,
     mavsdk: Mavsdk,
     others: [Vehicle; 2],
-    /// Number of refusals of setpoint control in the first drone's log to which its pilot has reacted.
+    /// Number of the first relay's refusals of setpoint control to which its pilot has reacted.
     found: usize,
-    /// True while the pilot has chosen another mode because of a refusal, and is to choose OFFBOARD again.
+    /// True while the pilot has left OFFBOARD because of a refusal, and will choose it again.
     chooses: bool,
 }
 

@@ -195,7 +195,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the shared settings of a chain in which an agreement may take arbitrarily long.
+/// Draws settings that all relays of a chain share. With them an agreement may take arbitrarily long.
 pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let usual = settings(rng, mission);
     let micros = |most: f64, rng: &mut _| f64::from(scaled(rng, 3e4, 1e3, 1e13)).min(most) as u64;
@@ -229,7 +229,7 @@ pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the settings of one relay, from the shared ones. `guarded` gives it a motion guard.
+/// Draws the settings of one relay: the shared ones, with a profile of its own. `guarded` gives it a motion guard.
 pub(crate) fn own(
     rng: &mut impl Rng,
     mission: &Mission,

@@ -41,7 +41,7 @@ fn place(rng: &mut ChaCha8Rng, distance_m: f32) -> Placement {
     }
 }
 
-/// Feeds random measurements of all nodes to the relays for 60 s, then 1e-9 W. The chain must agree in the end.
+/// Gives random measurements of all nodes to the relays for 60 s, then 1e-9 W. The chain must agree in the end.
 fn fly(seed: u64, mission: Mission, settings: Settings) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some(mut line) = line(mission, Instant::ZERO, |_| settings) else {

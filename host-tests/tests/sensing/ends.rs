@@ -17,7 +17,7 @@ const RELAYS: u16 = 5;
 /// Factor by which the true path loss on the ground exceeds that in the mission: Rx is behind a hill.
 const HILL: f64 = 8.0;
 
-/// Returns two results of each random scene: the error of relay 1's power estimate at Rx, and the SIR.
+/// Returns two results of each random scene: relay 1's error of the power at Rx, and the SIR. The error is relative.
 ///
 /// The error is relative, and `None` without an estimate. The SIR is that of the chain's worst hop, linear, with the
 /// true interference.

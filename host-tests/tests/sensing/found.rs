@@ -11,7 +11,7 @@ use crate::count;
 
 type Setups = fn(&RandomScene) -> Result<Setup, FigureError>;
 
-/// Limits of a test: number of agreements, quantile of the scenes, least fraction of the optimum.
+/// Limits of a test: number of agreements, quantile of the scenes, least fraction of the optimum SIR.
 ///
 /// For example (5, 0.5, 0.99): after five agreements, the median SIR is at least 0.99 of the optimum.
 type Limits = &'static [(usize, f64, f64)];

@@ -31,7 +31,7 @@ fn setup(wild: &RandomScene) -> Setup {
     setup
 }
 
-/// Returns the SIR of the final positions as a fraction of the optimum.
+/// Returns the SIR at the final positions as a fraction of the optimum SIR.
 pub(crate) fn share(wild: &RandomScene, outcome: &Outcome) -> f64 {
     let goals = outcome.snapshots.last().unwrap().goals.as_ref();
     goals.map_or(0.0, |goals| {
@@ -51,7 +51,7 @@ pub(crate) fn named(outcome: &Outcome) -> Vec<u16> {
     named
 }
 
-/// Returns the fraction of the optimum SIR that each scene reaches without sensor faults.
+/// Returns each scene's SIR as a fraction of the optimum, with intact sensors.
 fn sound(relays: u16) -> Vec<f64> {
     let one = |seed| {
         let wild = RandomScene::new(seed, relays, 1);

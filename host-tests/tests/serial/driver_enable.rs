@@ -9,7 +9,7 @@ use uav_relay::{Instant, Wiring};
 use crate::chain::{BAUD, BYTE_TIME, relay};
 use crate::uart::{Bench, IoUart, Pin, Uart};
 
-/// Runs a relay whose neighbour is missing for `millis` ms of simulated time. Returns the error count of the
+/// Runs a relay without a neighbour for `millis` ms of simulated time. Returns the number of errors of the
 /// driver-enable pin.
 fn call(port: impl SerialPort, bench: &Rc<RefCell<Bench>>, millis: u64) -> u32 {
     let pin = Pin(Rc::clone(bench));

@@ -12,7 +12,7 @@ use pipe::{End, ReadErrors};
 use uav_relay::serial::{READ_LIMIT, SerialStats};
 use uav_relay::{Instant, Mission, Placement, Side, Wiring};
 
-/// Returns the positions on which relays agree that exchange frames without serial ports.
+/// Returns the positions on which relays agree if their frames do not pass through serial ports.
 fn bare(relays: u16) -> Vec<Option<Placement>> {
     agreed(Mission::try_new(fixtures::paper(relays)).unwrap())
 }

@@ -14,7 +14,7 @@ pub(crate) struct Bench {
     /// Start and end of the transmission of each byte, µs.
     pub(crate) bytes: Vec<(u64, u64)>,
     pub(crate) edges: Vec<(u64, bool)>,
-    /// Number of attempts that fail next: to set the driver-enable pin low, and to set it high.
+    /// Numbers of coming attempts that fail: to set the driver-enable pin low, and to set it high.
     pub(crate) refusals: [u32; 2],
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Uart {
     pub(crate) byte_time: u64,
     /// Size of the UART's FIFO in bytes, without the byte that is leaving.
     pub(crate) fifo: u64,
-    /// Computing time between two reads of the clock, µs.
+    /// Computing time that passes between two reads of the clock, µs.
     pub(crate) lag: u64,
 }
 
@@ -51,7 +51,7 @@ impl Uart {
         bench.bytes.push((start, start + self.byte_time));
     }
 
-    /// Simulates a read of the UART's state: it takes time and returns no byte.
+    /// Simulates that the driver reads the UART's state: it takes time, and no byte is read.
     fn look(&self) {
         self.bench.borrow_mut().clock += self.lag;
     }

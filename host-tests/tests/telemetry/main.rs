@@ -61,13 +61,13 @@ fn flown(mut setup: Setup) -> Setup {
     setup
 }
 
-/// Figures of a run: ages of each relay's reports, position errors, bytes.
+/// Figures of a telemetry run: ages of the relays' reports, position errors, and bytes on the links.
 #[derive(Default)]
 struct Figures {
     ages_s: Vec<Vec<f64>>,
     errors_m: Vec<f64>,
     frames: Vec<OnAir>,
-    /// First time at which all relays hold their positions.
+    /// First time at which all relays hold their agreed positions.
     agreed: Option<Instant>,
 }
 
@@ -106,7 +106,7 @@ impl Figures {
         }
     }
 
-    /// Returns the age that reports do not exceed for this share of the time, s, of the worst relay.
+    /// Returns the age that the worst relay's reports do not exceed for the fraction `share` of the time.
     fn age_s(&self, share: f64) -> f64 {
         let all = self.ages_s.iter().map(|ages| quantile(ages, share));
         all.fold(0.0, f64::max)

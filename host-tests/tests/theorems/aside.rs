@@ -19,9 +19,9 @@ use super::scene::Scene;
 struct SceneResult {
     /// Name of the theorem's case by which the solution was found.
     case: String,
-    /// Fraction by which the solution's SIR falls short of the best SIR that brute force finds.
+    /// Fraction by which the solution's SIR is below the best SIR that brute force finds.
     short: f64,
-    /// Relative error of the SIR that the solution states.
+    /// Relative error of the SIR that the solution claims for its position.
     told: f64,
 }
 

@@ -3,7 +3,8 @@
 use super::scene::Scene;
 
 impl Scene {
-    /// Returns the best SIR over a box of x and altitude. It searches along lines, then around the best points.
+    /// Returns the best SIR over a box of x and altitude, by brute force. The search is along lines, then around the
+    /// best points.
     pub(crate) fn brute(&mut self, x: (f64, f64), h: (f64, f64)) -> f64 {
         let lines = |(low, high): (f64, f64)| {
             if low < high {
@@ -67,8 +68,8 @@ impl Scene {
     }
 }
 
-/// Returns the maximum of `f` over `range` and its position. Samples are denser around `near`. A golden-section
-/// search then refines the best sample.
+/// Returns the maximum of `f` over `range` and its position. Samples are denser around `near`, and a golden-section
+/// search refines the best.
 fn along(range: (f64, f64), near: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     let (low, high) = range;
     let mut at = vec![low, high];

@@ -97,7 +97,7 @@ impl LateralScene {
         [(0.0, self.scene.link.distance_m), self.lateral, band]
     }
 
-    /// Returns the best SIR over a box of x, y and altitude: by a grid, then by random searches. The random searches
+    /// Returns the best SIR over a box of x, y and altitude, by brute force: a grid, then random searches. These
     /// begin at the best points of the grid that are far from each other.
     pub(crate) fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
@@ -160,7 +160,7 @@ impl LateralScene {
     }
 }
 
-/// Returns samples of a range: its ends, equidistant ones, and denser ones around each of `near`.
+/// Returns sample points of a range: its ends, equidistant ones, and denser ones around each of `near`.
 pub(crate) fn marks((low, high): (f64, f64), near: &[f64]) -> Vec<f64> {
     let mut at = vec![low, high];
     for step in 1..12 {

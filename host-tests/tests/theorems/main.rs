@@ -8,5 +8,5 @@ mod lemmas;
 mod optima;
 mod scene;
 
-/// Largest permitted shortfall from the best SIR, as a fraction.
+/// Largest permitted shortfall from the best SIR, as a fraction of it.
 const ALLOWED: f64 = 1e-4;

@@ -49,7 +49,7 @@ fn new_place(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, moved(base, 700.0, -300.0)).unwrap()
 }
 
-/// Runs the ground station and one relay for two seconds. Returns the relay's events.
+/// Exchanges frames between the ground station and one relay for two seconds. Returns the relay's events.
 fn exchange(ground: &mut Ground, relay: &mut Relay, port: Port, from_ms: u64) -> Vec<Event> {
     let mut events = Vec::new();
     let mut frame = [0; MAX_FRAME];

@@ -58,7 +58,7 @@ fn upload(
     }
 }
 
-/// Checks a run with uploads. Returns the first fault as an error.
+/// Checks the rules of uploads in a run. Returns the first violation as an error.
 ///
 /// All members of a membership view must use the same mission. If it is an uploaded one, it must be stored by at
 /// least as many relays as the view has. Setpoints must be within limits. A settled chain must use mission `version`,

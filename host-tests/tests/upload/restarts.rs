@@ -20,7 +20,8 @@ fn power_cut(wiring: Wiring, forgetful: &[u16]) -> (Setup, Outcome) {
     (setup, outcome)
 }
 
-/// Returns the number of membership views that relays accepted after the power failure.
+/// Returns the number of membership views that relays accepted after the power failure. A view is the agreed set of
+/// members.
 fn views(outcome: &Outcome) -> usize {
     let moments = outcome
         .moments

@@ -40,32 +40,32 @@ pub(crate) struct Kind {
 /// Scheduled event at a relay or link. Relays are counted from 0.
 #[derive(Clone, Debug)]
 pub(crate) enum ScheduledEvent {
-    /// Event: the relay is switched on. After a reboot it has its stored votes and upload.
+    /// The relay is switched on. After a reboot it has its stored votes and upload.
     On(usize),
     Off(usize),
-    /// Event: an operator informs the relay that the other drone with its index is gone.
+    /// An operator informs the relay that the other drone with its index is gone.
     Clear(usize),
-    /// Event: the relay requests to leave the chain, with this remaining endurance, s.
+    /// The relay requests to leave the chain, with this remaining endurance, s.
     Leave(usize, Option<u16>),
-    /// Event: the relay becomes a spare, if it has not taken part in anything.
+    /// The relay becomes a spare (waits outside of the chain), if it has not taken part in anything.
     Spare(usize),
-    /// Event: the relay cancels its departure, or joins the chain again.
+    /// The relay cancels its departure, or joins the chain again.
     Stay(usize),
-    /// Event: the link from `from` to `to` is cut. Several cuts of one link add up.
+    /// The link from `from` to `to` is cut. Several cuts of one link add up.
     Cut {
         from: usize,
         to: usize,
     },
-    /// Event: one cut of the link from `from` to `to` ends. The link works again if no other cut is left.
+    /// A cut of the link from `from` to `to` ends. The link works again if no other cut is left.
     Mend {
         from: usize,
         to: usize,
     },
-    /// Event: from now on, this fraction of frames is lost on every link.
+    /// Frames are lost with this probability on every link from now on.
     Loss(f64),
-    /// Event: a mission is uploaded to the relay.
+    /// A mission is uploaded to the relay.
     Upload(usize, Box<Upload>),
-    /// Event: the relay's clock steps by this many µs, but not below 0. The fields are the relay and the step.
+    /// The relay's clock steps by this many µs, but not below 0. The fields are the relay and the step.
     Step(usize, i64),
 }
 
@@ -111,7 +111,7 @@ struct Drone {
     starts: u32,
     stored: (Option<ViewRecord>, Option<Upload>),
     wake_us: Option<u64>,
-    /// Difference of the drone's clock from the simulated time, µs.
+    /// Reading of the drone's clock minus the simulated time, µs.
     ahead_us: i64,
     /// Time at which the drone's transmitter is free again, for each port, µs.
     free_us: [u64; 2],
@@ -137,13 +137,13 @@ pub(crate) struct Air {
     /// Time since which all relays have had agreed positions in one view, µs; `None` while some have not. A view is
     /// the agreed membership of the chain.
     pub(crate) whole_since_us: Option<u64>,
-    /// Number of relays that may lack an agreed position without an interruption of the time in `flown_us`.
+    /// Number of relays that may lack an agreed position while the chain counts as flying (`flown_us`).
     pub(crate) spare: usize,
     /// Total time in which all relays but at most `spare` have had positions of one agreement, µs.
     pub(crate) flown_us: u64,
     /// Time at which all relays but at most `spare` first had positions of one agreement, µs.
     pub(crate) first_us: Option<u64>,
-    /// Longest interruption of the time in `flown_us`, µs: too many relays lack an agreed position.
+    /// Longest time in which more than `spare` relays lacked an agreed position, µs.
     pub(crate) longest_us: u64,
     flies: bool,
     changed_us: u64,
@@ -170,7 +170,7 @@ impl Drone {
 }
 
 impl Air {
-    /// Stores the voting record of an earlier flight at relay `at`.
+    /// Stores the record of votes from an earlier flight at relay `at`.
     pub(crate) fn store(&mut self, at: usize, record: ViewRecord) {
         self.drones[at].stored.0 = Some(record);
     }
@@ -512,8 +512,7 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest membership view whose members all have positions of one agreement. A view is
-    /// the agreed membership of the chain.
+    /// Returns the size of the largest membership view whose members all have positions of one agreement.
     fn flying(&self) -> usize {
         let holds = |seen: &&ObservedState| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding

@@ -24,7 +24,7 @@ fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Result of one schedule of faults.
+/// Result of one simulated schedule of faults.
 #[derive(Clone, Debug)]
 struct Measured {
     seed: u64,
@@ -42,7 +42,7 @@ fn flown(seed: u64, schedule: &Schedule) -> Measured {
     ended(seed, schedule, schedule.begun())
 }
 
-/// Runs the chain `air` to the end of its schedule, and then until all relays have agreed positions. Gives up after
+/// Simulates the chain `air` to the end of its faults, and on until all relays have agreed positions. Gives up after
 /// 15 minutes.
 fn ended(seed: u64, schedule: &Schedule, mut air: Air) -> Measured {
     let end = schedule.faults_end_us;

@@ -76,7 +76,7 @@ impl Schedule {
         self.cut_link_between(other, one, from_us, until_us);
     }
 
-    /// Separates the relays for which `is_in` is true from all others, between two times.
+    /// Cuts the links between the relays for which `is_in` is true and all others, between two times.
     pub(crate) fn cut(&mut self, is_in: impl Fn(usize) -> bool, from_us: u64, until_us: u64) {
         let all = usize::from(self.kind.mission.relays());
         for one in 0..all {
@@ -132,7 +132,7 @@ pub(crate) fn random(seed: u64) -> Schedule {
     schedule
 }
 
-/// Draws a schedule of faults of every kind in which relays also leave. Each of them stays in the end.
+/// Draws a schedule of faults in which relays also leave the chain. Each of them cancels its departure in the end.
 pub(crate) fn with_departures(seed: u64) -> Schedule {
     let mut schedule = random(seed);
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0x5555);

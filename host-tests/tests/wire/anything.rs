@@ -112,7 +112,7 @@ struct Step {
     /// next pass; its answer, the number of the pass sent last.
     off: i16,
     tame: bool,
-    /// Time until the next step, ms.
+    /// Time until the next step of the test, ms.
     wait_ms: u64,
     /// True if a neighbour's answer follows a message that travels along the chain.
     answered: bool,
@@ -144,7 +144,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     vec(step, 1..40)
 }
 
-/// State of a test in which a relay receives random messages.
+/// State of a random test, in which a relay receives random messages.
 struct Flight {
     bench: Bench,
     /// Messages of the test, one of each tag, in the order of the tags.

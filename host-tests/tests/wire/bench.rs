@@ -17,7 +17,7 @@ use super::message::{WireMessage, plain_of, wire};
 #[derive(Clone, Debug)]
 pub(crate) struct Bench {
     relay: Relay,
-    /// Node number of the relay.
+    /// Node number of the relay under test.
     pub(crate) own: u16,
     /// Digest of the mission that the relay has before flight.
     pub(crate) mission: u16,
@@ -113,21 +113,21 @@ impl Bench {
         out
     }
 
-    /// Advances the time by a millisecond. Returns what the relay then sends.
+    /// Advances the time by a millisecond. Returns the ports and messages that the relay then sends.
     pub(crate) fn advance_1_ms(&mut self) -> Vec<(Port, WireMessage)> {
         self.now = self.now + Duration::from_millis(1);
         self.relay.handle_timeout(self.now);
         self.sent()
     }
 
-    /// Advances the time to the relay's next timeout. Returns what it then sends.
+    /// Advances the time to the relay's next timeout. Returns the ports and messages that it then sends.
     pub(crate) fn advance_to_timeout(&mut self) -> Vec<(Port, WireMessage)> {
         self.now = self.relay.poll_timeout().unwrap();
         self.relay.handle_timeout(self.now);
         self.sent()
     }
 
-    /// Advances the time by a second. Returns all that the relay sends meanwhile.
+    /// Advances the time by a second. Returns the ports and messages that the relay sends meanwhile.
     pub(crate) fn advance_1_s(&mut self) -> Vec<(Port, WireMessage)> {
         let mut out = self.sent();
         out.extend((0..1000).flat_map(|_| self.advance_1_ms()));

@@ -9,7 +9,8 @@ use uav_relay_decode::{range, walk};
 use super::golden::vectors;
 use super::message::FORMAT;
 
-/// Values of each field that the test vectors have, as text. The key is the message's name and the field's.
+/// Values of each message field that occur in the test vectors, as text. The key is the message's name and the
+/// field's.
 type BoundsSeen = BTreeMap<String, BTreeSet<String>>;
 
 /// Returns the name under which a message's fields are collected. Messages with the same fields share a name.

@@ -78,7 +78,7 @@ fn last_of_20(quorum: bool) -> Bench {
     Bench::with(paper(20), 20, settings)
 }
 
-/// Returns the decision by which the last relay answers a proposal.
+/// Returns the decision with which the last relay, `last`, answers a proposal of a view.
 fn decided_by(last: &mut Bench, proposal: &WireMessage) -> WireMessage {
     let mut out = last.receive(Port::Upstream, proposal);
     let (port, message) = out.pop().unwrap();

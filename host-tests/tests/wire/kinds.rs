@@ -13,7 +13,7 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Field of interference in which a chain of eight can meet a target SIR.
+/// Field of interference (Upsilon = E[1/I] along x) in which a chain of eight can meet a target SIR.
 pub(crate) const FIELD: Field = Field::new(&[at(-100.0, 1e8), at(500.0, 3e7), at(900.0, 2e8)]);
 
 /// Field of interference that is as weak as the format permits.
@@ -154,7 +154,7 @@ pub(crate) fn relay_4(config: MissionConfig) -> (Bench, Port, Port) {
     (bench, from, to)
 }
 
-/// Returns the ports at which a relay receives messages along the chain, and to which it forwards them.
+/// Returns the ports at which a relay receives messages along the chain, and at which it forwards them.
 pub(crate) fn ways(interference: Interference) -> (Port, Port) {
     match interference {
         Interference::Source(_) | Interference::Unknown => (Port::Upstream, Port::Downstream),

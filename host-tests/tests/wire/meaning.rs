@@ -48,7 +48,7 @@ impl MessageFields<'_> {
         PerTarget::from_slice(&list(self.0, name)).unwrap()
     }
 
-    /// Returns true if the optional field `name` has a value.
+    /// Returns true if the message's optional field `name` is present.
     fn has(&self, name: &str) -> bool {
         self.0.get(name) != Some(&Value::None)
     }

@@ -111,7 +111,7 @@ fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     verdict
 }
 
-/// Numbers of bodies by verdict: accepted, wrongly encoded, out of range.
+/// Numbers of message bodies by verdict: accepted, wrongly encoded, out of range.
 #[derive(Default, Debug)]
 struct VerdictCounts([usize; 3]);
 

@@ -25,9 +25,10 @@ const BACK: usize = 87;
 const GAP: usize = 95;
 const SITES_AT: usize = 99;
 
-/// Length of an offer's body, bytes.
+/// Length of a mission offer's body, bytes.
 pub(crate) const BYTES: usize = 125;
-/// Length of the part of an offer's body that a relay stores: all but the number of the answered hello.
+/// Length of the part of a mission offer's body that a relay stores, bytes. It is all but the number of the answered
+/// hello.
 pub(crate) const KEPT: usize = 123;
 
 /// Returns an offer of mission `version` that eight relays can fly. Their mission before flight has the digest

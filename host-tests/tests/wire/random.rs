@@ -140,7 +140,7 @@ proptest! {
 
 #[test]
 fn random_bodies_reach_messages_and_both_errors() {
-    /// First unused message tag. Bodies with this or a later tag, or without a tag, are counted together.
+    /// Index under which message bodies without a known tag are counted: the first unused tag.
     const NONE: usize = 23;
 
     let mut runner = TestRunner::new(config(1));

@@ -27,7 +27,7 @@ const SIGNED: u16 = 1;
 /// Flag in a frame's header: the body is a handshake.
 const HANDSHAKE: u16 = 2;
 
-/// Returns the settings of a relay with the test's key.
+/// Returns the settings of a relay with the test's network key.
 pub(crate) fn settings(wiring: Wiring) -> Settings {
     Settings {
         wiring,

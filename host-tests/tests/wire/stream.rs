@@ -42,7 +42,7 @@ fn deframed_in_runs(stream: &[u8]) -> Vec<Outcome> {
     out
 }
 
-/// Decodes `stuffed`, the bytes between two delimiters, by the rules of the format. Returns a frame or an error.
+/// Decodes `stuffed`, the bytes between two delimiters, by the format's COBS rules. Returns a frame or an error.
 pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
     let (plain, whole) = envelope::unstuffed(stuffed);
     if plain.len() > MAX_DECODED {
@@ -54,7 +54,8 @@ pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
     }
 }
 
-/// Returns the stuffed frames in a stream, without empty ones and an incomplete last one.
+/// Returns the parts of a stream between delimiters: its COBS frames. Empty ones and an incomplete last one are left
+/// out.
 pub(crate) fn chunks(stream: &[u8]) -> Vec<&[u8]> {
     let mut chunks: Vec<&[u8]> = stream.split(|&byte| byte == 0).collect();
     chunks.pop();

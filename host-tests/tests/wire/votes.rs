@@ -17,15 +17,15 @@ pub(crate) const fn id(number: u32, node: u16) -> u32 {
     number << 10 | node as u32
 }
 
-/// Returns the number that a membership view adds to the mission digest in messages of that view.
+/// Returns the number that messages of a membership view add to the mission digest.
 pub(crate) fn mark(view: u32) -> u16 {
     let low = view & 0xFFFF;
     let (top, next) = (view >> 24, view >> 16 & 0xFF);
     u16::try_from((low + (next << 8) + top) & 0xFFFF).unwrap()
 }
 
-/// Remaining lease of a relay that has just booted, in units of 0.1 s. It is `dead_after`, the time for which other
-/// relays may rely on this one.
+/// Remaining lease of a relay that has just booted: `dead_after`, in units of 0.1 s. Other relays may rely on it for
+/// that long.
 pub(crate) const RELIED: u16 = 150;
 
 /// Returns the proposal of membership view `view` as the relay at position `place` forwards it. All relays up to

@@ -12,7 +12,7 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of random chains over which the paper takes its means.
+/// Number of random chains whose results are averaged, as in the paper.
 pub const DRAWS: u32 = 1000;
 
 /// Mean results of many chains whose relays are at random positions.
@@ -72,7 +72,7 @@ pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
 /// Any f64 interval needs fewer steps.
 const HALVINGS: u32 = 200;
 
-/// Returns the relays' x, m from Tx, that maximise the weakest received signal, without interference.
+/// Returns the relays' x, m from Tx, that maximise the weakest received signal. Interference is ignored.
 ///
 /// All relays get the altitude and power of the first relay. Empty without relays. The cost is that of computing the
 /// length of a chain 200 times.
@@ -101,14 +101,14 @@ pub fn blind_places(scene: &Scene) -> Vec<f64> {
         .collect()
 }
 
-/// Computes hop lengths, m, from the received power that each hop must have, W.
+/// Computation of hop lengths, m, from the received power that each hop must have, W.
 struct Hops<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
 }
 
 impl Hops<'_> {
-    /// Returns the largest signal power, W, that is possible on both the first and the last hop.
+    /// Returns the largest signal power that is possible on both the first and the last hop, W.
     ///
     /// On these hops, the received power is largest if the relay is right above Tx, or right above Rx.
     fn strongest(&self) -> f64 {

@@ -119,7 +119,7 @@ impl Board {
     }
 }
 
-/// Largest distance between the first bytes of the first and the last part of an image.
+/// Largest distance between the first bytes of an image's first and last part, bytes.
 ///
 /// No supported flash is larger than this.
 pub const LARGEST: u32 = 16 * 1024 * 1024;
@@ -130,7 +130,7 @@ pub const BLANK: u8 = 0xFF;
 /// Part of an image: contiguous bytes, and the flash address of the first one.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Piece {
-    /// Address of the first byte.
+    /// Address in flash of the image's first byte.
     pub address: u32,
     /// Contents of this part of the flash image. The first byte is at `address`.
     pub bytes: Vec<u8>,
@@ -199,7 +199,7 @@ pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
 
 const RECORD: u8 = 16;
 
-/// Returns the image as the text of an Intel HEX file, with 32-bit addresses.
+/// Returns the image as the text of an Intel HEX file, with 32-bit addresses. The error is a line for the user.
 pub fn hex(pieces: &[Piece]) -> Result<String, String> {
     let mut records = Vec::new();
     let mut above = None;

@@ -25,7 +25,7 @@ const NO_SCENE: FigureError = FigureError::Unsettled("a scene");
 pub struct RandomScene {
     /// Geometry, powers and the true interferers.
     pub scenario: Scenario,
-    /// Number of relays.
+    /// Number of relays in the chain.
     pub relays: u16,
     /// Seed of the random numbers that draw the interferers, and of those in the simulation.
     pub seed: u64,
@@ -139,7 +139,7 @@ impl RandomScene {
     }
 }
 
-/// Returns the chain's true SIR after each agreement on positions, linear.
+/// Returns the chain's SIR with the true interferers after each agreement on positions, linear.
 ///
 /// The relays had no measurements at the first agreement. `stands` are the states of the simulated chain in order.
 pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
@@ -154,7 +154,7 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
     sirs
 }
 
-/// Largest number of agreements, based on measurements, after which the figure shows the SIR.
+/// Number of agreements based on measurements up to which the figure shows the SIR.
 pub const LAST: usize = 8;
 
 /// Ratios of the SIR to the best possible SIR: list k has those after k agreements with measurements.
@@ -213,7 +213,7 @@ pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     Ok(setup)
 }
 
-/// Returns the quantile of `numbers` at `part`, 0 to 1 (0.5 is the median); NaN if there are none.
+/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1 (0.5 is the median). NaN if there are none.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -226,7 +226,7 @@ pub fn quantile(numbers: &mut [f64], part: f64) -> f64 {
     numbers.get(at).copied().unwrap_or(f64::NAN)
 }
 
-/// Time after the start of a run from which its SIRs count, s.
+/// Time after the start of a run from which its SIRs are averaged, s.
 const BEGUN_S: u32 = 60;
 
 /// Mean ratios of the SIR to the best possible SIR at the same moment, one for each experiment.
@@ -300,7 +300,7 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     }
 }
 
-/// Returns the arithmetic mean of `shares`; NaN if there are none.
+/// Returns the arithmetic mean of `shares`, SIRs as fractions of the best possible ones. NaN if there are none.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

@@ -77,7 +77,7 @@ fn elevation(scenario: &Scenario) -> Elevation {
     Elevation::load(scenario, &[], 1.0).unwrap().unwrap()
 }
 
-/// Returns the largest worst hop of all chains with one candidate for each relay.
+/// Returns the SIR of the best chain over all combinations of one candidate position for each relay.
 fn brute_force(
     search: &mut Search<'_>,
     candidates: &[Vec<Candidate>],

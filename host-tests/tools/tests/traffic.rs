@@ -112,7 +112,7 @@ impl Case {
         }
     }
 
-    /// Returns the planner's data rates toward Rx and toward Tx, bit/s, when both share the time equally.
+    /// Returns the planner's data rates toward Rx and toward Tx, bit/s, if both share the time equally.
     fn both_bps(&self, plan: &Plan) -> [f64; 2] {
         let relays = u16::try_from(plan.places.len()).unwrap();
         let scene = Scene::new(&self.scenario, relays).unwrap();
@@ -121,7 +121,7 @@ impl Case {
         [&plan.sirs, &back].map(|sirs| self.radio.chain_bps(sirs) / 2.0)
     }
 
-    /// Returns the planner's plan for the largest data rate.
+    /// Returns the planner's plan with the largest data rate for this case.
     fn planned(&self) -> Plan {
         let ask = self.request(Number::Of(self.relays));
         match Carried::new(&self.scenario, &ask, &self.radio, self.relays) {
@@ -210,7 +210,7 @@ impl Case {
     }
 }
 
-/// Checks the delivered data rate, and returns it as a fraction of the planner's rate `promised_bps`.
+/// Checks the data rate that a flow has delivered. Returns it as a fraction of the planner's rate `promised_bps`.
 ///
 /// No packet may be unaccounted for, and the rate at the agreed positions is never exceeded. The planner's rate may
 /// be exceeded by the fraction `most`, because the agreed positions differ slightly from the planned ones.

@@ -17,14 +17,14 @@ use crate::time::{Duration, Instant};
 /// Distance to the setpoint, m, below which the moving target for the autopilot counts as arrived.
 const ARRIVED_M: f32 = 0.01;
 
-/// Ratio k of the moving target's speed to its remaining distance, 1/s, near the setpoint.
+/// Ratio k of the moving target's speed to its remaining distance near the setpoint, 1/s.
 const END_PER_S: f32 = 0.5;
 
 /// Minimum speed of the moving target near the setpoint, m/s.
 const END_SPEED_M_S: f32 = 0.2;
 
-/// Gain of an autopilot's position control, 1/s. A drone d metres behind its target flies 1.25 d m/s faster than the
-/// target.
+/// Assumed gain of an autopilot's position control, 1/s. A drone d metres behind its target flies 1.25 d m/s faster
+/// than the target.
 const CATCH_UP_PER_S: f32 = 1.25;
 
 /// Maximum speed of the moving target as a fraction of the speed limit. The rest is a margin, because a drone
@@ -56,12 +56,12 @@ const SETTLED_M: f32 = 0.25;
 /// the drone's lag.
 const BEHIND_MS: u64 = 1_200;
 
-/// Half-life of the moving target's speed near the setpoint, ms. The speed is k times the remaining distance, with k
-/// = 0.5 /s, so it halves in ln 2 / k.
+/// Time in which the speed of the moving target near the setpoint halves, ms. It is ln 2 / k: the speed is k times
+/// the remaining distance, with k = 0.5 /s.
 const HALVES_MS: u64 = 1_387;
 
-/// Maximum number of half-lives that [`Pace::stopping_time`] counts. Eight of them reduce the remaining distance from
-/// 20 m, the longest one at which the speed is proportional to it, to less than [`SETTLED_M`].
+/// Maximum number of half-lives of the speed that [`Pace::stopping_time`] counts. Eight of them reduce a remaining
+/// distance of 20 m to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
 /// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
@@ -82,7 +82,7 @@ pub struct Pace {
 }
 
 impl Default for Pace {
-    /// Creates the default pace: 5 m/s and 1 m/s².
+    /// Returns the default speed limit and acceleration: 5 m/s and 1 m/s².
     fn default() -> Self {
         Self {
             speed_m_s: 5.0,
@@ -92,7 +92,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default pace with the maximum speed `speed_m_s`, m/s: 0.1 to 20, or 0 for the default.
+    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. It is 0.1 to 20, or 0 for the default.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {
@@ -169,7 +169,7 @@ pub(super) struct Carrot {
 }
 
 impl Carrot {
-    /// Creates a standing target at the drone's position.
+    /// Creates a moving target that stands at the drone's position `place`.
     pub(super) const fn at(place: Placement, now: Instant) -> Self {
         Self {
             place,
@@ -302,9 +302,9 @@ fn length(a: [f32; 3]) -> f32 {
     libm::sqrtf(dot(a, a))
 }
 
-/// Interval at which a moving target is sent to the autopilot.
+/// Interval at which the position of a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
-/// Interval at which a standing target is sent again. A PX4 leaves OFFBOARD after a second without a target.
+/// Interval at which a standing target is sent again to a PX4. A PX4 leaves OFFBOARD after a second without a target.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
@@ -323,7 +323,7 @@ const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
 
-/// Number of repetitions of a standing target to an autopilot that never reports its target.
+/// Number of times that a standing target is repeated to an autopilot that never reports its target.
 const UNCONFIRMED: u8 = 10;
 
 /// Target that is sent to the autopilot, with its schedule and the autopilot's confirmation.
@@ -331,7 +331,7 @@ const UNCONFIRMED: u8 = 10;
 pub(super) struct Target {
     pub(super) carrot: Carrot,
     pub(super) due: Instant,
-    /// Number of times that the standing target has been sent.
+    /// Number of times that this target has been sent to the autopilot while it stands still.
     times_sent: u8,
     /// True once the autopilot has reported this target as its own.
     is_accepted: bool,
@@ -339,12 +339,12 @@ pub(super) struct Target {
     since: Instant,
     /// Number of consecutive reports in which the autopilot names another target.
     other_targets: u8,
-    /// True once the autopilot has reported any target.
+    /// True once the autopilot has reported any target position in POSITION_TARGET_GLOBAL_INT.
     is_reported: bool,
 }
 
 impl Target {
-    /// Creates a standing target that has not been sent.
+    /// Creates the state of a target standing at `place` that has not been sent to the autopilot yet.
     pub(super) const fn at(place: Placement, now: Instant) -> Self {
         Self {
             carrot: Carrot::at(place, now),
@@ -443,7 +443,7 @@ mod tests {
     use crate::place::Placement;
     use crate::time::{Duration, Instant};
 
-    /// Returns the positions and speeds of a moving target, every 100 ms, until it stands.
+    /// Simulates a flight. Returns the positions and speeds of the moving target, every 100 ms, until it stands.
     fn fly(from: Placement, to: Placement, pace: Pace) -> Vec<(Placement, f32), 512> {
         let mut carrot = Carrot::at(from, Instant::ZERO);
         let mut way = Vec::new();
@@ -616,8 +616,8 @@ mod tests {
         );
     }
 
-    /// Checks that the moving target's velocity does not jump when a new setpoint is in another direction. The
-    /// velocity in the old direction ends within 3 s.
+    /// Checks that the moving target turns smoothly when a new setpoint is in another direction. The velocity in the
+    /// old direction ends within 3 s.
     #[test]
     fn a_setpoint_elsewhere_turns_it_by_its_acceleration() {
         for (x_m, y_m) in [

@@ -43,7 +43,7 @@ pub(super) struct Clearance {
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without one.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays have landed; `None` once the relay knows.
+    /// Side whose lost relays the operator has reported as landed; `None` once the relay has been told.
     cleared: Option<Side>,
 }
 

@@ -30,7 +30,7 @@ use crate::wire::upload::UPLOAD;
 #[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 
-/// Component number of an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
+/// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
 /// MAVLink system number of this component until the autopilot's is known: the default of autopilots.
@@ -38,7 +38,8 @@ const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Maximum delay in sending a target to a PX4. After a longer one the PX4 may have entered its failsafe.
+/// Maximum time between two targets to a PX4 that counts as on time. After a longer one the PX4 may have entered its
+/// failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Time for which positions must be received regularly before [`State::Blind`] (position lost) ends.
@@ -51,12 +52,13 @@ const SHORT_TIME: Duration = Duration::from_millis(60_000);
 /// Maximum time from an ArduCopter's mode change to its report of the fence breach that caused it.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason not to control the drone must last before the operator is told.
+/// Time for which a reason not to control the drone must last before it is reported to the operator.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports of reasons not to control the drone.
+/// Minimum time between two reports to the operator of reasons not to control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard (collision avoidance) must hold the drone back before this is reported.
+/// Time for which the guard must hold the drone back before the operator is told the reason. The guard is the
+/// collision avoidance.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
 /// Link to one autopilot over MAVLink: control state, targets, and reports for the operator.
@@ -70,8 +72,8 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Positions of Tx and Rx with which the link was created. Stored only if a mission uploaded in flight can
-    /// replace them.
+    /// Tx and Rx positions with which the link was created. The array is empty unless a mission uploaded in flight
+    /// can replace them.
     loaded: [Sites; UPLOAD as usize],
     pace: Pace,
     clock: MonotonicClock,
@@ -88,7 +90,7 @@ pub struct Autopilot {
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
-    /// Time at which the drone's position was last lost.
+    /// Time at which the autopilot last stopped reporting the drone's position.
     blind_at: Option<Instant>,
     /// Time since which positions are received again in the state [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
@@ -96,12 +98,12 @@ pub struct Autopilot {
     recovery: Duration,
     /// Release of control that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason for which the relay cannot control the drone (`None`: it can), and the start of that state.
+    /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if he can.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason for which the relay cannot control the drone, and the time of the report. An inner `None`
-    /// is the report that it can.
+    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` before
+    /// any. An inner `None` reports that he can.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
-    /// True while the relay is ready to control the drone, once the pilot chooses OFFBOARD or GUIDED.
+    /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
     /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
     /// because of the upstream neighbour, the second because of the downstream one.
@@ -109,7 +111,7 @@ pub struct Autopilot {
     /// Newest reasons why the guard (collision avoidance) holds the drone back, and since when. The first is because
     /// of the upstream neighbour, the second because of the downstream one.
     newest_hold: ([Option<HoldReason>; 2], Instant),
-    /// True from the acceptance of a new view (set of relays) until the relays have agreed on positions.
+    /// True from the acceptance of a new view (set of relays) until its relays have agreed on positions.
     is_new_view: bool,
     report: Report,
     position: Option<Position>,
@@ -395,14 +397,14 @@ impl Autopilot {
         }
     }
 
-    /// Handles the timers due at `now`. Constant work.
+    /// Handles the timers of the autopilot link that are due at `now`. The work per call is constant.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.streams.handle_timeout(now);
         self.review(now);
     }
 
-    /// Updates the control state from the observations of the autopilot at `now`.
+    /// Updates the control state from the latest messages of the autopilot at `now`.
     fn review(&mut self, now: Instant) {
         self.vehicle.review_choice(now);
         let before = self.state;
@@ -452,7 +454,7 @@ impl Autopilot {
         self.report.queue_line(Line::info(Topic::Control, line));
     }
 
-    /// Reports a pending release of control once its cause is known.
+    /// Reports a pending release (end of the relay's control of the drone) once its cause is known.
     fn review_release(&mut self, now: Instant) {
         let Some((mut release, until)) = self.release else {
             return;
@@ -487,7 +489,7 @@ impl Autopilot {
             .is_some_and(|at| now.since(at) >= self.recovery);
     }
 
-    /// Returns the cause of the present release of control, and the autopilot's mode.
+    /// Returns the cause of the relay's latest loss of control, and the autopilot's mode.
     fn release(&self) -> Release {
         let vehicle = &self.vehicle;
         let mode = vehicle.mode().unwrap_or(FlightMode::Other);
@@ -553,7 +555,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time to report the present reason not to control the drone; `None` if it is reported.
+    /// Returns the time at which the present reason not to control the drone must be reported. `None` once it has
+    /// been.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -583,7 +586,7 @@ impl Autopilot {
         Some(self.trust.sign(now, frame))
     }
 
-    /// Returns the next frame without its signature.
+    /// Returns the next frame to the autopilot without a signature; `None` if none is pending.
     fn next_frame(&mut self, now: Instant) -> Option<FrameBytes> {
         if let Some((to, result)) = self.clearance.take_answer() {
             let command = CLEAR_LOST;

@@ -19,7 +19,7 @@ use crate::time::{Duration, Instant};
 /// Minimum time between two equal lines of text to the operator.
 const SPACING: Duration = Duration::from_millis(10_000);
 
-/// Maximum number of different lines of text sent within [`SPACING`].
+/// Maximum number of different lines of text to the operator that are sent within [`SPACING`].
 const RECENT: usize = 16;
 
 /// Maximum number of queued text lines to the operator that this link itself has written.
@@ -35,7 +35,7 @@ const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 /// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Control of the drone: the relay takes or loses it.
+    /// Event about the control of the drone: the relay takes or loses it.
     Control,
     /// Reason for which the pilot cannot give the relay control of the drone.
     Wait,
@@ -43,7 +43,7 @@ pub(super) enum Topic {
     Upstream,
     /// Reason why the guard (collision avoidance) holds the drone back because of its downstream neighbour.
     Downstream,
-    /// Event of the relay, such as a lost neighbour.
+    /// Event of the relay itself that the operator is to see, such as a lost neighbour.
     Relay,
     /// Breach of the autopilot's own fence.
     Fence,
@@ -130,7 +130,7 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
-/// Queue of texts and numbers for the operator.
+/// Queue of the texts and named values that the link is to send to the operator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
@@ -141,7 +141,7 @@ pub(super) struct Report {
     /// Last line sent on each topic. An equal line that would have to wait is dropped.
     newest_sent: [Option<Line>; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
-    /// Number of values (SIR and position) already sent in the present second.
+    /// Number of values (SIR and position) sent to the operator in the present second.
     sent: usize,
     next_values_at: Option<Instant>,
 }
@@ -160,7 +160,7 @@ impl Report {
         let _ = self.lines.push(line);
     }
 
-    /// Queues a line of the firmware; returns true if it was queued or is already waiting.
+    /// Queues a text line of the firmware for the operator. Returns true if it was queued or is already waiting.
     pub(super) fn queue_text(&mut self, text: &str) -> bool {
         let mut line = String::new();
         for character in text.chars() {
@@ -288,11 +288,11 @@ pub(super) type RelayNumbers = [u16; MOST];
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum AutopilotEvent {
-    /// First message of an autopilot.
+    /// The first message of an autopilot of this kind has arrived.
     Found(Kind),
-    /// Restart of the autopilot.
+    /// The autopilot has restarted.
     Restarted,
-    /// Change of the control state to this one: see [`State`].
+    /// The control state has changed to this one: see [`State`].
     State(State),
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
@@ -300,7 +300,7 @@ pub enum AutopilotEvent {
     /// Reason for which the pilot cannot give the relay control of the drone, by OFFBOARD or GUIDED. Or the reason
     /// for which the relay does not use the mode that the pilot has chosen.
     Waits(WaitReason),
-    /// Readiness: the pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
+    /// The pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,
     /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
     ///
@@ -317,9 +317,9 @@ pub enum AutopilotEvent {
     LostCleared {
         /// Side of this relay whose lost relays have landed.
         side: Side,
-        /// Numbers of the relays, padded with zeros.
+        /// Node numbers of the relays that have landed, padded with zeros.
         relays: [u16; MOST],
-        /// Sender of the command.
+        /// MAVLink address of the sender of the command.
         from: Address,
     },
     /// Denied command of the operator, which reports lost relays as landed. It does not name exactly the lost relays
@@ -327,7 +327,7 @@ pub enum AutopilotEvent {
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: [u16; MOST],
-        /// Sender of the command.
+        /// MAVLink address of the sender of the command.
         from: Address,
     },
     /// Mismatch of the signatures of autopilot and link.

@@ -27,11 +27,11 @@ pub enum State {
     Silent,
     /// The drone is on the ground, or not armed.
     Grounded,
-    /// Drone in the air that is not controlled by the relay.
+    /// The drone is in the air, and the relay does not control it.
     Standby,
-    /// Controlled by the relay: the drone flies to the relay's setpoint.
+    /// The relay controls the drone, which flies to the relay's setpoint.
     Engaged,
-    /// Controlled by the relay, but the drone's position is unknown: the autopilot keeps the last target.
+    /// The relay controls the drone, but its position is unknown: the autopilot keeps the last target.
     Blind,
 }
 
@@ -84,7 +84,7 @@ impl State {
 /// Values of `MAV_TYPE` for vehicles that hover under ArduCopter. With other vehicles the same mode numbers have other meanings.
 const COPTERS: [u8; 9] = [2, 3, 4, 13, 14, 15, 29, 35, 43];
 
-/// Kind of autopilot.
+/// Kind of autopilot firmware: PX4 or ArduPilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// PX4: the mode OFFBOARD grants control, for as long as targets are streamed.
@@ -167,9 +167,9 @@ pub enum ReleaseCause {
 /// Release of the drone's control: its cause, and the present mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Release {
-    /// Cause of the release.
+    /// Event or decision because of which the relay has lost control of the drone.
     pub cause: ReleaseCause,
-    /// Present mode of the autopilot.
+    /// Flight mode of the autopilot at the time when the relay lost control of the drone.
     pub mode: FlightMode,
 }
 
@@ -202,7 +202,7 @@ impl Release {
 pub enum WaitReason {
     /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
     Failsafe,
-    /// Messages from the autopilot arrive late.
+    /// The link from the autopilot is late: its messages are old on arrival.
     Link,
     /// OFFBOARD or GUIDED was chosen before this link started. Another mode has to be chosen first.
     Found,
@@ -215,7 +215,7 @@ pub enum WaitReason {
 }
 
 impl WaitReason {
-    /// Returns the text about this reason for the operator.
+    /// Returns the text that tells the operator this reason for losing control of the drone.
     pub(super) const fn text(self) -> &'static str {
         match self {
             Self::Failsafe => "relay: waits, autopilot in failsafe",

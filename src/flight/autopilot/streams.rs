@@ -8,8 +8,7 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time for which messages are counted before their rates are checked. Messages that come too rarely are requested
-/// again.
+/// Time window in which the autopilot's messages are counted. Messages that come too rarely are then requested again.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.
@@ -59,7 +58,7 @@ const REQUESTED: [RequestedMessage; 4] = [
     },
 ];
 
-/// State of the request for one message of the autopilot.
+/// State of the periodic request for one kind of message from the autopilot.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     is_requested: bool,
@@ -97,7 +96,7 @@ impl Streams {
         }
     }
 
-    /// Counts a received message with the number `id`.
+    /// Counts a message received from the autopilot, if its MAVLink id `id` is one of the requested ones.
     pub(super) fn count_message(&mut self, id: u32) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             if asked.id == id {
@@ -152,7 +151,7 @@ impl Streams {
         self.since = now;
     }
 
-    /// Requests the autopilot's report of its target again, once the relay controls the drone.
+    /// Restarts the requests for the autopilot's report of its target, once the relay controls the drone.
     ///
     /// An ArduCopter sends that report only in GUIDED, so that earlier requests may have been given up.
     pub(super) fn renew(&mut self) {

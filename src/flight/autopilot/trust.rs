@@ -58,8 +58,8 @@ pub(super) struct Trust {
     #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
-    /// Kind of signature mismatch in the latest heartbeats, and the number of heartbeats in a row with it. `None` if
-    /// the last heartbeat had no mismatch.
+    /// Signature mismatch of the latest heartbeats, and the number of heartbeats in a row with it. `None` if the last
+    /// heartbeat had no mismatch.
     row: Option<(Mistrust, u8)>,
     /// Kinds of signature mismatch that have to be reported, as bits.
     due: u8,
@@ -80,7 +80,7 @@ impl Trust {
         }
     }
 
-    /// Returns true if the frame is accepted: its signature is valid, or it may be unsigned.
+    /// Returns true if the frame is accepted: its signature is valid, or it needs none.
     fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {

@@ -46,28 +46,28 @@ const CRITICAL: u8 = 5;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Position {
-    /// Time of the measurement, on the relay's clock.
+    /// Time of the autopilot's position measurement, on the relay's clock.
     pub at: Instant,
-    /// Position in the mission's coordinates.
+    /// Position of the drone in the mission's coordinates.
     pub place: Placement,
-    /// Velocity toward north, east and down, m/s.
+    /// Velocity of the drone toward north, east and down, m/s.
     pub velocity_m_s: [f32; 3],
 }
 
 /// Kind of news that a received MAVLink message has for the link.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum VehicleUpdate {
-    /// Message of another sender, or without new information.
+    /// The message is of another sender, or has no new information.
     Nothing,
-    /// First message of an autopilot on this link.
+    /// The message is the first one of an autopilot on this link.
     Found,
-    /// Message that shows a restart of the autopilot.
+    /// The message shows that the autopilot has restarted.
     Restarted,
-    /// New information that may change the control state.
+    /// The message has new information that may change the control state.
     StateChanged,
-    /// New position of the drone, in the mission's coordinates.
+    /// The message has a new position of the drone, in the mission's coordinates.
     Position(Position),
-    /// New position of the drone that is too far from the line for the mission's coordinates.
+    /// The message has a position of the drone too far from the line Tx-Rx for the mission's coordinates.
     OffLine(Geodetic),
     /// Target that the autopilot reports: latitude and longitude, 1e-7 degrees.
     Target(i32, i32),
@@ -84,14 +84,14 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// Time of the autopilot's last message of any kind.
+    /// Time at which the last message of any kind was received from the autopilot.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the autopilot's mode is OFFBOARD or GUIDED, in which the relay sets the target.
     granted: bool,
-    /// Value of `MAV_STATE` in the last heartbeat.
+    /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
-    /// True if OFFBOARD or GUIDED, once entered, counts as chosen by the pilot ([`Self::review_choice`]).
+    /// True if OFFBOARD or GUIDED, now or once entered, counts as the pilot's choice. See [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -303,7 +303,7 @@ impl Vehicle {
         self.position = None;
     }
 
-    /// Converts the stored position to the coordinates of another line by `moved`. Drops the position if that returns
+    /// Converts the stored position to another line from Tx to Rx by `moved`. Drops the position if that returns
     /// `None`.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
@@ -398,7 +398,8 @@ const SHIFT: u32 = 20;
 /// Tag in the TIMESYNC requests of a link whose seed was not set.
 const TAG: u32 = 0xA_52A5;
 
-/// Measurement of the link's delay by echoes (TIMESYNC). It gives an upper bound of the age of received messages.
+/// Measurement of the delay of the link to the autopilot by echoes (TIMESYNC). It gives an upper bound of the age of
+/// received messages.
 ///
 /// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's
 /// clock may lose time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes
@@ -415,7 +416,7 @@ pub(super) struct Echo {
     /// Tag in the low bits of every request, by which this link recognises the replies to its own requests.
     tag: u32,
     due: Option<Instant>,
-    /// Time of the first TIMESYNC request.
+    /// Time of the first TIMESYNC request to the autopilot; `None` before it.
     begun_at: Option<Instant>,
     /// Time at which the newest TIMESYNC request with a reply was sent.
     answered_at: Option<Instant>,
@@ -491,11 +492,11 @@ impl Echo {
 /// Minimum backward step of the autopilot's clock that shows a restart, µs.
 const RESTARTED_US: i64 = 2_000_000;
 
-/// Half of the window in which the minimum delay of messages is taken. The two halves are replaced in turn, so that
-/// the minimum covers the last 4 to 8 s.
+/// Half of the time window over which the minimum delay of messages is taken. The halves are replaced in turn, so
+/// that the minimum covers the last 4 to 8 s.
 const HALF: Duration = Duration::from_millis(4_000);
 
-/// Minimum number of messages in each half of the window in which the minimum delay is taken.
+/// Minimum number of messages in each half of the time window over which the minimum delay is taken.
 ///
 /// If the link pauses, a half may contain only the late messages that arrive after the pause. Their delay would then
 /// count as normal.
@@ -644,7 +645,7 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone's position is near the line Tx to Rx, so that it is not reported as far off.
+    /// Records that the drone is near the line Tx-Rx again, which permits a new report on the ground.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;

@@ -42,14 +42,14 @@ static CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MCRF4XX);
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Address {
-    /// System id of MAVLink, 1 to 255.
+    /// MAVLink system id of the sender or addressee, 1 to 255.
     pub system: u8,
     /// Component id of MAVLink: 1 is the autopilot, 191 an onboard computer.
     pub component: u8,
 }
 
-/// Returns the checksum of a frame with the `covered` bytes between start byte and checksum. `known` has the CRC seed
-/// of the message.
+/// Returns the checksum of a frame from the bytes `covered`, those after the start byte. `known` has the CRC seed of
+/// the message.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -61,11 +61,11 @@ pub fn checksum(covered: &[u8], known: Known) -> u16 {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
-    /// Message id of MAVLink, 24 bits.
+    /// Id of the kind of MAVLink message, 24 bits.
     pub id: u32,
     /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
     pub crc_extra: u8,
-    /// Length of the message's fields, without extensions of later dialects, bytes.
+    /// Length of the message's original fields, bytes, without extensions that later dialects may add.
     pub length: u8,
 }
 
@@ -104,7 +104,7 @@ pub mod id {
 const ADDED: u8 = 24;
 
 impl Known {
-    /// Maximum payload length of this message with extensions, bytes.
+    /// Maximum payload length of this message, bytes, with extensions that later dialects may add.
     pub const fn longest(self) -> u8 {
         self.length.saturating_add(ADDED)
     }

@@ -111,9 +111,9 @@ pub enum Incoming {
     CommandLong {
         /// Value of `MAV_CMD`, the number of the command.
         command: u16,
-        /// Parameters of the command.
+        /// Seven parameters of the command, whose meaning depends on `command`.
         parameters: [f32; 7],
-        /// System and component of the addressee.
+        /// MAVLink address of the addressee.
         to: Address,
         /// True if the sender repeats a command because it has received no answer.
         is_repeated: bool,
@@ -228,7 +228,7 @@ pub fn noise_w(noise: u8) -> Option<f32> {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Received {
-    /// Address of the sender.
+    /// MAVLink address of the sender.
     pub from: Address,
     /// Decoded message; `None` for a kind of message that this crate does not read.
     pub message: Option<Incoming>,
@@ -242,7 +242,7 @@ pub struct Received {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters {
-    /// Number of valid frames.
+    /// Number of valid MAVLink frames received.
     pub frames: u32,
     /// Number of frames of known messages with a wrong checksum or unknown incompatibility flags. Most are corrupted
     /// frames; other bytes can also look like a frame.
@@ -258,17 +258,17 @@ pub struct Parser {
 }
 
 enum First {
-    /// The first bytes are the start of an incomplete frame.
+    /// The received bytes are the start of an incomplete frame.
     Part,
-    /// The first bytes are no frame: the header is unknown or invalid.
+    /// The received bytes do not start a frame: the header is unknown or invalid.
     None,
-    /// The first bytes are a corrupted frame.
+    /// The received bytes start with a corrupted frame.
     Broken,
     Frame(Received, usize),
 }
 
 impl Parser {
-    /// Creates a parser without received bytes.
+    /// Creates a MAVLink parser that has not received any bytes.
     pub const fn new() -> Self {
         Self {
             bytes: Vec::new(),

@@ -36,7 +36,7 @@ pub enum Outgoing<'a> {
     Heartbeat,
     /// COMMAND_LONG 511, SET_MESSAGE_INTERVAL: requests that a message is sent at an interval.
     SetMessageInterval {
-        /// Id of the requested message.
+        /// MAVLink id of the requested message.
         id: u32,
         /// Interval requested between two of these messages, µs.
         interval_us: u32,
@@ -47,14 +47,14 @@ pub enum Outgoing<'a> {
         command: u16,
         /// Value of `MAV_RESULT`, the answer.
         result: u8,
-        /// Sender of the command, to which the reply goes.
+        /// MAVLink address of the sender of the command, to which this reply goes.
         to: Address,
     },
     /// SET_POSITION_TARGET_GLOBAL_INT: target to fly to, above mean sea level (frame 5).
     SetPosition {
         /// Time since the companion's start, ms.
         boot_ms: u32,
-        /// Target position.
+        /// Target position of the drone.
         at: Geodetic,
         /// Target velocity toward north, east and down, m/s; without it the autopilot stops at the target.
         velocity_m_s: Option<[f32; 3]>,
@@ -84,8 +84,8 @@ pub enum Outgoing<'a> {
     },
 }
 
-/// Bits of `type_mask` in a target, which mark values that the autopilot is to ignore. Position (bits 0 to 2),
-/// velocity (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
+/// Bits of `type_mask` in a target message: values that the autopilot must ignore. Position (bits 0 to 2), velocity
+/// (3 to 5), acceleration (6 to 8), yaw (10), yaw rate (11).
 mod mask {
     pub(super) const VELOCITY: u16 = 0b11_1000;
     pub(super) const ACCELERATION: u16 = 0b1_1100_0000;

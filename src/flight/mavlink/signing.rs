@@ -58,7 +58,7 @@ struct Sender {
 pub struct Stamp(u64);
 
 impl Stamp {
-    /// Timestamp to start with on a board that does not know the time.
+    /// Time stamp for signatures on a board that does not know the time.
     pub const UNKNOWN: Self = Self(0);
 
     /// Converts a Unix time, µs since 1970-01-01.
@@ -68,11 +68,11 @@ impl Stamp {
     }
 }
 
-/// Reason why a frame's signature is rejected.
+/// Reason why the signature of a received MAVLink frame is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Flaw {
-    /// The frame has no signature.
+    /// The received MAVLink frame has no signature.
     Unsigned,
     /// The signature is of another key, or the frame was altered.
     Key,
@@ -88,7 +88,7 @@ pub struct Signing {
     /// Timestamp of this link at the time `at`, in units of 10 µs.
     stamp: u64,
     at: Instant,
-    /// Timestamp of the last sent frame.
+    /// Timestamp in the signature of the last sent MAVLink frame.
     sent: u64,
     senders: [Sender; SENDERS],
 }
@@ -121,8 +121,7 @@ impl Signing {
         }
     }
 
-    /// Advances the timestamp for signatures to `now`, by at most about an hour per call. An exact step would need a
-    /// 64-bit division, which takes a kilobyte of flash.
+    /// Advances the time stamp for signatures to `now`, by at most about an hour per call.
     fn advance(&mut self, now: Instant) {
         let passed = u32::try_from(now.since(self.at).as_micros()).unwrap_or(u32::MAX);
         let units = passed / UNIT_US;

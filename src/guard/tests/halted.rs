@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Tells the guard that its relay is reported at `place`, long after the guard's last setpoint.
+    /// Test helper: reports the relay to its guard at `place`, long after the guard's last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);

@@ -48,7 +48,7 @@ fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     }
 }
 
-/// Guard under test, with the time of the test.
+/// Guard of one relay under test, with the time of the test.
 struct One {
     guard: Guard,
     now: Instant,
@@ -66,7 +66,7 @@ impl One {
         one
     }
 
-    /// Tells the guard that its relay is reported at `x_m`, long after the guard's last setpoint.
+    /// Test helper: reports the relay to its guard at `x_m`, long after the guard's last setpoint.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));
@@ -166,7 +166,7 @@ fn a_relay_between_two_fences_keeps_its_promise() {
     );
 }
 
-/// Checks rule 9: a relay keeps clear of a lost neighbour.
+/// Checks rule 9: a relay keeps the separation from the last position of a lost neighbour.
 #[test]
 fn a_lost_relay_is_kept_clear_of() {
     let mut one = One::new([None, Some(2)], 100.0, 400.0);
@@ -272,7 +272,7 @@ fn a_relay_that_turns_stays_within_its_earlier_setpoints() {
     assert_eq!(after(21_000, &[], 95.0), (95.0, 95.0));
 }
 
-/// Setpoints of two neighbouring relays along x, m: relay 1, relay 2. The tests compare them exactly.
+/// x of the setpoints of two neighbouring relays, m: relay 1 and relay 2. The tests compare them exactly.
 #[derive(PartialEq, Debug)]
 struct Both(f32, f32);
 
@@ -333,7 +333,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
     assert_eq!(pair.setpoints(), Both(50.0, 400.0));
 }
 
-/// Checks rules 3, 4 and 6: toward Rx, relay 1 advances only as far as relay 2 has moved ahead.
+/// Checks rules 3, 4 and 6 for moves toward Rx. Relay 1 advances only as far as relay 2 has moved ahead.
 #[test]
 fn the_owner_follows_the_follower() {
     let mut pair = Pair::new([100.0, 200.0], [120.0, 300.0]);
@@ -357,7 +357,7 @@ fn the_owner_follows_the_follower() {
     );
 }
 
-/// Checks rules 1 and 5: toward Tx relay 1 moves first, then the fence (limit of x), and then relay 2.
+/// Checks rules 1 and 5 for moves toward Tx. Relay 1 moves first, then the fence (limit of x), and then relay 2.
 #[test]
 fn the_follower_follows_the_owner() {
     let mut pair = Pair::new([200.0, 100.0], [300.0, 120.0]);
@@ -424,7 +424,7 @@ fn an_old_report_frees_nothing() {
     assert_eq!(pair.setpoints(), Both(100.0, 120.0));
 }
 
-/// Checks rule 7: two relays that start too close to each other first move apart along x.
+/// Checks rule 7: two relays that start closer than the separation first move apart along x.
 #[test]
 fn a_start_too_close_is_opened_before_anything_else() {
     let mut pair = Pair::new([100.0, 500.0], [104.0, 600.0]);

@@ -10,7 +10,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::Instant;
 
-/// Three relays in a row, 100 m apart, of which the tests give the middle one to its pilot.
+/// Three relays in a row, 100 m apart. The tests put the middle one under its pilot's manual control.
 struct Row {
     all: [One; 3],
 }
@@ -284,8 +284,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// Checks that a leave notice is repeated until the neighbour has started a new association (session). That holds
-/// even if the pilot has given the drone back.
+/// Checks that the notice of a relay that leaves its association (session) is repeated. This ends when the neighbour
+/// has started a new one. That holds even if the pilot has given the drone back.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();

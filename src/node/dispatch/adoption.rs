@@ -12,7 +12,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::upload::UPLOAD;
 
 impl Node {
-    /// Handles the decision on a view proposal: on acceptance, starts the new view with its mission.
+    /// Handles the decision on a view proposal. If it is accepted, starts the new view (membership) with its mission.
     pub(super) fn adopt_view(&mut self, now: Instant, decided: ProposalOutcome) {
         let Some(proposed) = self.layers.view.proposed() else {
             return;
@@ -82,7 +82,7 @@ impl Node {
         self.raise(Event::Adopted);
     }
 
-    /// Replaces the active mission by `mission`, the stored one. `now` is `None` after a start.
+    /// Replaces the active mission by the stored `mission` with the identifier `id`. `now` is `None` after a start.
     ///
     /// If the new mission has other positions of Tx and Rx, all relay positions become invalid: there is no setpoint
     /// until the next agreement, and the guard starts again.

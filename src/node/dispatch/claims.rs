@@ -102,8 +102,8 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the new claim number if the authentication sessions must be restarted; else `None`. New nonces then
-    /// count up from this number.
+    /// Returns the relay's new claim number if all authentication sessions must be restarted; else `None`. The new
+    /// sessions count their nonces from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -144,8 +144,8 @@ impl Node {
         }
     }
 
-    /// Makes this relay active again, as after a restart. It leaves its view, because the other node with its number
-    /// may have changed that view meanwhile.
+    /// Makes this passive relay active again, as after a restart. It leaves its view, because the other node with its
+    /// number may have changed that view meanwhile.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

@@ -11,7 +11,7 @@ use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 use crate::wire::upload::UPLOAD;
 
-/// Mission fields of a hello: the newest mission, and flags that tell if it is active or refused.
+/// Mission fields of a hello: the newest stored mission, and flags for active and refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -20,7 +20,7 @@ struct MissionState {
 }
 
 impl Node {
-    /// Schedules a hello to node `to` at `side`; `ask` requests one in return.
+    /// Schedules a hello to node `to` at `side`; if `ask` is true it requests a hello in return.
     #[inline(never)] // called from many places
     pub(super) fn schedule_hello(&mut self, side: Side, to: u16, ask: bool) {
         let distance = to.abs_diff(self.member.node);
@@ -131,8 +131,8 @@ impl Node {
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay, including this one. `far` is the
-    /// side of this relay that is away from that neighbour.
+    /// Returns the number of relays that a neighbour reaches through this relay. They are this one and those at
+    /// `far`, its other side.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
@@ -143,8 +143,7 @@ impl Node {
         }
     }
 
-    /// Returns the number of relays that are connected to this relay on `side`. It is known from the last view
-    /// proposal.
+    /// Returns the number of relays connected to this relay on `side`, by the last view proposal.
     pub(super) fn relays_on(&self, side: Side) -> u16 {
         if self.layers.neighbours.at(side).has_no_peer() {
             return 0;
@@ -223,8 +222,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records that node `from` receives this relay if `heard` is true, else that it does not. Reports the node to
-    /// the firmware if it repeatedly does not.
+    /// Records if node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly does
+    /// not.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -291,8 +290,8 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). If it has done so only
-    /// now, outstanding messages are sent again, because it can answer them now.
+    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). Retransmits unanswered
+    /// messages if that is new, because the neighbour can answer now.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

@@ -59,7 +59,7 @@ mod timers;
 #[cfg(test)]
 mod tests;
 
-/// Claim to a node number that must be sent back to its sender: side, destination node, and claim.
+/// Claim to a node number, to be sent back to its sender as an echo: side, destination node, and claim.
 pub(crate) type Echo = (Side, u16, Claim);
 
 #[derive(Clone, Debug)]
@@ -70,11 +70,11 @@ pub(crate) struct Node {
     pub(crate) reporting: Reporting,
     pub(super) duplicate: IndexClaims,
     pub(super) no_quorum_timer: NoQuorumTimer,
-    /// Received claim to a node number that must be sent back to its sender; `None` if there is none.
+    /// Received claim to a node number that must be sent back to its sender as an echo. `None` if there is none.
     pub(super) echo: Option<Echo>,
     /// Side to which this relay sends the next claim to its node number.
     pub(super) claim_side: Side,
-    /// Votes on views (acceptor state) that the firmware has confirmed as stored.
+    /// Votes on views (chain memberships) that the firmware has confirmed as stored.
     persisted: ViewRecord,
     pub(super) telemetry: Telemetry,
 }
@@ -154,7 +154,7 @@ impl Node {
         self.telemetry.events.raise_node_event(kind, side, node);
     }
 
-    /// Applies the effects of one protocol layer to the other layers, the events and the counters.
+    /// Applies the effects of one protocol layer's step to the other layers, the events and the counters.
     pub(super) fn apply(&mut self, now: Instant, effects: Effects) {
         let stats = &mut self.telemetry.stats;
         for (happened, counter) in [
@@ -237,12 +237,13 @@ impl Node {
         self.telemetry.events.take()
     }
 
-    /// Returns the expiry of the lease; `None` without one.
+    /// Returns the time at which this relay's lease expires; `None` if it has no lease.
     pub(crate) const fn lease(&self) -> Option<Instant> {
         self.layers.lease.until()
     }
 
-    /// Returns the shares of this relay's slots; `None` without a valid agreement, and with equal slots.
+    /// Returns the begin and end of this relay's time slots, as fractions of the frame. `None` without a valid
+    /// agreement, and for equal slots.
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         let void = self.layers.lease.has_lapsed() || self.layers.view.has_no_quorum();
         self.layers.round.slot_shares().filter(|_| !void)
@@ -284,7 +285,7 @@ impl Node {
         &mut self.telemetry.stats
     }
 
-    /// Returns the current votes on views (acceptor state) if they are not stored yet; else `None`.
+    /// Returns the current votes on views (acceptor state) if the firmware has not stored them yet. Else `None`.
     pub(crate) fn unpersisted(&self) -> Option<ViewRecord> {
         let record = self.view_record();
         (record != self.persisted).then_some(record)
@@ -294,7 +295,7 @@ impl Node {
         self.layers.view.record(self.member.digest)
     }
 
-    /// Records that the firmware has stored `record`.
+    /// Records that the firmware has stored `record`, the votes on views.
     pub(crate) const fn persisted(&mut self, record: &ViewRecord) {
         self.persisted = *record;
     }
@@ -361,42 +362,41 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` is too early, so that it would leave out relays. Relays that are
-    /// about to be linked would be missing. This is assumed for a short time after the sender was selected as
-    /// neighbour, if the proposal has visited fewer relays than the last one.
+    /// Returns true if a view proposal from `side` is early, and would leave out relays about to be linked. Assumed
+    /// for a short time after the sender became the neighbour, if the proposal has visited fewer relays than the last
+    /// one.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
-    /// Schedules retransmissions of all messages whose reply is outstanding. Called when the next relay can be
-    /// reached again.
+    /// Schedules retransmissions of all messages that await a reply. Called when the next relay can be reached again.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();
     }
 }
 
-/// Events and counters for the firmware.
+/// Events and counters of a relay, which the firmware reads.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True if the expiry of the lease was reported to the firmware since the last accepted view. It is reported once
-    /// per view.
+    /// True if the end of the lease was reported to the firmware since the last accepted view. It is reported once
+    /// per view (membership of the chain).
     pub(super) lapse_reported: bool,
     /// True if a missing quorum was reported to the firmware since the last accepted view. It is reported once per
-    /// view.
+    /// view (membership of the chain).
     pub(super) no_quorum_reported: bool,
 }
 
-/// Wait before relays without a quorum drop their links for the first time, in units of `dead_after`.
+/// Time without a quorum after which relays drop their neighbour links first, in units of `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
-/// Wait before relays without a quorum drop their links again, in units of `dead_after`.
+/// Time without a quorum after which relays drop their links again, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
-/// Timer after which relays without a quorum drop their links and search for neighbours again.
+/// Timer after which relays without a quorum drop the links to their neighbours and search for others.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct NoQuorumTimer {
     /// Expiry of the timer; `None` while there is a quorum.
@@ -425,7 +425,7 @@ impl Node {
         }
     }
 
-    /// Returns the time for which links to neighbours are kept without a quorum.
+    /// Returns how long links to neighbours are kept while there is no quorum.
     fn link_retention(&self) -> Duration {
         let settings = &self.member.settings;
         let times = if self.no_quorum_timer.has_expired {
@@ -437,7 +437,7 @@ impl Node {
         settings.dead_after.times(times).max(pass)
     }
 
-    /// Drops the links to both neighbours if there has been no quorum for too long (timer expired).
+    /// Drops the links to both neighbours if the no-quorum timer has expired.
     pub(super) fn drop_links_if_expired(&mut self, now: Instant) {
         if self.no_quorum_timer.at.is_none_or(|at| now < at) {
             return;

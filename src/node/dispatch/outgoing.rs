@@ -46,8 +46,8 @@ impl Node {
         Some((side, to, Message::Fence { line_digest, fence }))
     }
 
-    /// Returns the next message of a view change, a lease renewal or an agreement on positions. It comes with its
-    /// side and its destination. `None` if no such message is pending.
+    /// Returns the next pending message of a view change, a lease renewal or an agreement on positions. It comes with
+    /// its side and its destination node. `None` if no such message is pending.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {

@@ -9,7 +9,8 @@ use crate::time::{Duration, Instant};
 use crate::wire::message::Message;
 
 impl Node {
-    /// Handles a Watch or a Report of node `from` at `side`, a neighbour or not.
+    /// Handles a telemetry message of node `from` at `side`: a Watch (request for reports) or a Report. The node need
+    /// not be a neighbour.
     pub(super) fn on_telemetry(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
         if !cfg!(feature = "auth") {
             return; // Ground stations sign all frames.
@@ -21,17 +22,19 @@ impl Node {
         }
     }
 
-    /// Records a frame of node `from` on the shared channel, to whichever node.
+    /// Records that a frame of node `from` was received on the shared channel, whatever its destination.
     pub(crate) fn on_channel(&mut self, now: Instant, from: u16) {
         self.reporting.handle_frame(now, from);
     }
 
-    /// Returns the next node to which a handshake is due because it has not reported.
+    /// Returns the next node to which a handshake is due because no report of it has arrived. `None` if there is
+    /// none.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         self.reporting.poll_greeting()
     }
 
-    /// Returns the next Watch or Report, with its side and its destination.
+    /// Returns the next telemetry message (Watch or Report) with its side and its destination. `None` if none is
+    /// pending.
     pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let wait = self.telemetry_waits();
         if !self.reporting.is_due(now, wait) {
@@ -46,7 +49,7 @@ impl Node {
         self.reporting.poll(now, member, neighbours, wait, own)
     }
 
-    /// Returns the time by which reports wait for an agreement that needs the shared channel.
+    /// Returns the time for which telemetry reports wait. An agreement can use the shared channel first.
     pub(super) fn telemetry_waits(&self) -> Duration {
         let is_idle = matches!(
             self.phase(),

@@ -36,7 +36,7 @@ pub(super) fn upload_to(base: &Mission, version: u16) -> Upload {
     Upload::new(base, version, config).unwrap()
 }
 
-/// Returns relay 2 of a chain of 3; with an authentication key if `signs`.
+/// Test helper: returns relay 2 of a chain of 3, which signs its frames if `signs` is true.
 pub(super) fn relay(signs: bool) -> Node {
     relay_of(base(), 2, signs)
 }
@@ -371,7 +371,7 @@ fn a_stored_upload_does_not_contain_the_offer_number() {
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
 }
 
-/// Returns a hello of node 1. `hears` is the bit set of the nodes that it receives.
+/// Returns a hello of node 1. `hears` is the bit mask of the nodes that it has received.
 fn hello_of(node: &Node, hears: u8) -> Message {
     let Message::Hello(hello) = hello(node, node.layers.update.latest()) else {
         unreachable!();
@@ -439,7 +439,8 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
     }
 }
 
-/// Checks that a spare requests no view, whatever else happens to it, until it is called or stays.
+/// Checks that a spare relay requests no view, whatever else happens, until it is called in. A spare waits outside of
+/// the chain.
 #[test]
 #[cfg(feature = "departures")]
 fn a_relay_outside_proposes_nothing() {

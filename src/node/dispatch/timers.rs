@@ -116,7 +116,7 @@ impl Node {
         }
     }
 
-    /// Returns true while this relay computes its solution of the chain by the joint method.
+    /// Returns true while this relay computes its part of the joint solution of the whole chain.
     fn is_solving(&self, now: Instant) -> bool {
         self.layers
             .round
@@ -135,14 +135,14 @@ impl Node {
         }
     }
 
-    /// Returns true until this relay has taken part in a pass along the chain, or requested a view. A pass is a
-    /// series of messages, each from one relay to the next.
+    /// Returns true until this relay's first pass or view request. A pass is a message along the chain, a view its
+    /// agreed membership.
     fn awaits_first(&self) -> bool {
         self.layers.round.is_fresh() && !self.layers.view.request.is_pending()
     }
 
-    /// Starts the timer for the first pass along the chain. If no pass arrives before it expires, the relay requests
-    /// a view.
+    /// Starts the timeout of the first pass (message along the chain). If it expires, the relay requests a new view
+    /// (membership).
     pub(super) fn await_first(&mut self, now: Instant) {
         let (settings, all) = (&self.member.settings, self.member.all);
         let there_and_back = settings.hop_time.times(2 * u32::from(all));

@@ -23,22 +23,22 @@ use super::hearing::{CANDIDATES, mask};
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Maximum number of times that the hold-down of a link doubles. During the hold-down a flapping link is not used.
+/// Maximum number of times that the hold-down of a flapping (often lost) link doubles. A held-down link is not used.
 const MAX_DOUBLINGS: u8 = 3;
 
-/// Maximum hold-down of a link, in units of `dead_after`. During the hold-down a flapping link is not used.
+/// Maximum hold-down of a flapping (often lost) link, in units of `dead_after`. A held-down link is not used.
 const MAX_HOLD_DOWN: u32 = 6;
 
-/// Number of recent losses up to which a link does not yet count as flapping.
+/// Maximum number of recent losses of a link that is not flapping yet.
 const MAX_FORGIVEN: u8 = 2;
 
-/// Minimum time between the last two losses of a link that flaps slowly, in units of `dead_after`.
+/// Minimum time between two losses of a link that flaps slowly, in units of `dead_after`.
 const SLOW_INTERVAL: u32 = 10;
 
 /// Time without a loss after which a link's earlier losses are forgotten, in units of `dead_after`.
 const MEMORY: u32 = 32;
 
-/// Node that is received without a gap, with the times of the first and the last frame.
+/// Node that is received without gaps: its distance, and the times of its first and last frame.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     distance: u16,
@@ -47,7 +47,7 @@ struct Heard {
 }
 
 impl Heard {
-    /// Returns `known` updated by a frame at `now` from the node at `distance`. It starts again with this frame after
+    /// Returns the record of a node's gap-free reception after a frame from the node at `distance`. It restarts after
     /// a silence of more than `gap`, or if `known` is of another node.
     fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
@@ -64,15 +64,15 @@ impl Heard {
     }
 }
 
-/// State of the link to one node. A link that was lost often recently is flapping, and is not used for a while.
+/// Record of losses of the link to one node. A link that was lost often (flaps) is not used for a while.
 #[derive(Clone, Copy, Debug)]
 struct Link {
-    /// Time at which the link was lost last.
+    /// Time at which the link to the neighbour was last lost.
     lost_at: Instant,
     /// Frames received since the last loss of the link: times of the first and last; `None` without any.
     back: Option<Heard>,
     losses: u8,
-    /// True if the last loss does not count in `losses`, because the channel was bad.
+    /// True if the last loss does not count as flapping, because the channel was bad.
     excused: bool,
     /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
     was_down: bool,
@@ -92,7 +92,7 @@ impl Link {
         }
     }
 
-    /// Returns how many times the link was lost; 0 if the last loss was long ago.
+    /// Returns how many times the link was lost recently; 0 if the last loss was long ago.
     #[inline(never)] // called from many places
     fn recent(&self, now: Instant, settings: &Settings) -> u8 {
         if now.since(self.lost_at) >= settings.dead_after.times(MEMORY) {
@@ -103,7 +103,7 @@ impl Link {
     }
 
     /// Returns true while the link must not be used (hold-down), because it was lost repeatedly. The hold-down ends
-    /// once the node has been received without a gap for long enough.
+    /// once the node has been received without gaps for long enough.
     fn is_held_down(&self, now: Instant, settings: &Settings) -> bool {
         let Some(more) = self.losses.checked_sub(MAX_FORGIVEN + 1) else {
             return false;
@@ -113,7 +113,8 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link, whose loss count was `losses` before. The count grows only if `counted` is true.
+    /// Records a loss of the link, which had `losses` recent losses before. The loss is added to them only if
+    /// `counted` is true.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -130,10 +131,10 @@ impl Link {
     }
 }
 
-/// Losses of the links to the four nearest nodes on one side, nearest node first.
+/// Records of lost links to the four nearest nodes on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that may be selected as the neighbour once it has been received for long enough.
+    /// Node that will be selected as the neighbour once it has been received without gaps for long enough.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -219,8 +220,8 @@ impl Damping {
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the loss count of every link on this side to that of the link that was lost last. All links of a side
-    /// cross the same gap in the chain, so they were lost together. Higher counts stay.
+    /// Raises the loss counts of all links on this side to that of the link lost last. They were lost together,
+    /// because all cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -240,8 +241,8 @@ impl Damping {
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if a link on this side flaps slowly: it was lost repeatedly, at long intervals. Its next loss
-    /// should then be noticed early.
+    /// Returns true if a link on this side flaps slowly (is lost repeatedly, at long intervals). Its next loss should
+    /// then be detected early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -249,8 +250,8 @@ impl Damping {
         self.links.iter().any(is_slow)
     }
 
-    /// Returns true if the last loss of the link to the node `distance` relays away was an outage. After an outage no
-    /// frame of the node was received for more than `dead_after`.
+    /// Returns true if the last loss of the link to the node `distance` relays away was an outage. An outage is more
+    /// than `dead_after` without a frame.
     pub(super) fn was_down(&self, distance: u16) -> bool {
         self.link(distance).is_some_and(|link| link.was_down)
     }
@@ -263,13 +264,13 @@ impl Damping {
             .fold(0, |held, distance| held | mask(distance))
     }
 
-    /// Forgets the node that was about to be selected as the neighbour.
+    /// Clears the node that was about to be selected as the neighbour.
     pub(super) const fn clear(&mut self) {
         self.candidate = None;
     }
 
-    /// Records a frame of the candidate `distance` relays away. Returns true if the candidate has been received
-    /// without a gap for `probe_after`, or for `more` if that is longer.
+    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if it has been
+    /// received without gaps for `probe_after`, or for `more` if that is longer.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,
@@ -304,7 +305,7 @@ mod tests {
         Duration::from_millis(1_000 * s)
     }
 
-    /// Returns the initial state of a test: a side without losses, the time 1 000 s, and default settings.
+    /// Returns the initial state of a test: links without losses, the time 1 000 s, and default settings.
     fn begun() -> (Damping, Instant, Settings) {
         let now = Instant::ZERO + seconds(1_000);
         (Damping::new(now), now, Settings::default())

@@ -5,11 +5,11 @@ use crate::time::{Duration, Instant};
 
 pub(crate) use crate::wire::CANDIDATES;
 
-/// Minimum interval between two reports about the same node.
+/// Minimum interval between two reports to the firmware about the same node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
-/// Counts of consecutive events, one for each of the four nearest nodes. An event is, for example, a handshake signed
-/// with another key.
+/// Number of consecutive events of one kind at each of the four nearest nodes. An event is, for example, a handshake
+/// signed with another key.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ConsecutiveCounts([u8; CANDIDATES as usize]);
 
@@ -33,7 +33,7 @@ impl ConsecutiveCounts {
     }
 }
 
-/// Nodes on one side that have been received recently.
+/// Set of nodes on one side that have been received recently.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hearing {
     since: Instant,
@@ -41,7 +41,7 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Limiter of reports about nodes on one side: at most one report a minute for each node.
+/// Limits reports about nodes on one side to one a minute for each node.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReportLimiter {
     since: Instant,

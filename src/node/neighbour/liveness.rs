@@ -22,16 +22,16 @@ use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost. Fewer are enough only after a
-/// silence of the maximum duration of a lease.
+/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost. Exception: a silence of the
+/// maximum lease duration.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor that tells a lost neighbour from lost frames. A neighbour counts as lost after three times as many
-/// unanswered requests as in the longest recent run, or after the maximum duration of a lease.
+/// Factor on the longest recent run of unanswered heartbeat requests. A neighbour counts as lost after that many, or
+/// after the maximum lease duration.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between heartbeat requests to a silent neighbour. It is the round trip through `all` relays,
-/// which share one channel, but short enough for sixteen requests between `probe_after` and `dead_after`.
+/// Returns the interval between heartbeat requests to a silent neighbour. It is a round trip through `all` relays,
+/// but short enough for sixteen requests between `probe_after` and `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
@@ -44,7 +44,8 @@ pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
 }
 
-/// Returns `dead_after` minus `probe_after`, in microseconds.
+/// Returns the time from the first heartbeat request to the loss of a neighbour, in µs. It is `dead_after` -
+/// `probe_after`.
 const fn waiting(settings: &Settings) -> u64 {
     let dead = settings.dead_after.as_micros();
     dead.saturating_sub(settings.probe_after.as_micros())
@@ -63,7 +64,7 @@ fn third(number: u64) -> u64 {
     u64::from(high / 3) << 32 | u64::from(rest)
 }
 
-/// Returns the round trip through a chain of `all` relays, limited to `most_micros` microseconds.
+/// Returns the round trip time through a chain of `all` relays, but at most `most_micros` microseconds.
 #[inline(never)] // called from both
 fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     let least = waiting(settings) / 64 + 1;
@@ -79,12 +80,12 @@ pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     round.min(longest_lease(settings)).max(settings.probe_after)
 }
 
-/// Number of heartbeat requests to which an answer is still accepted: the last four.
+/// Number of the latest heartbeat requests to which a reply is still accepted.
 const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Time of the neighbour's last sign of life; before the first one, the time of this relay's start.
+    /// Latest time at which the neighbour is known to have been alive. At first the time of this relay's start.
     last_sign: Instant,
     lost: bool,
     /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.
@@ -93,25 +94,24 @@ pub(crate) struct Liveness {
     request_number: u16,
     /// Times of the last heartbeat requests, latest first.
     request_times: [Instant; REMEMBERED_REQUESTS],
-    /// Number of heartbeat requests since the neighbour's last sign of life.
+    /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests that ended with an answer. It shows how many frames the
-    /// channel loses. It starts at [`MIN_REQUESTS`], the most with which the channel counts as a good one, and decays
-    /// with each answer.
+    /// Longest recent run of unanswered heartbeat requests before a reply. It measures the channel's losses. It
+    /// starts at [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
 }
 
-/// Result of the check of a neighbour's silence.
+/// Result of the check whether a silent neighbour is lost.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Silence {
-    /// True if the neighbour has become lost by this check.
+    /// True if this check has found that the neighbour is lost.
     pub(crate) lost: bool,
-    /// Time of the next check, later than now.
+    /// Time at which the neighbour's silence is checked again.
     pub(crate) next_check: Instant,
 }
 
 impl Liveness {
-    /// State of a neighbour's liveness before the relay starts: all zeros.
+    /// Liveness record of a neighbour before this relay starts: all zeros.
     pub(super) const NONE: Self = Self {
         longest: 0,
         ..Self::new(Instant::ZERO)
@@ -129,9 +129,9 @@ impl Liveness {
         }
     }
 
-    /// Starts again with another node as the neighbour. It keeps the longest run of unanswered requests, which
-    /// describes the channel. The unanswered requests to the previous node count as a run, unless the link
-    /// `was_down`, because then they measure an outage. If the link `flaps` slowly, all runs are dropped.
+    /// Restarts the liveness record for another node as the neighbour. It keeps the longest run of unanswered
+    /// requests, which describes the channel. The unanswered requests to the previous node count as a run, unless the
+    /// link `was_down`, because then they measure an outage. If the link `flaps` slowly, all runs are dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -156,12 +156,12 @@ impl Liveness {
         self.was_received && !self.lost
     }
 
-    /// Returns true if the neighbour is lost and nothing has been received from it since.
+    /// Returns true if the neighbour is lost, and no frame of it has been received since.
     pub(crate) const fn is_silent(&self) -> bool {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence that lost frames alone can explain, with one request every `tick`.
+    /// Returns the longest silence that lost frames alone can explain, if a request is sent every `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
@@ -207,8 +207,8 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`. Relays send nothing while they compute, which
-    /// must not count as silence. Returns false, and does nothing, if the neighbour is lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, because computing relays send nothing. Returns
+    /// false, and does nothing, if the neighbour is lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;
@@ -216,7 +216,7 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the neighbour is lost. It is not lost before a silence of `dead`. `tick` is the time to the
+    /// Checks at `now` if the silent neighbour is lost; never before a silence of `dead`. `tick` is the time to the
     /// next check.
     pub(crate) fn review_silence(
         &mut self,

@@ -71,19 +71,19 @@ impl Neighbours {
         [&self.upstream, &self.downstream].map(|side| Some(side.node()).filter(|node| *node != 0))
     }
 
-    /// Returns true if a neighbour has changed since the last decision on a view.
+    /// Returns true if a neighbour has changed since the last decision on a view (membership of the chain).
     pub(crate) fn have_changed(&self, now: Instant) -> bool {
         self.upstream.has_changed(now) || self.downstream.has_changed(now)
     }
 
-    /// Leaves the view. Until the next view, no side has a neighbour that belongs to a view.
+    /// Leaves the view (membership of the chain): until the next view no neighbour counts as a member.
     pub(crate) const fn leave(&mut self) {
         self.upstream.leave();
         self.downstream.leave();
     }
 
-    /// Records on both sides that a view proposal was refused with the current neighbours. A side then causes no view
-    /// request until its neighbour changes.
+    /// Records on both sides that a view proposal was refused. A side requests no new view until its neighbour
+    /// changes.
     pub(crate) const fn refuse(&mut self) {
         self.upstream.refuse();
         self.downstream.refuse();

@@ -39,9 +39,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// Linked: this relay and a node have selected each other as neighbours, by the node's last report.
+    /// Linked: this relay and the node have selected each other, by the node's last report.
     Linked,
-    /// Pairing: this relay has selected a node, which has not, or no longer, selected this relay.
+    /// Pairing: this relay has selected a node that has not, or no longer, selected this relay.
     Pairing {
         since: Instant,
     },
@@ -53,20 +53,20 @@ enum NeighbourState {
 /// Neighbour on one side of this relay: its selection, its liveness and the search for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbour {
-    /// Node number of the selected neighbour, 0 for none.
+    /// Node number of the selected neighbour; 0 if there is none.
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
-    /// End of the grace period after the selection of a neighbour; until then no new view is requested. The relay on
-    /// the neighbour's other side may be about to select the neighbour, too. One view change for both is enough.
+    /// End of the time after the selection of a neighbour in which no new view is requested. The relay beyond the
+    /// neighbour may select it at the same time, and one view change is enough for both.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped because of a missing quorum; 0 if none since the last selection.
+    /// Node whose link was dropped because there was no quorum. 0 if none since a neighbour was last selected.
     dropped: u16,
     /// Previous neighbour, which a nearer node has replaced; 0 for none.
     replaced: u16,
-    /// Start of the last search for a neighbour.
+    /// Time at which the last search for a neighbour began.
     searches_since: Instant,
     /// Distance to the selected neighbour, in relays along the chain: 1 for the next node number.
     pub(super) distance: u16,
@@ -75,11 +75,11 @@ pub(crate) struct Neighbour {
     /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
     /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node other than the neighbour; `None` before any.
+    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` before any.
     unselected_at: Option<Instant>,
-    /// Nodes on this side that were received recently.
+    /// Nodes on this side of the relay from which it has recently received frames.
     pub(super) hearing: Hearing,
-    /// Number of consecutive hellos that do not list this relay as received, for each node on this side.
+    /// Number of consecutive hellos of each node on this side that do not list this relay as received.
     pub(super) not_received: ConsecutiveCounts,
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Reports go to the firmware;
     /// bit 0 is the nearest node.
@@ -90,20 +90,21 @@ pub(crate) struct Neighbour {
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
     tick: Duration,
-    /// Silence of the neighbour after which a heartbeat is requested.
+    /// Silence of the neighbour after which a heartbeat is requested from it.
     patience: Duration,
     jitter: Jitter,
     pub(super) heartbeat: PendingHeartbeat,
     /// Newest mission that the neighbour has reported to have stored; `None` before its first report.
     pub(crate) latest_mission: Option<MissionId>,
-    /// Time of the next check of the neighbour's silence, or of the next hellos of the search. `None` on a side that
-    /// needs neither.
+    /// Time of the next check of the neighbour's silence, or of the search's next hellos. `None` if neither is
+    /// needed.
     check_at: Option<Instant>,
     pub(super) hellos: Hellos,
 }
 
 impl Neighbour {
-    /// State of a side before the relay starts. All values are zero, so that no copy of them is kept in flash.
+    /// State of the neighbour on one side before the relay starts. All values are zero, so that no copy is kept in
+    /// flash.
     pub(super) const NONE: Self = Self {
         node: 0,
         agreed: AgreedNodes::on(0),
@@ -132,8 +133,7 @@ impl Neighbour {
         hellos: Hellos::NONE,
     };
 
-    /// Starts this side of the relay at `now`. The node `node` is the neighbour that the mission configures; 0 for
-    /// none.
+    /// Starts the neighbour state of this side at `now`. The mission configures `node` as the neighbour; 0 for none.
     #[inline(never)] // a relay has two of them
     pub(super) fn begin(
         &mut self,
@@ -173,12 +173,13 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if this side has no neighbour and the search for one has ended without success.
+    /// Returns true if this side has no neighbour, and the search for one has ended without success.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true for a short time after a node was selected. In that time it causes no request for a new view.
+    /// Returns true for a short time after a neighbour was selected. Its selection then causes no request for a new
+    /// view.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -236,9 +237,8 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`. Relays send nothing while they compute, which
-    /// must not count as silence. Returns false, and does nothing, unless the neighbour is linked, in the view and
-    /// not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, because computing relays send nothing. Returns
+    /// false, and does nothing, unless the neighbour is linked, a member of the view and not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -366,7 +366,8 @@ impl Neighbour {
         }
     }
 
-    /// Gives up the neighbour. No search follows if `ends` is true: the chain ends here, or this relay leaves it.
+    /// Gives up the selected neighbour. No search follows if `ends` is true: the chain ends here, or this relay
+    /// leaves it.
     pub(crate) fn give_up(&mut self, now: Instant, ends: bool) {
         self.search(now);
         self.heartbeat = PendingHeartbeat::NONE;
@@ -395,7 +396,7 @@ impl Neighbour {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the neighbour and searches again, because the relays that can be reached have no quorum.
+    /// Drops the selected neighbour and searches again. The reachable relays are too few for a quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -485,9 +486,9 @@ pub(crate) struct Candidate {
     pub(crate) downstream: bool,
     /// True if the candidate has selected this relay as its neighbour.
     pub(crate) pairs: bool,
-    /// True if the candidate is nearer than the selected neighbour.
+    /// True if the candidate is nearer in the chain than the selected neighbour.
     pub(crate) nearer: bool,
-    /// True if the candidate can be inserted between this relay and the neighbour, by its own report.
+    /// True if the candidate reports that it can be inserted between this relay and the selected neighbour.
     pub(crate) ready: bool,
     /// True if more relays can be reached through the candidate than through the selected neighbour.
     pub(crate) longer: bool,
@@ -496,8 +497,8 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, without the lost next node. This relay waits
-    /// longer for each of them before it selects the candidate, because a nearer node may still answer.
+    /// Returns the number of nodes between this relay and the candidate, without the lost next node. For each of them
+    /// the selection is delayed, because a nearer node may still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -517,18 +518,19 @@ impl Neighbour {
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the selected neighbour is also the one in the agreed view.
+    /// Returns true if the selected neighbour is also the one in the agreed view (membership of the chain).
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
 
-    /// Records the origin of a view proposal: the neighbour on this side, or this relay itself. A relay proposes a
-    /// view only if it has no neighbour on this side, the one toward the leader.
+    /// Records where a view proposal came from: the neighbour on this side, or this relay itself. A relay itself
+    /// proposes only without a neighbour toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
 
-    /// Records that a view proposal was granted. Its sender becomes the neighbour on this side in the view.
+    /// Records that a view proposal was granted. The neighbour that sent it becomes this side's neighbour in the
+    /// view.
     pub(crate) const fn agree_with_proposer(&mut self) {
         self.agreed.agree_with_proposer();
     }
@@ -538,19 +540,20 @@ impl Neighbour {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. This side then causes no view request until its neighbour changes.
+    /// Records that a view proposal was refused. This side requests no new view until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that a view proposal was granted, on the side to which it was forwarded. If the chain `ends` at this
-    /// relay, this side has no neighbour in the view.
+    /// Records that a view proposal was granted, on the side to which it was forwarded. If the chain `ends` here,
+    /// this side has no neighbour in the view.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Node numbers that the last decisions on views gave to the neighbour on one side; 0 for none.
+/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is a membership
+/// of the chain.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view (agreed members of the chain).
@@ -601,7 +604,7 @@ impl AgreedNodes {
     }
 }
 
-/// Pending heartbeat to the neighbour.
+/// Heartbeat that must be sent to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PendingHeartbeat {
     /// True if a heartbeat request to the neighbour is pending.
@@ -637,12 +640,12 @@ impl Neighbour {
             || is_linked && self.liveness.is_present() && is_in(self.hearing.recent(now, settings))
     }
 
-    /// Returns true if this side has a linked neighbour less than `distance` relays away that is not lost.
+    /// Returns true if this side's neighbour is linked, not lost, and nearer than `distance` relays.
     pub(crate) fn links_within(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance < distance
     }
 
-    /// Returns true if this side has a linked neighbour more than `distance` relays away that is not lost.
+    /// Returns true if this side's neighbour is linked, not lost, and farther than `distance` relays away.
     pub(crate) fn has_link_beyond(&self, distance: u16) -> bool {
         self.is_mutual() && self.liveness.is_present() && self.distance > distance
     }
@@ -677,8 +680,7 @@ impl Neighbour {
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` relays away. `taken` is true if this node is the selected
-    /// neighbour.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if it is the selected neighbour.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -736,8 +738,8 @@ impl Neighbour {
         }
     }
 
-    /// Returns the time at which this relay sent the heartbeat request `number`, which was answered now. `None` if
-    /// the request is too old.
+    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if it is
+    /// too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }

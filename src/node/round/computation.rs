@@ -29,13 +29,14 @@ use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdi
 /// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
 pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
-/// True if the feature `altitude` (joint method) is on. Without it the code of the joint method is unreachable.
+/// True with the feature `altitude` (joint method: all positions are optimised together). If false, the compiler
+/// drops that code.
 pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
 
-/// True if the feature `adjust` (Algorithm 2) is on. Without it the code of Algorithm 2 is unreachable.
+/// True with the feature `adjust` (Algorithm 2: relays move one by one). If false, the compiler drops that code.
 pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
-/// Current pass (message along the chain) at this relay: its kind and its data.
+/// Kind and data of the current pass (message along the chain) at this relay.
 #[derive(Clone, Debug)]
 pub(super) enum PassKind {
     Sweep(SweepPass),
@@ -47,22 +48,22 @@ pub(super) enum PassKind {
 /// Position that the joint method has computed for this relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointPlace {
-    /// Lateral offset and altitude of the position.
+    /// Lateral offset and altitude of the position that this relay computed.
     pub(super) cross_section: CrossSection,
     /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
     /// used in an interference field.
     pub(super) end_m: f32,
-    /// True if every relay goes as far along the pass as the target SIR permits (a plain pass). False if relays may
-    /// stop before that x to help the next hop.
+    /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays may stop
+    /// before that x to help the next hop.
     pub(super) plain: bool,
 }
 
-/// Fitted slots of this relay; unused in a mission with equal slots.
+/// Time slots of this relay that are as long as its hops need; unused if all slots are equal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
     /// x of this relay in its joint solution, m, and the shares of its slots there.
     pub(super) solved: Option<(f32, SlotShares)>,
-    /// Shares of its slots at the agreed positions.
+    /// Begin and end of its slots at the agreed positions, as shares of the frame.
     pub(super) agreed: Option<SlotShares>,
 }
 
@@ -79,21 +80,22 @@ pub(crate) struct Computation {
     pub(super) state: RoundState,
     pub(super) pass: PassKind,
     pub(super) task: LeaderTask,
-    /// True once this relay has started a pass along the chain, until the statistics count that start.
+    /// True from the start of a pass by this relay until the statistics count it. A pass is a message along the
+    /// chain.
     pub(super) began: bool,
-    /// Configured altitude and power of this relay.
+    /// Altitude and transmit power that the mission gives to this relay.
     pub(super) profile: Profile,
-    /// Profiles (altitude and power) of the relays of this view, collected for the joint method.
+    /// Profiles (altitude and power) of the relays of this view, collected by a message along the chain.
     pub(super) seats: Seats,
-    /// Position that the joint method has computed for this relay in this view; `None` before.
+    /// Position that the joint method has computed for this relay in this view; `None` before it has.
     pub(super) chosen: Option<JointPlace>,
-    /// Lateral offset and altitude of the agreed position.
+    /// Lateral offset and altitude of the position that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
     /// Position and power of the next relay toward Rx, as last reported; `None` if unknown. Algorithm 2 uses it as
     /// the end of the hop from this relay.
     pub(super) after: Option<HopEnd>,
     pub(super) agreed_place: Option<Placement>,
-    /// Fitted slots of this relay; no element without the feature `altitude`.
+    /// Fitted time slots of this relay; the array is empty without the feature `altitude`.
     pub(super) fitted: [FittedSlots; ALTITUDE as usize],
     /// Average of the measured interference at the agreed position. Used only if the interference is a field (a known
     /// distribution along x).
@@ -135,7 +137,8 @@ impl Computation {
         }
     }
 
-    /// Returns true until this relay has started a task, taken part in a pass, or agreed on a position.
+    /// Returns true until this relay starts a task, takes part in a pass, or agrees on a position. A pass is a
+    /// message along the chain.
     pub(crate) const fn is_untouched(&self) -> bool {
         let at_first = matches!(self.state.phase(), Phase::Idle | Phase::Planning);
         at_first && matches!(self.task, LeaderTask::Idle) && self.agreed_place.is_none()
@@ -171,7 +174,7 @@ impl Computation {
         self.state.answer();
     }
 
-    /// Starts a new view, in which no pass along the chain has been received yet. `leads` is true at its leader.
+    /// Resets the computation for a new view (membership of the chain). `leads` is true at its leader.
     pub(crate) fn renew(&mut self, leads: bool) {
         self.task.clear();
         // They belong to the previous view's mission and hops.
@@ -236,8 +239,8 @@ impl Computation {
         }
     }
 
-    /// Returns the message of the current pass along the chain, for the next relay. `None` if the pass has ended, or
-    /// if this relay still computes.
+    /// Returns the message of the current pass for the next relay along the chain. `None` if the pass has ended, or
+    /// while this relay computes.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
             return None;
@@ -325,8 +328,8 @@ impl Computation {
         }
     }
 
-    /// Returns the lateral offset, altitude and power of this relay for a sweep of target SIRs. Lateral offset and
-    /// altitude are those of the joint method if `chosen` is true, else the configured ones.
+    /// Returns this relay's lateral offset, altitude and power for a sweep. A sweep is a pass along the chain that
+    /// tries target SIRs. Offset and altitude are the joint method's if `chosen` is true, else the configured ones.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -348,7 +351,7 @@ impl Computation {
     }
 }
 
-/// Solver of the joint method for a whole chain.
+/// Solver of the joint method (all positions at once) for up to [`MOST_SOLVED`] relays.
 pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 
 /// Current task of the leader: prediction, joint method, search for the target SIR, or Algorithm 2.
@@ -361,26 +364,26 @@ pub(crate) type ChainSolver = Solver<MOST_SOLVED, { MOST_SOLVED / 10 }>;
 )]
 #[derive(Clone, Debug)]
 pub(crate) enum LeaderTask {
-    /// Idle: not the leader, not started, or finished.
+    /// No task: this relay is not the leader, has not started, or has finished.
     Idle,
     /// Prediction of the chain's target SIR from the mission; the first sweep tries targets around it.
     Predicting(Planner),
     /// Solution of the whole chain by the joint method. Every relay computes it for itself.
     Solving(ChainSolver),
-    /// Search for the highest target SIR that the chain meets, by sweeps (messages along the chain). Lateral offsets
-    /// and altitudes are fixed meanwhile.
+    /// Search for the highest target SIR that the chain meets, by sweeps (messages along the chain). The lateral
+    /// offsets and altitudes stay as they are.
     Searching {
         search: Search,
         /// True if the method of the settings ends with this search, and no other algorithm follows.
         last: bool,
-        /// True for a search at the configured altitudes, after the one at the joint method's altitudes failed.
+        /// True for a search at the configured altitudes. Those of the joint method gave no feasible target.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.
     Adjusting(Rounds),
 }
 
-/// Progress of Algorithm 2, in which the relays move one after the other.
+/// Progress of Algorithm 2, in which the relays move one after the other: rounds and SIR.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
@@ -464,7 +467,7 @@ impl LeaderTask {
 }
 
 /// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
-/// interference is a field that varies along x, a call predicts only a part of one hop.
+/// interference varies along x, it predicts only part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
 /// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A field is a known

@@ -20,7 +20,7 @@ use crate::wire::message::{OwnSeat, OwnSeats, Roster};
 use core::task::Poll;
 
 impl Computation {
-    /// Returns this relay's power, and the lateral offsets and altitudes that it may take.
+    /// Returns this relay's profile: its power, and the lateral offsets and altitudes that it may take.
     pub(super) fn seat(&self, context: &Context<'_>) -> Seat {
         let holds = context.settings().hold_altitude;
         Seat::of(context.mission(), self.profile, holds)
@@ -133,7 +133,7 @@ impl Computation {
     }
 }
 
-/// Known profiles of the relays of the view.
+/// Altitudes and transmit powers of the relays of the view, as far as they are known.
 #[derive(Clone, Debug)]
 pub(super) struct Seats {
     /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.
@@ -186,13 +186,14 @@ impl Seats {
 }
 
 impl Computation {
-    /// Returns true while this relay still has to compute its position by the joint method.
+    /// Returns true while this relay has yet to compute its position by the joint method.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues this relay's solution by the joint method in advance, while it waits for a pass.
+    /// Continues this relay's joint solution of the chain in advance. Called while it waits for a pass (message along
+    /// the chain).
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);

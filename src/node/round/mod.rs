@@ -131,8 +131,8 @@ impl Round {
         }
     }
 
-    /// Carries out the action `next`. The returned effects include what has changed in the sensing results since
-    /// `before`.
+    /// Carries out `next`, the action of the agreement on positions. Returns the effects, among them the sensing
+    /// results that differ from `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -195,7 +195,7 @@ impl Round {
         }
     }
 
-    /// Handles a measurement; returns true if it was accepted.
+    /// Handles a measurement of this relay's radio; returns true if it was accepted.
     pub(crate) fn handle_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
         if sample.is_heard() {
             return SENSING
@@ -223,8 +223,8 @@ impl Round {
         self.work_at = None;
     }
 
-    /// Starts a new view at `now`; `leads` is true at the view's leader. `works` is true if this relay must compute
-    /// without waiting for a message, as every relay does in the joint method.
+    /// Resets the agreement on positions for a new view at `now`; `leads` is true at its leader. `works` is true if
+    /// this relay starts to compute at once, as every relay does in the joint method.
     pub(crate) fn renew(&mut self, now: Instant, leads: bool, works: bool) {
         self.computation.renew(leads);
         if leads || works {
@@ -232,7 +232,7 @@ impl Round {
         }
     }
 
-    /// Loads another mission, in which this relay has `profile`. The agreed position stays.
+    /// Loads another mission, in which this relay has `profile`. The agreed position is kept.
     pub(crate) fn load(&mut self, profile: Profile) {
         self.computation.load(profile);
     }
@@ -287,7 +287,8 @@ impl Round {
         self.computation.phase()
     }
 
-    /// Returns true until this relay has taken part in a pass along the chain or in a view.
+    /// Returns true until this relay has taken part in a pass or a view. A pass is a message along the chain, a view
+    /// its membership.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }

@@ -28,7 +28,7 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Heard;
 
-/// Maximum interval between two passes that collect measurements, as a multiple of [`Listen::every`].
+/// Maximum interval between collections of measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
 /// Number of sensing passes without a change of the estimate after which their interval doubles. A sensing pass is a
@@ -39,7 +39,7 @@ const PATIENCE: u8 = 4;
 /// message along the chain that collects measurements.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Number of consecutive measurements at or below the noise after which a relay's sensor may be faulty.
+/// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
@@ -206,7 +206,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Continues the leader's search for the relay with a faulty sensor, with the result of a sensing pass. Returns
+    /// Continues the leader's search for a faulty sensor with the measurements collected by a sensing pass. Returns
     /// true if the search needs another pass; the estimate then stays as it is.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
@@ -318,13 +318,13 @@ impl Computation {
     }
 }
 
-/// True with the feature `sensing`; without it the sensing code is unreachable.
+/// True with the feature `sensing` (estimate of an unknown interferer). If false, the compiler drops that code.
 pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
 /// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
 const FARTHEST: f32 = 100.0;
 
-/// Sensing state of a relay. It has one element with the feature `sensing`, none without it.
+/// Sensing state of a relay; the array is empty without the feature `sensing`.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing([SensorState; SENSING as usize]);
 
@@ -338,18 +338,18 @@ pub(super) struct SensorState {
     pub(super) transmitter: Average,
     /// Average of the interference power that Rx, on the ground, has reported to this relay.
     pub(super) receiver: Average,
-    /// True while this relay does not report its measurements, which contradict those of the other nodes.
+    /// True while this relay withholds its measurements, because they contradict those of the other nodes.
     pub(super) off: bool,
     /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
     /// measurements.
     pub(super) left_out: u16,
-    /// Node with a faulty sensor, as found by the leader or by the node itself; 0 for none.
+    /// Node whose sensor was found faulty, by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
-    /// Leader's search for the relay with a faulty sensor, by leaving out one relay after the other.
+    /// State of the leader's search for a faulty sensor. It leaves out one relay's measurements after the other.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements do not fit those of the relays; at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
-    /// True if the last measurements contradict each other, and the faulty sensor was not found.
+    /// True if the last collected measurements contradict each other, and the faulty sensor was not found.
     pub(super) contradicted: bool,
     /// True if this relay measures nothing where the other relays' measurements predict interference.
     pub(super) deaf: bool,
@@ -363,15 +363,16 @@ pub(super) struct SensorState {
     pub(super) known: Knowledge,
     /// Reason why the last collected measurements gave no estimate; `None` if they gave one.
     pub(super) unfit: Option<Unfit>,
-    /// Interval between sensing passes, as a multiple of `Listen::every`. A sensing pass collects measurements.
+    /// Interval between two collections of measurements along the chain, as a multiple of `Listen::every`.
     pub(super) wait: u32,
-    /// Number of consecutive sensing passes that did not change the estimate, modulo [`PATIENCE`].
+    /// Number of consecutive sensing passes that did not change the estimate, modulo [`PATIENCE`]. A sensing pass
+    /// collects measurements.
     pub(super) kept: u8,
     /// Time of the next sensing pass, which collects measurements; `None` if none is scheduled.
     pub(super) at: Option<Instant>,
 }
 
-/// Initial estimate: the interference that the mission configures.
+/// Estimate before any measurement: the interference that the mission configures.
 const AS_LOADED: NumberedEstimate = NumberedEstimate {
     number: 0,
     estimate: InterferenceEstimate::Mission,
@@ -417,7 +418,7 @@ impl Sensing {
         sensors.first_mut()
     }
 
-    /// Starts a new view, in which the leader distributes its estimate before the first agreement.
+    /// Resets the sensing for a new view, in which the leader first distributes its estimate to all relays.
     pub(super) const fn renew(&mut self) {
         if let Some(sensor) = self.sensor_mut() {
             sensor.is_distributed = false;
@@ -494,8 +495,8 @@ impl Sensing {
 }
 
 impl SensorState {
-    /// Returns the interference level at a ground station at time `now`, from the station's `average`. The level's
-    /// weight in an estimate decreases with the age of the station's last report.
+    /// Returns the interference level at a ground station at `now`, from the `average` of its reports. Older reports
+    /// have less weight in an estimate.
     pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
         let age = now.since(average.last);
         Level {
@@ -543,10 +544,10 @@ impl SensorState {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums of measurements as received from the previous relay: those of all earlier relays of the pass.
+    /// Sums of measurements over all earlier relays of the pass, as received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
-    /// True if the positions were agreed on with the current estimate. The chain then need not agree again.
+    /// True if the positions were agreed on with the current estimate. No new agreement is needed then.
     pub(super) holds: bool,
 }
 
@@ -555,7 +556,7 @@ pub(super) struct Sense {
 pub(super) struct Findings {
     pub(super) estimate: NumberedEstimate,
     pub(super) unfit: Option<Unfit>,
-    /// Node with a faulty sensor, as of the last sensing pass; 0 for none.
+    /// Node with a faulty sensor, according to the last sensing pass; 0 for none.
     pub(super) off: u16,
     pub(super) ends: EndsOff,
     pub(super) deaf: bool,

@@ -24,13 +24,13 @@ use crate::node::circulation::LateMessages;
 pub enum Phase {
     /// Idle: this relay has not received a pass (message along the chain) yet.
     Idle,
-    /// The leader computes the targets of its next pass.
+    /// The leader computes the target SIRs of its next pass along the chain.
     Planning,
     /// Waiting: a pass or view proposal has been forwarded, and its result is not known yet.
     Waiting,
-    /// The last pass (message along the chain) has completed without an agreement.
+    /// The last pass (message along the chain) has ended without an agreement on positions.
     Answered,
-    /// The chain has agreed; the relay holds its position.
+    /// The chain has agreed on the positions, and this relay holds its own.
     Holding,
     /// The leader has found that no target SIR is feasible. All relays keep their positions.
     Infeasible,
@@ -44,26 +44,26 @@ pub enum Phase {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,
-    /// Ignore the message, and count it as stale.
+    /// Ignore the received message, and count it as outdated.
     Stale,
-    /// Drop the outstanding message, and continue the computation after a pause.
+    /// Drop the message that awaits a reply, and continue the computation after a pause.
     Work,
-    /// Continue the computation after a pause. An outstanding message stays.
+    /// Continue the computation after a pause. A message that awaits a reply is kept.
     Think,
     /// Forward the pass to the next relay, and retransmit it until there is a reply.
     Forward,
-    /// Reply to a duplicate of the current pass.
+    /// Repeat the reply, because the received message is a duplicate of the current pass.
     Repeat,
-    /// Send the result of the pass to the previous relay.
+    /// Send the result of the pass (message along the chain) to the previous relay.
     Answer {
-        /// True if the chain has agreed on its positions.
+        /// True if the pass ends with the agreement of the chain on its positions.
         agreed: bool,
     },
-    /// Complete the pass at the leader, which starts no other pass now.
+    /// Complete the pass at the leader. No further pass starts now.
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view, because this relay cannot take part in the pass along the chain.
+    /// Request a new view (membership). This relay cannot take part in the leader's pass along the chain.
     Foreign,
 }
 
@@ -73,12 +73,12 @@ pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// Foreign pass: its leader has restarted, or this relay has missed passes before it.
+    /// Foreign: the pass's leader has restarted, or this relay has missed earlier passes.
     Foreign,
 }
 
 impl Arrival {
-    /// Returns the action for a pass message that is not new; `None` for a new one, which is handled.
+    /// Returns the action for a pass message that is not new; `None` for a new one, which must be handled.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -89,8 +89,8 @@ impl Arrival {
     }
 }
 
-/// Maximum number of passes by which a late pass message may be behind the current pass. A pass farther behind, or
-/// ahead of the next one, is foreign: its leader has restarted, or this relay has missed passes.
+/// Maximum number of passes by which a late message may be behind the current pass. A pass is a message along the
+/// chain. One farther behind is foreign: its leader has restarted.
 const STRAGGLERS: u16 = 32;
 
 /// Divisor of the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of 64
@@ -203,7 +203,8 @@ impl RoundState {
         }
     }
 
-    /// Counts a late pass message. Too many in a row count as foreign, because their leader has restarted.
+    /// Counts a late pass message, and classifies it. Too many in a row count as foreign, because the leader must
+    /// have restarted.
     const fn straggler(&mut self) -> Arrival {
         if self.late_messages.count_one() {
             Arrival::Foreign
@@ -212,18 +213,19 @@ impl RoundState {
         }
     }
 
-    /// Returns true if the result of pass `number` is awaited.
+    /// Returns true if `number` is that of the current pass, and its result has not arrived yet.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of the current pass has arrived since the state `before`.
+    /// Returns true if the result of the current pass has arrived since the earlier state `before`.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass has followed the pass of the state `before`, whose result was known then.
+    /// Returns true if a new pass has started since the earlier state `before`. In that state the result of the last
+    /// pass was known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }
@@ -239,7 +241,7 @@ mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::circulation::SUSPICIOUS;
 
-    /// Returns the state of a relay that has accepted a pass with the number 200.
+    /// Returns the state of a relay that has accepted a pass (message along the chain) with the number 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
         state.accept(200);

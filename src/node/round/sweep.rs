@@ -153,7 +153,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Completes the agreement on a target SIR, unless the leader continues with another algorithm.
+    /// Completes the agreement on a target SIR, unless another algorithm follows in the settings' method.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
         self.state.hold();
         if let LeaderTask::Searching { last: false, .. } = self.task {
@@ -183,20 +183,21 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay of this pass has another power or fixed altitude than the common profile.
+    /// True if a later relay of this pass has a power or fixed altitude other than the common ones.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
     from: PerTarget,
-    /// Farthest x in the direction of the pass at which this relay meets each target SIR, m.
+    /// Reaches of this relay, one for each target SIR, m. A reach is the farthest x in the direction of the pass at
+    /// which the relay meets the target.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// x that this relay takes for the committed target, m; `None` without a committed target.
+    /// x of this relay for the target SIR that was committed, m; `None` if none was committed.
     place: Option<f32>,
-    /// x that the previous relay must take for the committed target, m. `None` if that relay must take the farthest x
-    /// at which it meets this target.
+    /// x that the previous relay must take for the target SIR that was committed, m. `None` if it takes the farthest
+    /// x that meets the target.
     required_x_m: Option<f32>,
 }
 
@@ -281,8 +282,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores `place`, this relay's x for the committed target SIR, m. Computes from it the x that the previous relay
-    /// must take; if there is no suitable one, the commitment is revoked.
+    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from it the x that the previous relay
+    /// must take. If that relay has no such x, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -306,8 +307,8 @@ impl SweepPass {
         }
     }
 
-    /// Returns the committed target SIR, and the farthest x, m, at which this relay meets it. `None` if no target is
-    /// committed.
+    /// Returns the target SIR that was committed, and the farthest x, m, at which this relay meets it. `None` if none
+    /// was.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((

@@ -88,7 +88,8 @@ impl Line {
     }
 }
 
-/// Delivers messages between the relays until `ends` returns true for one. Returns the delivered messages.
+/// Delivers messages between the test chain's relays until `ends` returns true for one. Returns the delivered
+/// messages.
 fn exchange(line: &mut Line, ends: impl Fn(&Line, &Message) -> bool) -> Vec<Message> {
     let mut all = Vec::new();
     for _ in 0..100_000 {

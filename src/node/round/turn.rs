@@ -106,8 +106,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Ends this relay's turn in Algorithm 2, and computes the worst SIR of the hops from it to Rx. The reply to the
-    /// previous relay has this SIR. `worst` is the worst SIR of the hops from the next relay to Rx, linear.
+    /// Ends this relay's turn in Algorithm 2, and prepares its reply. That is the worst SIR of the hops from this
+    /// relay to Rx. `worst` is that of the hops from the next relay to Rx, linear.
     pub(super) fn conclude_turn(&mut self, context: &Context<'_>, worst: f32) -> Action {
         let (PassKind::Turn(turn_pass), Some(at), Some(interferer)) = (
             &mut self.pass,
@@ -154,7 +154,7 @@ pub(crate) struct TurnPass {
     /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
     before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay or a later relay has moved in this pass of the token.
+    /// True if this relay or a later one has moved in this pass of Algorithm 2.
     pub(crate) any: bool,
     /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,

@@ -28,14 +28,14 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum number of views by which one message may advance the latest known view number. One message thus cannot use
-/// up all numbers.
+/// Maximum amount by which one message may raise the latest known view number. One message thus cannot use up all
+/// numbers.
 const MAX_ADVANCE: u32 = 4096;
 
 /// State of one relay in view changes, by which the relays agree on the members of the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewChange {
-    /// Progress of the view proposal along the chain: `Outstanding` while its decision is awaited.
+    /// Progress of the view proposal along the chain; `Outstanding` while its decision is awaited.
     pub(super) circulation: Circulation,
     pub(super) proposed: Option<Proposed>,
     pub(super) electorate: Electorate,
@@ -214,8 +214,8 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, which `place` relays have voted on before. `received` has their votes, `None` at
-    /// the proposer. Returns the effects, `None` if this relay has promised a later view.
+    /// Votes on the proposed `view`, on which `place` relays have voted before. `received` has their votes (`None` at
+    /// the proposer). Returns the effects; `None` if this relay has promised a later view (Paxos).
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -453,8 +453,7 @@ impl ViewChange {
         Effects { resent, ..effects }
     }
 
-    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads. `fresh` is
-    /// true if this relay has taken part in no pass or view since its start.
+    /// Sends a view request to the neighbour toward the leader, or proposes a view if this relay leads.
     fn request_again(&mut self, context: &Context<'_>, leads: bool, fresh: bool) -> Effects {
         let settings = &context.member.settings;
         if !self.request.poll_due(context.now, fresh, settings) {
@@ -501,26 +500,26 @@ impl ViewChange {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Proposed {
     pub(crate) view: ViewId,
-    /// Identifier of the mission of the proposed view.
+    /// Identifier of the mission that the relays of the proposed view are to fly.
     pub(crate) mission_id: MissionId,
-    /// Position of this relay on the proposal's path: 1 for the proposer.
+    /// Position of this relay in the order in which the relays vote: 1 for the proposer.
     pub(crate) rank: u16,
-    /// Votes on the proposal, including that of this relay.
+    /// Votes of the relays on the proposed view, including the vote of this relay.
     pub(super) poll: Poll,
-    /// Node to which the proposal was forwarded; `None` before. It is never sent to a second node, because two
-    /// different views with the same identifier could result.
+    /// Node to which the proposal was forwarded; `None` before. It is never sent to a second node, because two views
+    /// with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
     /// View that the decided view replaces. Before the decision it is the newest view known to be agreed on, which
     /// may still be another one.
     pub(crate) base: View,
-    /// Number of relays that the proposal has reached; 0 until the decision is known.
+    /// Number of relays that the view proposal has reached; 0 until its decision is known.
     pub(super) reached: u16,
     /// View that the decision accepted; `None` before the decision and without a quorum.
     pub(super) accepted: Option<View>,
     pub(super) usable_in: u16,
 }
 
-/// Decision on a view proposal.
+/// Decision of the relays on a proposed view: accepted, or why not.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ViewVerdict {
     pub(super) reached: u16,
@@ -543,13 +542,12 @@ pub(super) struct ViewVerdict {
 #[derive(Clone, Debug)]
 pub(crate) struct ViewRequest {
     pending: bool,
-    /// Number of view requests sent without a result.
+    /// Number of requests for a new view that this relay has sent without a result.
     tries: u8,
     at: Option<Instant>,
-    /// Number of consecutive view proposals that were refused.
+    /// Number of consecutive refusals of view proposals, for want of a quorum.
     refusals: u8,
-    /// Earliest time to which the next view request can be advanced after a refusal. A new reason for a view advances
-    /// the request. `None` if it cannot be advanced.
+    /// Earliest time to which a new reason can advance the next view request after a refusal. `None` if it cannot.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
@@ -602,7 +600,7 @@ impl ViewRequest {
         }
     }
 
-    /// Requests a view after about `wait`, which consecutive refusals double up to three times.
+    /// Requests a view (membership) after about `wait`. Consecutive refusals double the wait up to three times.
     ///
     /// [`request_now`](Self::request_now) ends the doubling.
     pub(super) fn request_after_refusal(&mut self, now: Instant, wait: Duration) {
@@ -630,8 +628,8 @@ impl ViewRequest {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer. Returns true if a view request must be sent: one is pending, or this relay is
-    /// `fresh` (no pass or view since its start).
+    /// Handles the expired timer of view requests. Returns true if a request must be sent: one is pending, or this
+    /// relay is `fresh` (no pass or view since its start).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {
@@ -657,7 +655,7 @@ impl ViewRequest {
         self.at
     }
 
-    /// Creates a pending view request that is due at `at`.
+    /// Creates a request for a new view that must be sent at `at`.
     #[cfg(test)]
     pub(super) const fn due(at: Instant) -> Self {
         Self {

@@ -50,10 +50,10 @@ pub(super) const VOTES: usize = 8;
 pub(crate) struct Electorate {
     /// Newest view that is known to be agreed on.
     pub(super) agreed: View,
-    /// True if this relay is a member of the view `agreed`, so that it has a vote.
+    /// True if this relay is a member of the view `agreed`, so that its vote counts.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted last. `None` once it is known to be agreed on.
+    /// View that this relay has accepted but does not know to be agreed on; `None` if there is none.
     pub(super) accepted: Option<Successor>,
     /// View proposals that this relay has voted on and that may still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
@@ -200,7 +200,7 @@ impl Electorate {
         true
     }
 
-    /// Records that all members have accepted the view that this relay accepted last.
+    /// Records that all members have accepted the view that this relay accepted last: it is agreed on.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
             self.learn(accepted.view);
@@ -243,14 +243,13 @@ pub(crate) fn decide(poll: &Poll, proposal: ViewId, relays: u16, all: u16) -> Op
 
 #[cfg(test)]
 impl Electorate {
-    /// Disables the quorum rule, so that a test can show that the model check finds the fault. Every decision counts
-    /// as agreed on, and every relay votes.
+    /// Disables the quorum rule, so that a test can show that the model check finds this fault.
     pub(super) fn count_everybody(&mut self) {
         self.commit();
         self.member = true;
     }
 
-    /// Returns true if this relay has voted on `proposal`, which may still become a view.
+    /// Returns true if this relay has voted on `proposal`, whose decision is not known yet.
     pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
         self.voted.contains(&proposal)
     }

@@ -99,7 +99,7 @@ fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     assert_eq!(found.what, ONE_CHAIN, "{}", found.how);
 }
 
-/// Checks the view change with more events than in the usual test; takes some minutes.
+/// Model check of the view change with more events than in the usual test; takes some minutes.
 #[test]
 #[ignore = "minutes"]
 fn chains_of_three_and_four_in_more_states() {
@@ -164,11 +164,11 @@ pub(super) struct Frame {
     pub(super) body: Body,
 }
 
-/// State of one relay in the model.
+/// State of one relay in the model of view changes.
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// Last accepted view, this relay's rank in the view, and the number of its members.
+    /// View that the relay accepted last, its rank in that view, and the view's number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -198,7 +198,7 @@ impl core::hash::Hash for RelayState {
     }
 }
 
-/// View that was decided on: with its size, the view that it replaces, and the relays that voted.
+/// Decided view of the model: its size, the view that it replaces, and the relays that voted.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct DecidedView {
     pub(super) view: SizedView,
@@ -214,7 +214,7 @@ pub(super) struct Chain {
     pub(super) parts: Vec<u8>,
     /// Frames that were sent and may still arrive, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
-    /// Views that were ever decided on.
+    /// Views that the relays of the model have ever decided on.
     pub(super) decided: Vec<DecidedView>,
     /// Views that were ever agreed on: all members have accepted them.
     pub(super) agreed: Vec<SizedView>,
@@ -224,7 +224,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
     /// Bit mask of the relays outside of the chain; bit 0 is the first relay.
     pub(super) outside: u8,
-    /// Number of departures and joins that may still happen.
+    /// Number of departures and joins that may still happen in this run of the model.
     pub(super) moves: u8,
 }
 
@@ -239,7 +239,7 @@ pub(super) enum ModelEvent {
     Passes(usize),
     Reboots(usize),
     Forgets(usize),
-    /// The relay leaves the chain, or joins it again.
+    /// Event: the relay with this list index leaves the chain, or joins it again.
     Moves(usize),
 }
 
@@ -259,7 +259,7 @@ impl Chain {
         (at + 1..self.parts.len()).find(|&other| self.are_linked(at, other))
     }
 
-    /// Returns true if two relays are inside of the chain and reach each other.
+    /// Returns true if two relays are both inside of the chain, and their link is not cut.
     fn are_linked(&self, one: usize, other: usize) -> bool {
         self.parts[other] == self.parts[one] && self.outside & (1 << one | 1 << other) == 0
     }
@@ -422,7 +422,7 @@ impl Check {
         }
     }
 
-    /// Returns the bit mask of the relays that have voted on the view `proposal`; bit 0 is the first relay.
+    /// Returns the relays that have voted on the view `proposal`, as a bit mask; bit 0 is the first relay.
     pub(super) fn voters(chain: &Chain, proposal: ViewId) -> u8 {
         let voters = chain.relays.iter().zip(0..);
         let voters = voters.filter(|(unit, _)| unit.change.electorate.has_voted(proposal));
@@ -434,7 +434,8 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Adds the pending messages of relay `at` to the frames under way. Records the decision in `effects`, if any.
+    /// Sends the pending messages of relay `at`: adds them to the model's frames under way. Records the decision in
+    /// `effects`, if any.
     pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
         let context = self.context(chain, at);
@@ -708,7 +709,7 @@ impl Check {
         None
     }
 
-    /// Returns true if every set of relays that is a quorum agrees on a view once its links are restored.
+    /// Returns true if every quorum of relays can still agree on a view once its links are restored.
     pub(super) fn is_alive(&self, chain: &Chain) -> bool {
         let all = ((1_u16 << chain.relays.len()) - 1) as u8;
         (1..=all).all(|there| {
@@ -824,7 +825,7 @@ impl Model for Check {
     }
 }
 
-/// Property that the model check has found violated, and the events that lead to the violation.
+/// Violated property that the model check has found, and the events that lead to the violation.
 pub(super) struct Counterexample {
     pub(super) what: &'static str,
     pub(super) how: String,

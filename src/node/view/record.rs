@@ -28,13 +28,13 @@ pub struct ViewRecord {
     electorate: Electorate,
 }
 
-/// Reason why a stored record was rejected.
+/// Reason why a stored record of the view votes is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// Record error: the relay that wrote the record had loaded another mission.
+    /// The relay that wrote the record had loaded another mission.
     Base,
-    /// Record error: the relay has already started, so that its votes cannot be restored.
+    /// The relay has already started, so that its votes cannot be restored any more.
     Begun,
 }
 
@@ -100,7 +100,7 @@ impl Reader<'_> {
 }
 
 impl ViewRecord {
-    /// Length of a stored record, bytes.
+    /// Length of a stored record of the view votes, bytes.
     pub const LENGTH: usize = 25 + 4 * VOTES;
 
     pub(crate) const fn new(base: u16, electorate: Electorate) -> Self {
@@ -129,7 +129,7 @@ impl ViewRecord {
         })
     }
 
-    /// Encodes the record for storage, without a checksum.
+    /// Encodes the record of the view votes for storage, without a checksum.
     pub fn to_bytes(&self) -> [u8; Self::LENGTH] {
         let said = &self.electorate;
         let accepted = said.accepted.unwrap_or(nothing_after(said.agreed));
@@ -182,7 +182,7 @@ impl ViewRecord {
     }
 }
 
-/// Returns the value that encodes "no accepted view", for a relay whose newest agreed view is `agreed`.
+/// Returns the value that the record stores for "no accepted view". `agreed` is the relay's newest agreed view.
 const fn nothing_after(agreed: View) -> Successor {
     Successor {
         proposal: ViewId::LOADED,
@@ -190,7 +190,7 @@ const fn nothing_after(agreed: View) -> Successor {
     }
 }
 
-/// Returns true if a relay can have the voting state `kept`. A record of any other state is invalid.
+/// Returns true if a relay can have the acceptor state `kept`. A stored record with any other state is invalid.
 fn is_sound(kept: &Electorate) -> bool {
     let Electorate {
         agreed, promised, ..
@@ -278,8 +278,7 @@ mod tests {
         assert_eq!(ViewRecord::from_bytes(&[0; ViewRecord::LENGTH]), None);
     }
 
-    /// Checks that a record with one changed byte is rejected, or encodes to the same bytes again. Every byte is
-    /// given every other value.
+    /// Checks that a stored record with one changed byte is rejected, or encodes to the same bytes again.
     #[test]
     fn impossible_votes_are_not_read() {
         let mut taken = 0;

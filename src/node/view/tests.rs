@@ -58,7 +58,7 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Makes this relay the last one that can be reached, so that it decides an outstanding view proposal.
+    /// Makes this relay the last one that can be reached. It then decides the view proposal that awaits a decision.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
@@ -377,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores a decision if it has stored a newer mission than the proposed one.
+/// Checks that a relay ignores a decision on a view if it has stored a newer mission than the view's.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();

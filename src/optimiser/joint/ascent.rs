@@ -6,98 +6,93 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed moves that an iteration tries, from the largest to the smallest. The next one is
-/// tried if the chain does not improve.
+/// Fractions of the relays' computed moves that one iteration of the joint method tries, in this order. The next one
+/// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// Initial trust region: limit of a relay's move in one iteration of the joint method. It is a fraction of the
-/// relay's distance from the interferer. The same number limits the change of the target SIR, in ln(SIR).
+/// Initial limit of a relay's move in one iteration of the joint method. It is a fraction of the relay's distance
+/// from the interferer. The same number limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust region (limit of a relay's move) at which an ascent's final target SIR is predicted. An ascent
-/// improves one chain. A smaller limit holds the relays back, so that the prediction would be too low.
+/// Minimum limit of a relay's move at which the final target SIR of a chain's improvement is predicted. A smaller
+/// limit holds the relays back, so that the prediction would be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust region (limit of a relay's move) below which an ascent ends, because it makes no progress. An ascent
-/// improves one chain. The limit is a fraction of the relay's distance from the interferer.
+/// Limit of a relay's move below which the improvement of a chain ends without progress. It is a fraction of the
+/// relay's distance from the interferer.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising target SIR is assumed to reduce the chain's spare length at Rx. It is in D per
-/// ln(SIR); D is the distance from Tx to Rx. Steps of the target are divided by the rate, so that a rate near 0 would
-/// make them too long. The usual rate is 0.5, since hop lengths vary as 1 / sqrt(SIR).
+/// Minimum rate at which a rising target SIR is assumed to shorten the chain. It is in units of the distance Tx to Rx
+/// per ln(SIR). The computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which a chain's limit of the target SIR is raised, in ln(SIR). At its limit a chain is checked
-/// against the upper bound of all chains. If it misses the bound, its limit is raised.
+/// First amount by which a chain's limit of the target SIR is raised, in ln(SIR). It is raised when the chain reaches
+/// the limit but misses the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
 /// First cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above the
-/// cap does not count, so that it cannot outweigh the penalty for relays too near the interferer.
+/// cap does not count, so that it cannot outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's spare length at Rx: the cap is not lowered below this value. It is a fraction of the
-/// distance from Tx to Rx.
+/// Smallest cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above
+/// the cap does not count, so that it cannot outweigh a penalty.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of a missing length when two chains are compared. A metre that a chain falls short of Rx counts as much as
-/// two metres of spare length.
+/// Weight of missing length relative to spare length when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Increase of the target SIR below which an iteration counts as idle, in ln(SIR). An ascent improves one chain in
-/// iterations. Two idle ones in a row end it.
+/// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
+/// improvement.
 const CLOSE: f32 = 3e-6;
 
-/// Expected increase of the target SIR below which an ascent ends, in ln(SIR). An ascent improves one chain.
+/// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of the target SIR below which an ascent's final target is predicted, in ln(SIR). An ascent
-/// improves one chain.
+/// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which an ascent (improvement of one chain) is checked for divergence. It has diverged
-/// if its chain falls short of Rx by more than `ASTRAY` D; D is the distance from Tx to Rx.
+/// Number of iterations after which a chain's improvement is checked for divergence. It diverges if the chain falls
+/// far short of Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Maximum length by which an improved chain may fall short of Rx to be improved once more. The next improvement has
-/// a lower cap on the chain's spare length. The value is a fraction of the distance from Tx to Rx.
+/// Largest shortfall from Rx with which a chain is improved again. It is a fraction of the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum AscentStep {
-    /// Try the fraction `share` of the relays' computed moves with the target `sigma`, in ln(SIR).
+    /// Try the fraction `share` of the relays' computed moves, with the target `sigma` = ln(SIR).
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
     /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
     /// first.
     Again,
-    /// End the ascent. It goes on only if a lower cap on the chain's spare length may improve the chain.
+    /// End the improvement of this chain, unless a lower cap on its spare length at Rx may help.
     Over,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Ascent {
-    /// Target SIR of the current chain, in ln(SIR).
+    /// Target SIR of the current chain, as ln(SIR).
     pub(crate) sigma: f32,
-    /// Slack of the current chain, m: the length by which it could reach beyond Rx at the target `sigma`. It is below
-    /// 0 if the chain is too short.
+    /// Slack of the current chain, m: the length by which it could reach beyond Rx at its target SIR. It is below 0
+    /// if the chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target SIR at which the chain is checked against the upper bound of all chains, in ln(SIR). If it meets the
-    /// bound, no chain can be better. If it misses the bound, this limit is raised.
+    /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If it misses the
+    /// bound, this limit is raised.
     limit: f32,
-    /// Next increase of `limit`, the target SIR at which the chain is checked, in ln(SIR). It is made if the chain
-    /// misses the upper bound of all chains.
+    /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
     excess: f32,
     /// Cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. It is lowered if relays
-    /// too near the interferer cause a penalty, so that spare length cannot outweigh the penalty.
+    /// are too near the interferer, so that spare length cannot outweigh the penalty for that.
     spare: f32,
     /// Penalty for relays too near the interferer, m. It is subtracted from the chain's spare length at Rx.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Derivative of the chain's spare length at Rx by the target in ln(SIR), m. It is below 0.
+    /// Change of the chain's spare length at Rx per unit of ln(target SIR), m; below 0.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -108,7 +103,7 @@ pub(crate) struct Ascent {
 }
 
 impl Ascent {
-    /// Ascent before the first start: all its bytes are 0.
+    /// Empty state before the first improvement of a chain: all its bytes are 0.
     pub(crate) const NONE: Self = Self {
         spare: 0.0,
         limit: 0.0,
@@ -117,8 +112,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Creates an ascent, which improves a chain. For the target `sigma` the chain has the spare length `slack` at
-    /// Rx, m. Targets are in ln(SIR), and never fall below `floor`.
+    /// Starts the improvement of a chain. It has the spare length `slack` at Rx, m, for the target `sigma`. Targets
+    /// are in ln(SIR), and never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -139,8 +134,8 @@ impl Ascent {
         }
     }
 
-    /// Returns this ascent with a `limit`: the target SIR at which its chain is checked, in ln(SIR). If the chain
-    /// then meets the upper bound of all chains, no chain can be better.
+    /// Returns this state with another `limit`, in ln(SIR). At this target the chain is checked against the upper
+    /// bound.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -164,8 +159,7 @@ impl Ascent {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the cap on the spare length at Rx if relays too near the interferer cause a penalty. Returns true if it
-    /// did.
+    /// Lowers the cap on the spare length at Rx if relays are too near the interferer. Returns true if it did.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -174,8 +168,8 @@ impl Ascent {
         true
     }
 
-    /// Continues the ascent after the cap on the spare length was lowered; returns the next action. `slack` is the
-    /// chain's spare length at Rx under the new cap, m.
+    /// Continues after the cap on the chain's spare length was lowered; returns the next action. `slack` is the spare
+    /// length at Rx under the new cap, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -183,14 +177,13 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the chain has to be checked against the upper bound of all chains. This is so if the target
-    /// SIR has reached its limit, and the chain meets that target.
+    /// Returns true if the chain meets the limit of its target SIR. It must then be checked against the upper bound.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the limit of the target SIR, and returns the next action. The chain has met the old limit, but was
-    /// found to miss the upper bound of all chains.
+    /// Raises the limit of the target SIR, because the chain meets it but misses the upper bound. Returns the next
+    /// action.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -202,15 +195,15 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results for one segment (ten relays) to the totals of the backward pass. These are the derivative of
-    /// the spare length at Rx by the target, and the gains expected from the relays' moves.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the
+    /// expected gains of the relays' moves, and the change of spare length with the target.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// Returns the next action after a backward pass, which has computed the moves of all relays.
+    /// Returns the next action once the backward pass has computed the moves of all relays.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -231,14 +224,13 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if the target SIR is nearly final: it can change by less than `by`, in ln(SIR). This must hold
-    /// for the effect of the chain's spare or missing length, and for that of the relays' moves.
+    /// Returns true if ln(target SIR) is expected to change by less than `by`, by spare length and moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the ascent diverges: after some iterations the chain still falls far short of Rx.
+    /// Returns true if the improvement diverges. The chain then still falls far short of Rx after some iterations.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
@@ -249,9 +241,8 @@ impl Ascent {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if this ascent is predicted to end no higher than the target `sigma`, in ln(SIR). The ascent
-    /// improves one chain; if it ends no higher than another one, it can be dropped. `turn` is its next action. The
-    /// result is false if no prediction is possible.
+    /// Returns true if this chain's improvement is predicted to end no higher than `sigma`, in ln(SIR). It can then
+    /// be dropped. `turn` is its next action. False if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -262,8 +253,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target that the chain is expected to just meet after a part of the moves, in ln(SIR). `share` is
-    /// the fraction of the relays' computed moves, 0 to 1.
+    /// Returns the target that the chain is expected to just meet, in ln(SIR). `share` is the fraction of the
+    /// computed moves that it makes.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -282,14 +273,14 @@ impl Ascent {
         }
     }
 
-    /// Returns the merit of a chain, in ln(SIR): the target for which no spare length at Rx would be left. For the
-    /// target `sigma` the chain has the spare length `slack`, m. A missing length counts twice.
+    /// Returns the merit of a chain: the target, as ln(SIR), at which it would just reach Rx. At the target `sigma`
+    /// its spare length is `slack`, m; a missing length counts twice.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current one. The trial has the spare length `slack` at Rx, m,
-    /// for the target `sigma`, in ln(SIR).
+    /// Returns true if a trial chain is better than the current one. At the target `sigma`, as ln(SIR), its spare
+    /// length at Rx is `slack`, m.
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -298,7 +289,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the action after a failed trial: a smaller fraction of the moves, or a smaller trust region.
+    /// Returns the action after a trial that did not improve the chain. It is a smaller fraction of the moves, or a
+    /// smaller limit of them.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -311,9 +303,8 @@ impl Ascent {
         turn
     }
 
-    /// Makes a successful trial the current chain; returns the next action. In the trial the relays made the fraction
-    /// `share` of their moves. The trial has the spare length `slack` at Rx, m, for the target SIR `sigma`, in
-    /// ln(SIR).
+    /// Makes the trial with the fraction `share` of the moves the current chain; returns the next action. It has the
+    /// spare length `slack` at Rx, m, for the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -332,8 +323,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after a search for the highest target of the unchanged chain; returns the next action. The search
-    /// found `sigma`, in ln(SIR), for which the chain has the spare length `slack` at Rx, m.
+    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR). Returns the next action.
+    /// `slack` is the chain's spare length at Rx for it, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

@@ -53,10 +53,9 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         }
     }
 
-    /// Returns the target SIR over the sender's gain for the hop to relay `index`; c in the formulas. The gain is the
-    /// sender's power relative to the interferer's. c determines the hop's maximum length. With noise c includes the
-    /// factor 1 + noise / interference at the sender's position `from`, because the position of relay `index` is not
-    /// chosen yet.
+    /// Returns c, the target SIR over the sender's gain, for the hop to relay `index`. The gain is the sender's power
+    /// relative to the interferer's. c determines the hop's maximum length. With noise c includes the factor 1 +
+    /// noise / interference at the sender's position `from`, because the position of relay `index` is not chosen yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -118,9 +117,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target from which on every hop has a maximum length, in ln(SIR). It is just above the largest gain
-    /// of a hop. With a lower target a hop may pass the interferer and be of any length, because its SIR tends to the
-    /// gain.
+    /// Returns the target, as ln(SIR), from which on every hop has a maximum length. It is just above the largest
+    /// gain of a hop: with a lower target a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -129,8 +127,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     }
 }
 
-/// Returns the lateral offset and altitude at which a relay at the x of Rx receives Tx best. Candidates are the
-/// limits of the ranges in `room`, and the lateral offset 0. The initial chain `Far` begins there.
+/// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. Candidates are the
+/// limits of the ranges in `room`, and the lateral offset 0.
 pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -147,8 +145,7 @@ pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Roo
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays in one segment of the chain; 0 without the feature `altitude`. The policies (computed moves) of
-/// one segment are in memory at a time.
+/// Number of relays in a segment, the part of the chain whose computed moves are in memory at a time.
 pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
     SEGMENT
 } else {
@@ -156,17 +153,17 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of a segment of the chain: x before the segment, and derivatives at its last relay. They are the
-/// derivatives of the chain's slack by that relay's position. The slack is the maximum length of a chain that meets
-/// the target, less the distance from Tx to Rx.
+/// Stored state of one segment (ten relays) of the chain. It has the x before it, and derivatives of the chain's
+/// spare length at its last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
-    /// x of the relay before the segment, m.
+    /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack by the position of the segment's last relay, m/m.
+    /// First derivatives of the chain's spare length at Rx, m/m. They are by the position of the segment's last
+    /// relay.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack by the position of the segment's last relay, 1/m. The order is xx, xy,
-    /// xh, yy, yh, hh.
+    /// Second derivatives of the chain's spare length at Rx, 1/m. They are by the position of the segment's last
+    /// relay. The order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 
@@ -211,7 +208,7 @@ pub(super) fn last_of(mission: &Mission) -> u8 {
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// Returns each relay of `segment` as its number within the segment and its index in the chain.
+/// Returns the relays of a segment: each with its number in the segment, from 0, and in the chain.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
     // Counted in u16 at both ends, since zipping two ranges backward may panic.
@@ -231,7 +228,7 @@ pub struct Seat {
 }
 
 impl Seat {
-    /// Returns the profile that the mission gives to every relay without one of its own.
+    /// Returns the profile that the mission gives to relays without a profile of their own.
     pub const fn common(mission: &Mission) -> Self {
         Self {
             room: Room::of(mission),

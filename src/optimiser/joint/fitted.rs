@@ -26,30 +26,30 @@ use crate::sir::{Sender, in_noise, square, transmitter_gain};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions that a pass tries for each relay: its current one, and two on either side.
+/// Number of positions per relay that a pass combines: the current one and two on either side.
 const STATES: usize = 5;
-/// Moves of a relay that a pass tries, in widths. The first one is preferred among equals.
+/// Moves of a relay that a pass tries, in units of the current step width. The first one is preferred among equals.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Bits of a state's number in the stored choices of a relay.
+/// Number of bits in which a relay's choice among the states of the relay before it is stored.
 const BITS: usize = 3;
 
-/// Width of the moves at which the search of one initial chain ends.
+/// Step width at which the search from one initial chain ends. It is a fraction of the distance from Tx to Rx.
 const NARROWEST: f32 = 1.0 / 131_072.0;
-/// Relative gain of a round of passes below which the width is halved.
+/// Relative gain of a round of passes below which the step width of the moves is halved.
 const LITTLE: f32 = 1e-3;
-/// Maximum number of rounds of passes per initial chain.
+/// Maximum number of rounds of passes over one initial chain.
 const ROUNDS: u8 = 200;
 
-/// Number of relays of a pass that one portion of the work takes.
+/// Number of relays for which one call of the solver continues a pass.
 const AT_ONCE: u16 = 3;
-/// Number of relays that one portion of other work takes.
+/// Number of relays that one call of the solver handles in all work but passes.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to each squared hop length, in units of D^2, so that no time is 0.
+/// Amount added to each squared hop length, so that no hop time is 0. In units of the squared distance Tx to Rx.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, and first width of the moves. All are fractions of the distance
-/// from Tx to Rx. Relays whose first x is their last are gathered there, at their minimum separation.
+/// Initial chains: first and last x of the relays, and first step width of the moves. All are fractions of the
+/// distance from Tx to Rx. If both x are equal, the relays start there, at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -60,12 +60,13 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Number of the initial chain that is the best one along the line. Only if relays may leave the common altitude.
+/// Number of the initial chain that starts from the best one along the line. Used only if relays may leave the common
+/// altitude.
 const BEST: u8 = 8;
-/// First width of the moves of that chain.
+/// First step width of the moves from the best chain along the line. It is a fraction of the distance from Tx to Rx.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Cross-sections of the initial chains after it. The first number is a fraction of the largest lateral offset away
-/// from the interferer, the second one of the altitude band above the common altitude.
+/// Lateral offset and altitude of further initial chains, as two fractions. The first is of the largest lateral
+/// offset away from the interferer, the second of the altitude range above the common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
@@ -92,12 +93,12 @@ pub struct SlotShares {
     pub bits_per_hz: f32,
 }
 
-/// Gains over the SNR gap. SINR over gap is the gain times the inverse interference at the receiver, over the squared
-/// hop length. The gains at Rx and Tx include the interference there.
+/// Gains of the hops, each divided by the SNR gap. SINR over the gap is the gain times the inverse interference at
+/// the receiver, over the squared hop length. At Rx and Tx the gain includes the interference.
 #[derive(Clone, Copy, Debug)]
 struct Gains {
     source: Triple,
-    /// Receiver noise over the interferer's power received at the distance D.
+    /// Receiver noise over the interferer's power received at the distance from Tx to Rx.
     noise: f32,
     relay_per_w: f32,
     to_rx_per_w: f32,
@@ -106,15 +107,14 @@ struct Gains {
     from_rx: f32,
 }
 
-/// Node of the chain at a position that is tried: the position, and the inverse interference there. That is 1 at Tx
-/// and Rx.
+/// Position that is tried for a node, and the inverse interference there; 1 at Tx and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
     quiet: f32,
 }
 
-/// Position that is tried for one relay, and the least time of the hops before it.
+/// Position that is tried for one relay, and the shortest total time of the hops up to it.
 #[derive(Clone, Copy, Debug)]
 struct State {
     spot: Spot,
@@ -131,17 +131,19 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains over the SNR gap, forward and backward, and r. Relays also have a least distance.
+/// Hop between two nodes: its gains over the SNR gap, r (share of data back), and minimum separation. The gains are
+/// forward and backward.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Least squared distance of two relays, in units of D^2; `None` if an end is Tx or Rx.
+    /// Minimum squared distance of the two relays, in units of the squared distance Tx to Rx. `None` if an end is Tx
+    /// or Rx.
     apart: Option<f32>,
 }
 
 impl Hop {
-    /// Returns SINR over gap, forward and backward.
+    /// Returns the SINR over the SNR gap, linear, forward and backward.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -149,7 +151,8 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the time of a bit to Rx and of r bits back. Infinite if two relays are too close or in the wrong order.
+    /// Returns the times for one bit to Rx and for r bits back. Infinite if two relays are too close or in the wrong
+    /// order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -185,38 +188,38 @@ enum Work {
     Sum(u16),
 }
 
-/// Solver of a chain with fitted slots.
+/// Solver of a chain with fitted slots: time slots as long as each hop needs. It maximises the data rate.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. Once the chain is solved, `[there, back, _]`: the sums of the times of the hops to
+    /// Positions of the best chain. In the end their first two values are replaced by the sums of the hop times up to
     /// each relay, toward Rx and back.
     best_places: [Triple; RELAYS],
-    /// Best state of the relay before, for each state of a relay: three bits each.
+    /// Best state of the previous relay for each of a relay's five states: three bits per choice.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
-    /// Number of the current initial chain.
+    /// Number of the initial chain that is being improved, from 0.
     number: u8,
     rounds: u8,
-    /// Coordinate that the current pass changes: 0, 1, 2 for x, y, altitude.
+    /// Coordinate that the current pass changes: 0 for x, 1 for y, 2 for the altitude.
     axis: u8,
     width: f32,
-    /// Time of the current chain; infinite if relays are too close.
+    /// Total hop time of the current chain, which is minimised; infinite if relays are too close.
     time: f32,
-    /// Time of the current chain before the current round of passes.
+    /// Total hop time of the chain before the current round of passes.
     before: f32,
-    /// Time of the best chain; 0 before the first.
+    /// Total hop time of the best chain found; 0 before the first.
     best: f32,
-    /// Sums of the times of the solved chain's hops, toward Rx and back.
+    /// Sums of the hop times of the solved chain, toward Rx and back.
     sums: [f32; 2],
     worst: f32,
 }
 
 impl<const RELAYS: usize> Fitted<RELAYS> {
-    /// State of the solver before its first portion of work. All its bytes are 0, so it takes no flash.
+    /// State of the solver before its first call. All its bytes are 0, so it takes no flash.
     pub(super) const NEW: Self = Self {
         gains: Gains {
             source: [0.0; 3],
@@ -243,7 +246,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         worst: 0.0,
     };
 
-    /// Processes one portion of the solution; ready with the worst SIR, linear, at the end.
+    /// Continues the solution by one bounded portion. Ready at the end, with the linear SIR of the worst hop.
     pub(super) fn step(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -410,7 +413,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after a pass whose best combination of moves takes `time`, with the last relay in `state`.
+    /// Continues after a pass. Its best combination of moves has the total hop time `time`, with the last relay in
+    /// `state`.
     fn conclude(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
@@ -420,7 +424,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Moves relays toward Tx from relay `index` on, which is in `state`.
+    /// Moves relays to their best positions, from relay `index` (which is in `state`) toward Tx.
     fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
@@ -438,7 +442,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the coordinate and the width of the next pass. After the last one the chain is kept if it is the best.
+    /// Selects the coordinate and the step width of the next pass. After the last one the chain is kept if it is the
+    /// best.
     fn next_pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
         let config = chain.mission.config();
         self.axis += 1;
@@ -470,7 +475,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the times of the hop to node `index` of the current chain. Lowers `worst` to the hop's worse SIR.
+    /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the hop's worse SIR.
     fn hop_times(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -490,7 +495,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of the slot to Rx of hop `hop`, 0..=N + 1, and the begin of its slot back. 0 and 1 for hop 0.
+    /// Returns two bounds of slots of hop `hop`, as shares of the frame. They are the end of its slot toward Rx, and
+    /// the begin of its slot back. For hop 0 these are 0 and 1; `hop` is at most N + 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
@@ -536,7 +542,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains: more if relays may choose their lateral offsets or altitudes.
+/// Returns the number of initial chains. It is larger if relays may choose lateral offsets or altitudes.
 fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {
@@ -568,7 +574,7 @@ impl Gains {
         in_noise(square(x) + square(y) + square(h), self.noise)
     }
 
-    /// Returns the hop to node `index`, 1..=N + 1.
+    /// Returns the gains of the hop to node `index`, 1 to N + 1 (Rx).
     fn hop(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Hop {
         let config = chain.mission.config();
         let relays = config.relays;

@@ -66,8 +66,8 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end is at the x of Rx, or at the rim of what the hop reaches: all are 0. No
-    /// coordinate of such an end depends on the others, on the hop's start, or on the target.
+    /// Derivatives of a hop's end that cannot move. It is at the x of Rx, or at the limit of what the hop reaches.
+    /// All are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -217,9 +217,8 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition s + `spare` >= `c` l for a hop to meet its target. s and l are the squared distances of the hop's end
-/// from the interferer and from the sender, m^2. `c` is target SIR over gain; with noise it is larger, and `spare` is
-/// above 0.
+/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s and l are the squared distances of its end from
+/// the interferer and from the sender, m^2. `c` is the target over the gain, larger with noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,

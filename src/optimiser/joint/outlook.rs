@@ -11,8 +11,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's spare length at Rx as a function of one position. It is a
-/// quadratic model about the current position of one relay, and assumes that later relays react optimally.
+/// Value function of the joint method: the chain's spare length at Rx by one relay's position. It is a quadratic
+/// model. It assumes that the relays after it react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
@@ -21,13 +21,11 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a in the predicted gain a f + b f^2 of slack (spare length at Rx), m.
-    ///
-    /// f is the fraction of their computed moves that the relays toward Rx make.
+    /// Coefficient a of the spare length at Rx gained by the relays' moves, a f + b f^2, m. f is the fraction of
+    /// their computed moves that the relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient b in the predicted gain a f + b f^2 of slack (spare length at Rx), m.
-    ///
-    /// f is the fraction of their computed moves that the relays toward Rx make.
+    /// Coefficient b of the spare length at Rx gained by the relays' moves, a f + b f^2, m. f is the fraction of
+    /// their computed moves that the relays toward Rx make.
     pub(crate) square: f32,
 }
 
@@ -58,9 +56,8 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
-    /// distance that is missing, m^2; `slope` and `by_target` are its derivatives by the relay's position and by the
-    /// target in ln(SIR).
+    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the missing
+    /// squared distance, m^2; `slope` and `by_target` are its derivatives by position and ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -74,9 +71,9 @@ impl Outlook {
         }
     }
 
-    /// Propagates the value function from `hop`'s receiver to its sender; returns the receiver's policy. The policy
-    /// is a move of the receiver in two coordinates, within [`low`, `high`], m, relative to its current position. The
-    /// third coordinate, `axis`, then follows from the hop's maximum length.
+    /// Converts the value function (chain's spare length) of a hop's receiver to that of its sender. Returns the
+    /// receiver's policy. The policy is a move of the receiver in two coordinates, within [`low`, `high`], m,
+    /// relative to its current position. The third coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -162,18 +159,17 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True to take the larger of two solutions for the relay's third coordinate. A hop of maximum length can end at
-    /// two positions with the same first two coordinates.
+    /// True to select the larger of two solutions for the relay's third coordinate. At both the hop has its maximum
+    /// length.
     pub(super) rising: bool,
-    /// Move of the relay in its two free coordinates if the relay that sends to it has not moved, m.
+    /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
-    /// Additional move of the relay in each free coordinate for a move of the sending relay. It is in m per m that the
-    /// sending relay moves in x, y and h.
+    /// Additional move of the relay in each free coordinate per metre of the sending relay's move. That is in x, y
+    /// and h.
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature of the value function, relative to its largest curvature. A relay's move is divided by the
-/// curvature, and a smaller one would be only rounding noise.
+/// Minimum curvature of the value function, relative to its largest. A smaller one would be rounding noise.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
@@ -283,7 +279,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// Compressed [`Policy`]: the derivatives are stored with three digits, which is sufficient.
+/// Compressed [`Policy`] (a relay's move). Three digits of each derivative are stored, which is sufficient.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,

@@ -13,19 +13,17 @@ use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::{Sender, in_noise, square};
 
-/// Fraction of the squared maximum length of a hop that the joint method uses. The rest is a margin for rounding
-/// errors.
+/// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
 const RIM: f32 = 0.999_99;
 
-/// Factor by which the joint method increases the minimum separation. Its positions may violate the separation
-/// slightly, and the margin makes that harmless.
+/// Factor on the minimum separation in the joint method. Rounding then cannot violate the true separation.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Number of Newton steps in the computation of a hop with noise. Each step linearises the hop's condition at the end
-/// found so far (see [`Tangent`]).
+/// Number of Newton steps in the computation of a hop with noise. Each linearises the hop's condition at the latest
+/// result (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
-/// Number of bisection steps by which [`Site::halved`] finds the farthest reachable point of a path.
+/// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
 const HALVINGS: u8 = 12;
 
 /// Relay whose position the joint method computes, with the sender of the hop to it.
@@ -71,7 +69,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns this relay without the minimum separation from its sender.
+    /// Returns this relay without the required minimum separation from its sender.
     pub(crate) fn unparted(self) -> Self {
         Self {
             apart_m: 0.0,
@@ -346,7 +344,7 @@ fn toward(
 
 const LAST: f32 = 16_777_215.0;
 
-/// Stored lateral offset and altitude of one relay. Each takes three bytes, as a fraction of its allowed range.
+/// Stored lateral offset and altitude of one relay. Each has three bytes, as a fraction of the allowed range.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) struct Cell([u8; 6]);
 
@@ -416,9 +414,9 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Lateral offsets that the relay may choose from, m.
+    /// Range of the lateral offsets that the relay may choose from, m.
     pub lateral: Band,
-    /// Altitudes that the relay may choose from, m.
+    /// Range of the altitudes that the relay may choose from, m.
     pub band: Band,
 }
 
@@ -450,7 +448,7 @@ impl Room {
     }
 }
 
-/// Factor on the maximum SIR of the first or last hop, which gives the upper bound of the chain's SIR. The margin
+/// Factor that turns the maximum SIR of the first or last hop into the upper bound of the chain's SIR. The margin
 /// leaves the first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
@@ -547,9 +545,9 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns the squared distance by which a relay at `to` is too near the interferer, m^2, or 0. The second result
-    /// is the weight of the penalty for that, the third the derivative of the squared distance by the target in
-    /// ln(SIR). `c` is the target SIR over the sender's gain.
+    /// Returns by how much a relay at `to` is too near the interferer, in squared distance, m^2, or 0. The second
+    /// result is the weight of the penalty for that. The third is the derivative of the first by ln(target SIR). `c`
+    /// is the target SIR divided by the sender's gain.
     ///
     /// A hop of maximum length from p to p' that ends near the interferer at m is short. It violates the minimum
     /// separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with the inverse q of interference plus noise.

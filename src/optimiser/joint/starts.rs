@@ -37,8 +37,7 @@ pub(super) enum Start {
     /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
     /// it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
-    /// Initial chain at the lowest altitude, for a high target. The target is so high that no hop can pass the
-    /// interferer in one leap.
+    /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
     Near,
     /// Initial chain with relay 1 at the x of Rx, high above it or far to its side. The lateral offsets and altitudes
     /// of the other relays lead down from there in equal steps.
@@ -57,7 +56,7 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of entries of [`ARCHES`], the first ones, that are also tried without a minimum separation.
+/// Number of first entries of [`ARCHES`] that are also tried without the minimum separation of relays.
 const THROUGH: usize = 3;
 
 /// Initial chains for relays of which some have a fixed altitude. Each has the lateral offset of its middle, in units
@@ -87,8 +86,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral path about the interferer. On it the logarithm of the distance from the interferer changes linearly with
-/// the angle.
+/// Spiral about the interferer. The logarithm of the distance from it changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,
@@ -130,7 +128,7 @@ impl Way {
     }
 }
 
-/// Minimum divisor in the computation of a spiral, so that it never divides by 0.
+/// Minimum divisor in the computation of a spiral, which prevents a division by 0.
 const SHORTEST: f32 = 1e-6;
 
 /// Maximum tangent of the angle by which one hop of a spiral turns about the interferer.
@@ -175,8 +173,8 @@ impl Start {
         })
     }
 
-    /// Returns the lateral offset and altitude of relay `index` in a zigzag chain. Relays alternate between two
-    /// lateral offsets, `apart_m` apart; `room` has the allowed ranges.
+    /// Returns the lateral offset and altitude of relay `index` in a zigzag chain. Neighbours differ by `apart_m` in
+    /// the lateral offset; `room` has the allowed ranges.
     pub(super) fn in_turn(
         index: u16,
         interferer: &Interferer,
@@ -244,7 +242,7 @@ impl Start {
         }
     }
 
-    /// Returns a relay's lateral offset and altitude in this initial chain. The relay that sends to it is at x = `x_m`.
+    /// Returns the lateral offset and altitude of a relay in this initial chain. The previous relay is at x = `x_m`;
     /// `distance_m` is the distance from Tx to Rx, and `room` has the allowed ranges.
     pub(super) fn across(self, distance_m: f32, x_m: f32, room: Room) -> CrossSection {
         let (aside, up) = match self {
@@ -264,8 +262,8 @@ impl Start {
 /// Bisection for the highest feasible target SIR of a chain, in ln(SIR).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest target found feasible, in ln(SIR). The `bool` is true if some relays have to stay short of their
-    /// farthest position to meet it. `None` before any.
+    /// Highest target found feasible, in ln(SIR); `None` before any. The `bool` is true if some relays have to stay
+    /// short of their farthest x to meet it.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -302,7 +300,7 @@ impl Seek {
         }
     }
 
-    /// Records the result of the current target; returns true if there is another one to try.
+    /// Records if the chain meets the target that was tried; returns true if there is another one to try.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
     /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
@@ -338,5 +336,5 @@ impl Seek {
     }
 }
 
-/// Maximum step between two targets, in ln(SIR). If the next step would be longer, the search ends.
+/// Maximum step between two targets, in ln(SIR). The search ends instead of a longer step.
 const MOST_STEP: f32 = 40.0;

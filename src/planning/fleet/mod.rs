@@ -38,17 +38,17 @@ pub struct Fewest {
     pub proven: bool,
 }
 
-/// Highest target SIR that a chain of any number of relays meets.
+/// Highest target SIR that any number of relays meets, and the fewest relays that meet it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Most {
-    /// Highest target SIR that is met, linear, with a relative error of 1e-6.
+    /// Highest target SIR that can be met, linear, with a relative error of 1e-6.
     pub target: f32,
-    /// Minimum number of relays that meets `target`.
+    /// Minimum number of relays with which the chain reaches `target`.
     pub relays: u16,
 }
 
-/// Lowest target searched by [`Most::of`], as a fraction of the highest possible SIR of the first hop.
+/// Lowest target SIR of [`Most::of`], as a fraction of the highest possible SIR of the first hop.
 const DEPTH: f32 = 1e-20;
 
 /// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
@@ -56,8 +56,8 @@ const DEPTH: f32 = 1e-20;
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// Returns the minimum number of relays for `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR
-    /// above 0.
+    /// Returns the minimum number of relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`]. `target` is
+    /// a linear SIR above 0.
     ///
     /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive
     /// count if `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a
@@ -132,8 +132,8 @@ impl Mission {
     }
 }
 
-/// Returns the minimum number of relays for `target`; `None` if no number of relays meets it. The result's field
-/// `proven` is only valid for a mission without a minimum separation.
+/// Returns the minimum number of relays that meet `target`; `None` if no number does. The result's `proven` is valid
+/// only for missions without a minimum separation.
 fn counted(mission: &Mission, target: f32, profile_of: &impl Fn(u16) -> Profile) -> Option<Fewest> {
     if mission.field().is_some() && alike(MAX_RELAYS, profile_of) {
         fewest_of_equals(mission, target, profile_of(1))
@@ -262,7 +262,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     }
 }
 
-/// Maximum number of relays that are added if the minimum separation makes the minimum number fail.
+/// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
 const MORE: u16 = 32;
 
 #[cfg(feature = "internals")]

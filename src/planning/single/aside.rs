@@ -77,31 +77,30 @@ use crate::place::Placement;
 
 pub use super::edge::EdgeCoordinate;
 
-/// Number of bisection steps, in f64: enough for an error far below an f32's step.
+/// Number of bisection steps in f64; the remaining error is far below a step of an f32.
 const HALVINGS: u8 = 48;
 
 /// Geometric case of the optimal position of a single relay that may move sideways.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
-    /// Optimum where the circles of constant SIR_1 (first hop) and SIR_2 (second hop) touch. It is at the lowest
-    /// altitude.
+    /// Optimum at the lowest altitude, where the circles of constant SIR of both hops touch.
     Touching,
-    /// Optimum at the lowest altitude and the maximum of the first hop's SIR. This maximum is still below the second
-    /// hop's SIR there.
+    /// Optimum at the lowest altitude, where the first hop's SIR is at its maximum. The second hop's SIR is higher
+    /// there.
     Hilltop,
     /// Optimum above Rx, at the lowest altitude: the first hop's SIR is the higher one there.
     AboveRx,
-    /// Optimum on an edge of the box of allowed positions, along this coordinate. The optimum without limits is
-    /// outside the box.
+    /// Optimum on an edge of the box of allowed positions, along this coordinate. Without the box it would be
+    /// elsewhere.
     Edge(EdgeCoordinate),
     /// Optimum above Rx: the interferer is at Tx (X = Y = 0), so the SIR of the first hop is constant.
     Level,
     /// Optimum on a vertical face of the box of allowed positions, with noise. The curves of constant SIR of the two
     /// hops touch there.
     Wall,
-    /// Optimum inside the allowed lateral range, at the lowest or highest altitude, with noise. Found by a search
-    /// without a proof of optimality.
+    /// Optimum at the lowest or highest altitude, inside the allowed lateral range; only with noise. Found by a
+    /// search, without a proof.
     Inside,
     /// Optimum above Rx: the interferer is at Rx (X = D, Y = 0), so the second hop's SIR is always 0.
     Drowned,
@@ -219,7 +218,7 @@ fn holds(band: Band, value: f32) -> bool {
     (band.least_m..=band.most_m).contains(&value)
 }
 
-/// Returns the optimal position at `altitude_m`, without limits in x and y, and its case.
+/// Returns the optimal position of a single relay at `altitude_m`, without limits of x and y.
 fn without_limits(
     mission: &Mission,
     interferer: &Interferer,
@@ -243,8 +242,8 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude h, with all numbers that determine both hops' SIRs in it. In m and m^2: Tx-Rx
-/// distance D, interferer (X, Y), h^2, ratio G = K / A of the gains of both hops, noise nu.
+/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs in it. They are D (distance
+/// Tx-Rx), interferer (X, Y), h^2, ratio G = K / A of the hops' gains, and noise nu, in m and m^2.
 struct Plane {
     d: f64,
     x: f64,
@@ -285,7 +284,7 @@ impl Plane {
         (self.loudest(high), AsideCase::Touching)
     }
 
-    /// Returns SIR_1 / A at (x, y), the SIR of the first hop over its gain.
+    /// Returns the first hop's SIR over its gain A, with the relay at (x, y) in this plane.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
@@ -342,7 +341,8 @@ impl Plane {
         at(low * far)
     }
 
-    /// Returns SIR_2 / A, the second hop's SIR over the first hop's gain. `s` is the ground distance from Rx.
+    /// Returns the second hop's SIR over the first hop's gain A. `s` is the relay's distance from Rx along the
+    /// ground, m.
     fn second(&self, s: f64) -> f64 {
         self.g / (squared(s) + self.h2)
     }

@@ -75,9 +75,9 @@ use crate::sir::{self, Sender};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum EdgeCoordinate {
-    /// Edge along x, from Tx toward Rx.
+    /// Position varies from Tx toward Rx: edge along x.
     Along = 4,
-    /// Edge along y, across the line Tx to Rx.
+    /// Position varies across the line Tx to Rx: edge along y.
     Across = 5,
     /// Vertical edge: the altitude varies.
     Upward = 6,
@@ -125,8 +125,8 @@ impl Edge {
         place
     }
 
-    /// Returns the extrema of both hops' SIRs along the edge, as values of the coordinate that varies, m. They are
-    /// computed in f64; missing ones are NaN, or far away.
+    /// Returns the extrema of both hops' SIRs along the edge, as values of the varying coordinate, m. Missing ones
+    /// are NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let squared = |x: f64| x * x;
@@ -234,7 +234,7 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Maximum number of times that t is doubled to find a t at which a condition no longer holds.
+/// Maximum number of doublings of t until a condition no longer holds.
 const DOUBLINGS: u8 = 100;
 
 /// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. Missing ones are NaN.
@@ -260,8 +260,8 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     slope.turns().map(|t| libm::copysign(1.0, p) * t)
 }
 
-/// Function phi(t) whose sign for t > 0 is that of the slope of the first hop's SIR along an edge. t is the position
-/// on the edge. `p`, the t closest to the interferer, is above 0.
+/// Function phi(t) with the sign of the slope of the first hop's SIR along an edge, for t > 0. t is the position on
+/// the edge. `p`, the t closest to the interferer, is above 0.
 struct Slope {
     p: f64,
     a: f64,
@@ -334,13 +334,13 @@ fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
     at
 }
 
-/// Number of lines along x on either side of y = 0 in the search for the best position at one altitude.
+/// Number of lines of constant y on either side of y = 0 that the search at one altitude evaluates.
 const LINES: u8 = 24;
 
-/// Number of the best lines along x that are refined. The best position at one altitude is searched on such lines.
+/// Number of lines of constant y near which the search at one altitude is refined: the best ones.
 const FOLLOWED: usize = 3;
 
-/// Number of golden-section steps in y near each of the best lines along x.
+/// Number of golden-section steps in y near each of the best lines of constant y.
 const STEPS: u8 = 32;
 
 const GOLDEN: f32 = 0.618_034;
@@ -411,8 +411,8 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts the line `new` into the list of the best lines along x if it is better than one of them. The best one is
-/// first. Each entry has the best SIR on the line, and the y of the lines on either side.
+/// Inserts the line of constant y `new` into the list of the best lines if it is better than one. Each entry has the
+/// best SIR on the line, and the y of the lines on either side.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
@@ -464,8 +464,8 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0, with all numbers that determine both hops' SIRs in it. In m and m^2: Tx-Rx distance D,
-/// interferer's X, (y0 - Y)^2, y0^2, noise nu, ratio G = K / A of the gains of both hops.
+/// Vertical plane y = y0, with the numbers that determine both hops' SIRs in it. They are D (distance Tx-Rx),
+/// interferer's X, (y0 - Y)^2, y0^2, noise nu, and ratio G = K / A of the hops' gains, in m and m^2.
 struct Face {
     d: f64,
     x: f64,

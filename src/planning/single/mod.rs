@@ -24,7 +24,7 @@ use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
 
-/// Number of bisection steps for the x at which both SIRs are equal: to an f32's step, even near Tx.
+/// Number of bisection steps for the x at which both hops have the same SIR; exact to a step of an f32.
 const HALVINGS: u8 = 40;
 
 /// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field it is the
@@ -45,7 +45,7 @@ impl Found {
     }
 }
 
-/// SIRs of both hops of a mission with a single relay. The relay is above the line Tx to Rx, at one altitude.
+/// SIRs of both hops of a chain with a single relay, above the line Tx to Rx at one altitude.
 #[derive(Clone, Copy)]
 struct Two<'a> {
     mission: &'a Mission,
@@ -72,8 +72,8 @@ impl Two<'_> {
         }
     }
 
-    /// Returns the position between `low` and `high` at which SIR_1 (first hop) falls below SIR_2 (second). `low` and
-    /// `high` are x, m. The result is the better of the two f32 values of x next to the crossing.
+    /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's. Of the
+    /// two adjacent f32 values of x it is the better one.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {

@@ -281,8 +281,8 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Place of the optimum among the allowed x and altitudes: an edge of their rectangle, or its inside. An edge is
-/// given with its case; an optimum on a corner is on the first of its edges.
+/// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or its inside. An optimum on a
+/// corner is on the first of its edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
@@ -333,11 +333,12 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
-    /// Ratio C_1: below it the first hop is the worse one even right above Tx. It is 0 with the interferer at Rx.
+    /// Ratio C_1: if p_t / p_u is below it, the first hop is the worse one even right above Tx. 0 with the interferer
+    /// at Rx.
     pub c1: f32,
-    /// Ratio C_2: above it the first hop is the better one even right above Rx.
+    /// Ratio C_2: if p_t / p_u is above it, the first hop is the better one even right above Rx.
     pub c2: f32,
-    /// Ratio C_3: above it the first hop is the better one even at the minimum of its SIR.
+    /// Ratio C_3: if p_t / p_u is above it, the first hop is the better one even at the minimum of its SIR.
     ///
     /// The minimum is between Tx and Rx or beyond. `None` without a minimum, as for an interferer at X <= 0. With
     /// noise it is the minimum before the maximum.

@@ -35,9 +35,9 @@ use crate::sir::square;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Noise {
-    /// Noise power at the relay's receiver, W.
+    /// Receiver noise power of the relay, W.
     pub relay_w: f32,
-    /// Noise power at the ground receiver Rx, W.
+    /// Receiver noise power of the ground receiver Rx, W.
     pub receiver_w: f32,
 }
 
@@ -69,8 +69,8 @@ pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found
     }
 }
 
-/// Returns the position between `low` and `high`, x in m, with the largest SIR of the worse hop. The first hop's mean
-/// SIR must only rise or only fall there.
+/// Returns the position between the x `low` and `high`, m, at which the worse hop has its largest SIR. The first
+/// hop's mean SIR must only rise or only fall there.
 fn best_of(two: &Two, low: f32, high: f32) -> Found {
     let ends = two.found(low).or(two.found(high));
     if two.first(low) <= two.second(low) || two.first(high) >= two.second(high) {

@@ -7,8 +7,7 @@ use crate::view::ViewId;
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
 
-/// Hello message: the sender's neighbour, received nodes, connected relays, view and mission. Neighbour and received
-/// nodes are those on the side to which the message is sent.
+/// Hello message: the sender's neighbour, the nodes that it receives, its view and its mission.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "eight flags of the wire format"
@@ -22,9 +21,9 @@ pub struct Hello {
     pub latest_view: ViewId,
     /// Node number of the sender's neighbour on the side to which this message is sent; 0 for none.
     pub neighbour: u16,
-    /// True to request a hello in return.
+    /// True if the sender requests a hello in return.
     pub requests_reply: bool,
-    /// True to request a new view.
+    /// True if the sender requests a new view (agreed members of the chain).
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
@@ -35,8 +34,8 @@ pub struct Hello {
     /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are
     /// the connected relays from the sender to the end of the chain away from the destination.
     pub behind: u16,
-    /// Bit set of the nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3,
-    /// stands for the node whose number differs from the sender's by i + 1.
+    /// Nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3, stands for the node
+    /// whose number differs from the sender's by i + 1.
     pub hears: u8,
     /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,

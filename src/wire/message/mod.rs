@@ -25,12 +25,10 @@ use self::parts::{PassId, Word, read, tag, write};
 use super::upload::{UPLOAD, Upload};
 use crate::guard::Fence;
 
-/// Maximum length of a sweep message's body, bytes. Such a body has data for sixteen target SIRs, and the measured
-/// interference (Upsilon = E[1/I]) or a lateral offset.
+/// Maximum length of a sweep message's body, bytes. A sweep carries target SIRs along the chain.
 const SWEEP: usize = 88;
 
-/// Maximum length of a message body, bytes, without regard to mission offers. The longest message is the one that
-/// collects measurements, or a sweep if the feature `sensing` is off.
+/// Maximum length of a message body other than a mission offer, bytes.
 const LONG: usize = if cfg!(feature = "sensing") {
     round::HEARD
 } else {
@@ -52,9 +50,9 @@ pub const MAX_BODY: usize = LONG;
 /// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Message to the next relay of a pass: target SIRs, and the farthest x at which the sender meets each.
+    /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each.
     Sweep(Sweep),
-    /// Reply to a sweep: its verdict, the result for each target. It acknowledges the sweep of the same number.
+    /// Reply to a sweep of target SIRs: its verdict, the result for each target.
     Verdict(SweepVerdict),
     /// Reply to a duplicate of a pass message or view proposal that has no result yet.
     Busy {
@@ -70,17 +68,17 @@ pub enum Message {
         /// Number of the destination's heartbeat request that is answered, 0 for none.
         reply: u16,
     },
-    /// Message to the next relay of a pass: profiles (altitude and power) of all relays so far.
+    /// Message to the next relay: profiles (altitude and power) of all relays so far.
     Gather(Roster),
-    /// Reply to a gathering: profiles (altitude and power) of the whole chain.
+    /// Reply to `Gather`: profiles (altitude and power) of the whole chain.
     Gathered(Roster),
-    /// Message to the next relay of a pass: interference estimate, and all relays' measurements so far.
+    /// Message to the next relay: interference estimate, and all relays' measurements so far.
     Sense(Heard),
-    /// Reply to a sensing pass: measurements of the sender and of all later relays of the pass.
+    /// Reply to `Sense`: measurements of the sender and of all later relays.
     Sensed(Heard),
-    /// Message to the next relay of a pass of Algorithm 2: token, whose receiver may move.
+    /// Message to the next relay: token of Algorithm 2, whose receiver may move.
     Token(Token),
-    /// Reply to a token: position of the sender, and SIR of the worst hop after the sender.
+    /// Reply to a token of Algorithm 2: position of the sender, and SIR of the worst hop after the sender.
     Moved(Moved),
     /// Message to the next relay: lease renewal by the view's leader.
     Pulse(Pulse),
@@ -88,11 +86,11 @@ pub enum Message {
     Pulsed(Pulsed),
     /// Either direction, also to other nodes than neighbours: the sender's neighbours and view.
     Hello(Hello),
-    /// Message to the next relay: proposal of a new view. It counts the relays that it reaches.
+    /// Message to the next relay: proposal of a new view (membership of the chain), with the votes so far.
     Proposal(Proposal),
-    /// Reply to a proposal: the decision on it.
+    /// Reply to a proposal of a view: the decision on it.
     Decision(Decision),
-    /// Either direction: plane across x (fence) that keeps two neighbouring relays apart.
+    /// Either direction: limit of x (fence) that keeps two neighbouring relays apart.
     Fence {
         /// Digest by which two neighbours check that they have the same x axis. It covers the mission loaded before
         /// flight, and the Tx and Rx positions of an uploaded mission.
@@ -116,14 +114,14 @@ pub enum Message {
     },
     /// Either direction: claim to the sender's node number, or the echo of another node's claim.
     Claim(Claim),
-    /// Request for the reports of all relays, away from a ground station.
+    /// Request for the reports of all relays; forwarded from relay to relay, away from the ground station.
     Watch {
         /// Number of the request, wrapping. The station raises it every five seconds.
         number: u16,
         /// Digest of the mission that the sender loaded before flight.
         mission: u16,
     },
-    /// States of relays, toward a ground station that watches.
+    /// Reports on the states of relays; forwarded toward a ground station that requests them.
     Report(Reports),
 }
 
@@ -156,7 +154,8 @@ impl Message {
         }
     }
 
-    /// Returns true for messages of passes and lease renewals. Their digest identifies mission and view.
+    /// Returns true for messages of passes along the chain and of lease renewals. Their digest identifies mission and
+    /// view.
     pub(crate) const fn belongs_to_view(&self) -> bool {
         matches!(
             self,

@@ -48,7 +48,7 @@ impl Upload {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version of the upload, and digest of the mission loaded before flight that the upload replaces.
+    /// Version of the upload, and digest of the mission loaded before flight that it replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],

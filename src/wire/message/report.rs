@@ -9,16 +9,16 @@ use crate::place::Placement;
 use crate::time::{Duration, Instant};
 use crate::wire::CANDIDATES;
 
-/// Maximum number of entries in one report. A relay without any feature then has room for the message.
+/// Maximum number of relay states (entries) in one report.
 const MOST_ENTRIES: usize = 4;
 
-/// Coordinate of an unknown position, in quarters of a metre.
+/// Coordinate that marks an unknown position, in quarters of a metre.
 const UNKNOWN: i32 = -(1 << 23);
 
-/// Number of states of a relay: see [`Entry::state`].
+/// Number of values of a relay's combined state: see [`Entry::state`].
 const STATES: u16 = 49_152;
 
-/// Largest upper half of a finite positive f32.
+/// Upper 16 bits of the largest finite f32.
 const LARGEST: u16 = 0x7F7F;
 
 /// Position on the wire: x, y and altitude in quarters of a metre, 24 bits each.
@@ -59,19 +59,20 @@ impl Coarse {
     }
 }
 
-/// State of one relay in a report.
+/// State of one relay in a report of the relays' states.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Entry {
     relay: Word,
-    /// Age of the state, in tenths of a second.
+    /// Age of the reported state, in tenths of a second.
     pub age: u8,
     state: Word,
-    /// Position of the drone.
+    /// Position of the drone at the time of the reported state.
     pub at: Coarse,
 }
 
 impl Entry {
-    /// Creates the entry of relay `relay`. The number `state` combines its phase, its control state and flags.
+    /// Creates an entry on relay `relay`. `state` combines its phase, hold reasons, control state and flags: see
+    /// [`Entry::state`].
     pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
         Self {
             relay: Word::new(relay),
@@ -81,7 +82,7 @@ impl Entry {
         }
     }
 
-    /// Returns the time of the state, for an entry received at `now`.
+    /// Returns the time at which the relay was in this state, for an entry received at `now`.
     ///
     /// `None` if it is older than an entry can say, or than the receiver's clock.
     pub fn time(&self, now: Instant) -> Option<Instant> {
@@ -90,12 +91,13 @@ impl Entry {
         (self.age < u8::MAX).then(|| Instant::from_micros(micros))
     }
 
-    /// Returns the number of the relay in the mission.
+    /// Returns the node number of the relay in the mission, 1 to N.
     pub const fn relay(&self) -> u16 {
         self.relay.number()
     }
 
-    /// Returns the number of the state. Its digits are the phase, two hold reasons, flags, the control state and a flag.
+    /// Returns the relay's combined state as one number. Its digits are the phase, two hold reasons, flags, the
+    /// control state and a flag.
     ///
     /// Their units are 1, 8, 64, 512, 4096 and 24576.
     pub const fn state(&self) -> u16 {
@@ -107,7 +109,7 @@ impl Entry {
 /// every eighth entry that it sends about itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Detail {
-    /// Setpoint of the drone, and the agreed position.
+    /// Setpoint of the drone, and the agreed position of the relay.
     pub places: [Coarse; 2],
     /// Distances to the neighbours toward Tx and toward Rx, in relays: 1 to 4, 0 for none.
     pub neighbours: [u8; 2],
@@ -145,7 +147,7 @@ pub struct Reports {
     pass: PassId,
     /// Details of the relay in the first entry; `None` in most reports.
     pub detail: Option<Detail>,
-    /// States of relays.
+    /// States of up to four relays.
     pub entries: Vec<Entry, MOST_ENTRIES>,
 }
 

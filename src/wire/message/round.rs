@@ -22,13 +22,13 @@ use crate::wire::message::parts::{
 /// in the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Target SIRs that this pass along the chain tries.
     pub ladder: Ladder,
-    /// Lateral offset, altitude and power of the sender.
+    /// Lateral offset, altitude and transmit power of the sender.
     pub relay: Station,
     /// True if relays use the lateral offsets and altitudes of the joint method. False for the configured ones.
     pub chosen: bool,
@@ -40,7 +40,7 @@ pub struct Sweep {
     pub reaches: PerTarget,
 }
 
-/// Fields at the start of all kinds of sweep messages. The sender's farthest x for each target follows at the end.
+/// Fields at the start of all kinds of sweep messages. The list of the sender's farthest x follows at the end.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct SweepHead {
     pass: PassId,
@@ -137,9 +137,9 @@ fn checked(
 pub struct SweepVerdict {
     /// Number of the pass along the chain, as in the sweep message that is answered.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Slack (spare length of the chain) of each target, and the committed target, if any.
+    /// Verdict of the sweep: the chain's spare length for each target, and the committed target, if any.
     pub verdict: Verdict,
     /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
     /// x that it has reported for this target.
@@ -204,9 +204,9 @@ pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 /// sender, in the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Index of the last relay whose profile earlier passes collected; 0 in the first pass.
     pub after: u16,
@@ -263,9 +263,9 @@ impl Roster {
 /// Token message of Algorithm 2, in which one relay after the other improves its own position.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
@@ -316,16 +316,16 @@ impl Token {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdjustStep {
-    /// Token's action: stay, and store the neighbours' positions.
+    /// The relay stays, and only stores its neighbours' positions.
     Look,
-    /// Token's action: move if another position has a better SIR.
+    /// The relay moves if another position has a better SIR.
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
         /// Method by which the relay searches for a better position.
         local: Local,
     },
-    /// Token's action: stay for good, because Algorithm 2 has ended.
+    /// The relay stays for good, because Algorithm 2 has ended.
     Stop,
 }
 
@@ -389,9 +389,9 @@ impl StepBody {
 /// Reply to a token of Algorithm 2; relays send it back to the leader.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moved {
-    /// Number of the pass in which the token was received.
+    /// Number of the pass of Algorithm 2 in which the token was received.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Current position of the sender.
     pub place: Placement,
@@ -447,9 +447,9 @@ pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 /// the sender, in the reply those of the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
-    /// Number of the pass along the chain, wrapping.
+    /// Number of the pass along the chain, which rises from pass to pass and wraps.
     pub number: u16,
-    /// Digest of the sender's mission and view.
+    /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
     /// Interference estimate that all relays are to use.
     pub estimate: NumberedEstimate,

@@ -15,25 +15,25 @@ pub struct Proposal {
     pub mission_id: MissionId,
     /// Identifier of the proposed view, later than every view known to its proposer.
     pub proposed_view: ViewId,
-    /// Number of relays that the proposal has reached, including the sender: 1 to 1000.
+    /// Number of relays that the proposal has reached, including the sender, 1 to 1000.
     pub place: u16,
     /// Votes of the relays up to the sender, and their remaining leases.
     pub poll: Poll,
 }
 
-/// Votes on a view proposal so far, and remaining leases of earlier views. Every relay on the proposal's path adds
+/// Votes on a view proposal so far, and remaining leases of earlier views. Every relay that the proposal reaches adds
 /// its vote.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
-    /// Newest view that any polled relay knows to be agreed on. Only its members have a vote.
+    /// Newest view (membership) that any polled relay knows to be agreed on. Only its members have a vote.
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
     /// True if the proposer of the view `agreed` was polled; for the initial view, its leader. The votes of exactly
     /// half of the view's members are then enough for a quorum.
     pub proposer: bool,
-    /// Upper bound of the remaining leases of unpolled members of the view `agreed`, in tenths of a second.
+    /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
     /// Time until leases of views before `agreed` have expired, in tenths of a second; 65535 if unknown. Positions of
     /// the new view may be used only after that time.
@@ -71,7 +71,7 @@ pub struct Successor {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decision {
-    /// Identifier of the proposed view's mission.
+    /// Identifier of the mission that the members of the proposed view fly.
     pub mission_id: MissionId,
     /// Identifier of the proposed view.
     pub proposed_view: ViewId,
@@ -275,7 +275,7 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader, one departure or join at a time, in each lease renewal.
+/// Orders of the leader to a relay that may leave and to one that joins; part of each lease renewal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
@@ -295,7 +295,8 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by the relays from the last one to the sender.
+/// Requests to the leader by relays that need to leave or would join. They are of the relays from the last one to the
+/// sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
@@ -305,7 +306,7 @@ pub struct Requests {
     pub endurance_s: u16,
     /// Node outside of the chain that would join it, 0 for none.
     pub spare: u16,
-    /// True if all these relays are in place.
+    /// True if all relays from the last one to the sender are in place.
     pub in_place: bool,
 }
 
@@ -317,7 +318,7 @@ impl Requests {
         in_place: false,
     };
 
-    /// Returns the requests of two parts of the chain. The more urgent departure counts, and the spare of the lower
+    /// Merges the requests of two parts of the chain. The more urgent departure counts, and the spare with the lower
     /// number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
@@ -342,7 +343,7 @@ impl Requests {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulsed {
-    /// Number of the acknowledged lease renewal.
+    /// Number of the lease renewal that this reply acknowledges.
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,

@@ -33,8 +33,7 @@ fn plain(frame: &FrameBuf, len: usize) -> Plain {
     decoded.unwrap()
 }
 
-/// Returns a frame of the session `from`: a handshake, or a `Busy` message if `handshake` is false. `addresses` are
-/// the node numbers of sender and receiver.
+/// Returns a frame from the session `from`. It is a handshake, or a `Busy` message if `handshake` is false.
 fn frame(from: &mut Session, addresses: (u16, u16), handshake: bool, counter: u32) -> Plain {
     let (sender, destination) = addresses;
     let header = Header {
@@ -64,8 +63,8 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Exchanges handshakes between two nodes until none is pending; returns their number. `ends` are each node's session
-/// and node number, `counters` their frame counters.
+/// Lets two nodes exchange handshakes until none is pending; returns their number. `ends` are each node's session and
+/// node number, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;

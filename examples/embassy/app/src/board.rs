@@ -9,11 +9,11 @@ use uav_relay_chip::reset::Reset;
 /// Configuration block, seed, reset cause and flash of a board.
 #[derive(Debug)]
 pub struct Board<F> {
-    /// Configuration block.
+    /// Configuration block of the relay, as read from flash.
     pub block: Block,
     /// Random seed for the relay that differs between boards, and if possible between starts.
     pub seed: u32,
-    /// Cause of the last reset.
+    /// Cause of the last reset of the board.
     pub reset: Reset,
     /// Flash for state that survives a reboot, if any. Without it a block with a signing key is refused, and the
     /// relay's votes are lost at a reboot.

@@ -22,7 +22,7 @@ use crate::votes::Votes;
 /// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Static storage of the relay and of its mission's distribution of interference, to save stack.
+/// Static storage of the relay and of its mission's interference points, which saves stack.
 #[derive(Debug)]
 pub struct DroneStorage {
     field: config::FieldStorage,
@@ -30,7 +30,7 @@ pub struct DroneStorage {
 }
 
 impl DroneStorage {
-    /// Creates empty storage.
+    /// Creates storage for a drone whose relay has not been created yet.
     pub const fn new() -> Self {
         Self {
             field: config::EMPTY,
@@ -48,18 +48,18 @@ impl Default for DroneStorage {
 /// Reason why a drone does not join the chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Refused {
-    /// Invalid configuration block.
+    /// The configuration block is invalid.
     Block(ConfigError),
-    /// Error: the configuration block has a signing key, but the board has no flash that stores the epoch.
+    /// The configuration block has a signing key, but the board has no flash that stores the epoch.
     NoFlash,
-    /// Error: signing is impossible, because the last possible epoch has been used.
+    /// Signing is impossible, because the last possible epoch (start counter) has been used.
     NoEpoch,
-    /// Error: the configuration block has the positions of Tx and Rx, but there is no port to an autopilot.
+    /// The configuration block has the positions of Tx and Rx, but there is no port to an autopilot.
     NoAutopilot,
-    /// Error: the positions of Tx and Rx form no valid line, or their distance differs from the mission's.
+    /// The positions of Tx and Rx form no valid line, or their distance differs from the mission's.
     Course(CourseError),
-    /// Error: the relay rejects the settings, because they need a feature that this build lacks. The joint method for
-    /// more than 100 relays is rejected, too.
+    /// The relay rejects the settings. They need a feature that this build lacks, or the joint method for more than
+    /// 100 relays.
     Setup(SetupError),
 }
 

@@ -83,11 +83,10 @@ impl<const IN: usize> Buffers<IN> {
     }
 }
 
-/// Time between two feedings of the watchdog. No feeding takes place while the relay's timers are late.
+/// Interval at which the watchdog is fed, unless the relay's timers are late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Feeds the watchdog every [`TURN`] by calling `feed`, for a drone that does not join the chain. Its board is then
-/// not restarted.
+/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. For a drone that does not join the chain.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -95,7 +94,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     }
 }
 
-/// Feeds the watchdog every [`TURN`], unless the relay's timers are late: see [`watchdog::may_feed`].
+/// Feeds the watchdog every [`TURN`], forever, unless the relay's timers are late. See [`watchdog::may_feed`].
 ///
 /// It runs in the same task as the ports and timers. If that task hangs, panics or faults, the watchdog is not fed
 /// any more.
@@ -201,7 +200,7 @@ async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
-/// Logs the relay's events, and serves the autopilot's port for a drone that has one.
+/// Serves the tasks beside the relay's ports, forever. They are the log of events, and the autopilot's port, if any.
 async fn beside<R: Read, W: Write>(
     relay: &AsyncRelay<'_>,
     link: Option<&AsyncAutopilot>,

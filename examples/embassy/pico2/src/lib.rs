@@ -86,7 +86,7 @@ fn seed(trng: Peri<'_, TRNG>) -> u32 {
     Trng::new(trng, Irqs, embassy_rp::trng::Config::default()).blocking_next_u32()
 }
 
-/// Reader and writer of a UART.
+/// Receiving and sending half of a UART.
 pub type Port = (BufferedUartRx, BufferedUartTx);
 
 /// Absent autopilot port, for an image whose two UARTs both lead to neighbours.

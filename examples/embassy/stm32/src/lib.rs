@@ -78,7 +78,7 @@ fn tree(hardware: &ClockHardware, clocks: Clocks) -> rcc::Config {
     config
 }
 
-/// Reader and writer of a UART.
+/// Receiving and sending half of a UART.
 pub type Port = (BufferedUartRx<'static>, BufferedUartTx<'static>);
 
 /// Opens a UART at the firmware's bit rate, with `buffers` that no other UART uses.

@@ -61,15 +61,15 @@ impl Kind {
 /// Field of a message: a row of a table in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Field {
-    /// Name of the field.
+    /// Name of the message field.
     pub name: String,
-    /// Type of the field on the wire.
+    /// Type of the message field on the wire.
     pub kind: Kind,
-    /// Meaning of the field, in words.
+    /// Meaning of the message field, in words.
     pub meaning: String,
-    /// Unit of the field; empty if it has none.
+    /// Unit of the message field; empty if it has none.
     pub unit: String,
-    /// Permitted range of the field, in words.
+    /// Permitted range of the message field, in words.
     pub range: String,
 }
 
@@ -87,7 +87,7 @@ pub struct Layout {
 pub struct Format {
     /// Layouts of the messages; the index is the message's tag.
     pub messages: Vec<Layout>,
-    /// Layout of the handshake.
+    /// Layout of the authentication handshake's body.
     pub handshake: Layout,
 }
 

@@ -19,7 +19,7 @@ pub struct Shown<'a> {
     pub number: u64,
     /// Frame as captured, with time and interface.
     pub packet: &'a Packet<'a>,
-    /// Decoded frame.
+    /// Decoded frame that is shown.
     pub frame: &'a Frame<'a>,
     /// Result of verifying the frame's authentication tag, if it has one.
     pub tag: Option<TagCheck>,

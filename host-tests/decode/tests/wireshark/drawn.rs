@@ -24,7 +24,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
     around(&body, flags, rng)
 }
 
-/// Returns a frame with this body and a random header. `flags` are the flags of the header.
+/// Returns a frame with this body and a random header, whose flags are `flags`.
 ///
 /// If `flags` is 0, the frame has no authentication tag, otherwise a random one.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
@@ -41,7 +41,7 @@ pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     stuffed(&sealed(plain))
 }
 
-/// Damages a frame: changes, removes or adds bytes, or cuts off the end.
+/// Damages a frame at random: changes, removes or adds bytes, or cuts off the end.
 pub(crate) fn hurt(mut wire: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(0..wire.len() - 1);
     match rng.random_range(0..5) {

@@ -62,7 +62,8 @@ fn phase(member: &Member) -> Phase {
     member.watched.relay().phase()
 }
 
-/// Returns a relay's phase, view, index, number of relays and neighbours, for the message of a failure.
+/// Returns a relay's state for a failure message: phase, view, index, number of relays, neighbours. A view is a
+/// membership of the chain.
 fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();

@@ -37,7 +37,7 @@ const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
 const MOVED: [f64; 3] = [47.408, 8.556, 440.0];
 
-/// Lengths of a degree of latitude and of a degree of longitude near Tx and Rx, m.
+/// Lengths of a degree of latitude and of a degree of longitude near the test's Tx and Rx, m.
 const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
 
 struct Link {

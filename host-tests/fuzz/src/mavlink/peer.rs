@@ -33,16 +33,16 @@ type Sender = ((u8, u8, u8), u64);
 
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// Current time stamp of the simulated autopilot.
+    /// Current signature time stamp of the simulated autopilot, in units of 10 µs.
     stamp: u64,
     /// Newest signed frames of the simulated autopilot, for replays.
     history: Vec<Vec<u8>>,
     /// Clock of the tested link as a signature time stamp. It was read at the instant in the field `at`.
     time: u64,
     at: Instant,
-    /// Senders that the tested link should remember.
+    /// Senders that the tested link should remember, with the time stamps of their last frames.
     senders: Vec<Sender>,
-    /// Time stamp of the last frame that the tested link sent.
+    /// Signature time stamp of the last frame that the tested link sent.
     sent: u64,
     parser: Parser,
     pub(super) refused: u32,

@@ -16,7 +16,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reference {
     pub(super) frames: Vec<Frame>,
-    /// Number of invalid frames that begin with the header of a known message.
+    /// Number of frames so far that have the header of a known message but are invalid.
     pub(super) broken: usize,
     pub(super) checksums: usize,
 }

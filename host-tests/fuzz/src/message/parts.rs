@@ -146,7 +146,7 @@ impl Body<'_, '_> {
         number
     }
 
-    /// Appends a byte from `least` to `most`, rarely any byte, to the message; returns the byte.
+    /// Appends a byte to the message, mostly from `least` to `most`; returns the byte.
     pub(super) fn small(&mut self, least: u8, most: u8) -> u8 {
         let byte = self.input.byte();
         let small = if byte < 240 {
@@ -187,8 +187,8 @@ impl Body<'_, '_> {
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of up to `most` floats, with its count, to the message. All floats are the same number, or each
-    /// is drawn from `low` to `high`.
+    /// Appends a list of up to `most` floats with its count to the message. They are equal, or each is drawn from
+    /// `low` to `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();

@@ -27,7 +27,7 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// Returns the number of a node that is too far from relay `index` to be its neighbour, at least 0.
+/// Returns the number of a node beyond the neighbours of relay `index`, at least 0.
 ///
 /// The node is `more` places farther along the chain than the neighbour at `side` (0 upstream, 1 downstream).
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {

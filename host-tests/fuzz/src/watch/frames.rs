@@ -7,7 +7,7 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Range of radio messages on a shared channel: a relay sends to nodes at most this many numbers away.
+/// Largest difference of node numbers between sender and receiver of a frame on a shared channel.
 const NEAR: u16 = 4;
 
 /// Network number of every fuzzed relay.
@@ -18,7 +18,7 @@ pub const NETWORK: u16 = 9;
 /// A pass is a round of messages along the chain.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
-    /// Node number of the relay.
+    /// Node number of the relay under test.
     node: u16,
     /// Number of relays in the mission.
     all: u16,

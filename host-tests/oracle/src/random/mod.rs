@@ -44,7 +44,7 @@ pub enum Chain {
 pub struct Style {
     /// Smallest and largest number of relays, >= 1.
     pub relays: RangeInclusive<u32>,
-    /// Differences between the relays.
+    /// Differences between the relays of a random link.
     pub chain: Chain,
 }
 
@@ -105,7 +105,7 @@ pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     }
 }
 
-/// Returns and prints the seed of a random test. It is the environment variable `SEED`, or `default` if that is not a
+/// Returns and prints the seed of a random test. It is the environment variable `SEED`, or `default` if that is no
 /// number.
 pub fn seed(default: u64) -> u64 {
     let seed = std::env::var("SEED")
@@ -116,8 +116,8 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
-/// Returns the number of random problems in a test. It is the environment variable `COUNT`, or `usual` if that is not
-/// a number.
+/// Returns the number of random problems in a test. It is the environment variable `COUNT`, or `usual` if that is no
+/// number.
 pub fn count(usual: usize) -> usize {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(usual)

@@ -2,7 +2,7 @@
 
 use super::link::{Link, meets, received_w};
 
-/// Number of bisection steps, enough to halve any f64 interval in metres down to adjacent numbers.
+/// Number of bisection steps: enough to halve any f64 interval in metres down to adjacent numbers.
 const HALVINGS: usize = 200;
 
 /// Hop to a relay from Tx or from the relay before it. `x` in its methods is the receiving relay's position, m.
@@ -70,7 +70,7 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a value with the sign of the SIR's slope at `x`, for the search for its extrema.
+    /// Returns a value with the sign of the SIR's slope at `x`, by which the extrema of the SIR are found.
     ///
     /// Beyond the sender the value is a concave function of `x` (see [`super`]), so that it has at most two zeros.
     fn rise(&self, x: f64) -> f64 {
@@ -132,8 +132,8 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// Returns the last x, m, from `inside` towards `outside` at which `holds` is true. `outside` may be smaller than
-/// `inside`.
+/// Returns the last x, m, on the way from `inside` to `outside` at which `holds` is true. `outside` may be smaller
+/// than `inside`.
 ///
 /// `holds` must be true at `inside`, false at `outside`, and change once. Exact to adjacent f64 values.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {

@@ -48,7 +48,7 @@ pub struct FixedCrossSection {
     pub relay: usize,
     /// Fixed lateral position, the offset from the vertical plane through Tx and Rx, m.
     pub y_m: f64,
-    /// Fixed altitude, m, > 0.
+    /// Fixed altitude of the relay, m, > 0.
     pub altitude_m: f64,
 }
 
@@ -65,7 +65,7 @@ impl FixedCrossSection {
     }
 }
 
-/// Position of a relay.
+/// Position of a relay in the reference model of the joint method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Coordinate along the line from Tx to Rx, m: 0 to the distance D.
@@ -73,7 +73,7 @@ pub struct Place {
     /// Lateral offset from the vertical plane through Tx and Rx, m. Positive on the side on which an interferer with
     /// a positive `y_i` is.
     pub y_m: f64,
-    /// Altitude, m.
+    /// Altitude of the relay, m.
     pub altitude_m: f64,
 }
 

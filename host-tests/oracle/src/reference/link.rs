@@ -5,14 +5,14 @@
 pub struct Relay {
     /// Altitude of the relay, m, > 0, above the ground on which Tx, Rx and the interferer are.
     pub altitude_m: f64,
-    /// Transmit power, W, > 0.
+    /// Transmit power of the relay, W, > 0.
     pub power_w: f64,
 }
 
 /// Chain of relays between Tx at (0, 0) and Rx at (D, 0), with one interferer on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
-    /// Tx-Rx distance D, m, > 0.
+    /// Distance D from Tx to Rx, m, > 0.
     pub distance_m: f64,
     /// Minimum distance between neighbouring relays, m, >= 0; most searches ignore it.
     pub min_separation_m: f64,
@@ -88,7 +88,7 @@ pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }
 
-/// Returns true if `sir` is at least `target`, with a tolerance of a few units in the last place.
+/// Returns true if `sir` meets `target`: it may be a few units in the last place below it.
 ///
 /// Otherwise rounding would decide for a constant SIR (interferer at Tx) that equals the target.
 pub(super) fn meets(sir: f64, target: f64) -> bool {

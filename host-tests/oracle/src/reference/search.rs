@@ -18,7 +18,7 @@ impl Link {
         self.best_from(1, 0.0, points)
     }
 
-    /// Returns the best SIR of hops `k` to N+1 over all positions of the relays from `k` on.
+    /// Returns the best SIR of the worst of hops `k` to N+1, over all positions of the relays from `k` on.
     ///
     /// The SIR of several hops is that of the worst one. Relay k-1 is at `from_x`; `points` is the number of grid
     /// points per relay.
@@ -61,7 +61,7 @@ impl Link {
     }
 }
 
-/// Returns the largest value of `f`. It is sampled at the sorted points `x` and refined around the best few local maxima.
+/// Returns the largest value of `f`. It is sampled at the sorted points `x` and refined around the best local maxima.
 fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<(f64, f64)> = x.iter().map(|&x| (x, f(x))).collect();
     let place = |i: Option<usize>| i.and_then(|i| samples.get(i)).copied();

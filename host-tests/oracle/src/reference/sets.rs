@@ -100,7 +100,7 @@ impl Link {
     }
 }
 
-/// Returns the parts of the interval `low` to `high` in which `holds` is true.
+/// Returns the parts of the interval `low` to `high` in which `holds` returns true.
 ///
 /// `turns` ascends; between two successive values `holds` must change at most once.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {

@@ -152,7 +152,7 @@ fn watch(chain: &mut Chain, capture: &mut Option<&mut AirCapture>) -> Result<(),
     Ok(())
 }
 
-/// Prints the report as a table or as JSON. If the report contains an error, returns it as a failure.
+/// Prints the report as a table or as JSON; returns the error in the report, if any, as a failure.
 fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     command::print(&if options.json {
         command::json(report)?

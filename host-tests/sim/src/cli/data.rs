@@ -8,7 +8,7 @@ use crate::command::{Failure, given_option, number, whole};
 use crate::simulator::route::DataLink;
 use crate::simulator::traffic::TrafficSpec;
 
-/// Command-line options for data traffic.
+/// Command-line options for the simulated data traffic.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Data traffic")]
 pub struct Data {

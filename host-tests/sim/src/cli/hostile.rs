@@ -71,7 +71,7 @@ pub struct RelayEvent {
 /// Time for which an attack continues after the last other event, s.
 const ATTACK_S: u64 = 30;
 
-/// Time after the last event at which a run ends at the latest, s of virtual time.
+/// Time after the last planned event at which a run ends at the latest, s of virtual time.
 const PATIENCE_S: u64 = 3_600;
 
 impl Hostile {
@@ -267,7 +267,7 @@ fn partition(text: &str) -> Result<Partition, String> {
     Ok(Partition { after, from, until })
 }
 
-/// Command-line options for links and the radio channel.
+/// Command-line options for links, the shared radio channel, and losses of frames.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Links and the air")]
 pub struct Air {
@@ -350,7 +350,7 @@ impl Air {
         Ok(())
     }
 
-    /// Applies the options to a setup whose frames are lost with the probability `loss`.
+    /// Applies the options about links to `setup`, whose frames are lost with the probability `loss`.
     ///
     /// The setup's wiring must already be set, because the access method depends on it.
     pub fn prepare(&self, setup: &mut Setup, loss: f64) -> Result<(), Failure> {
@@ -434,7 +434,7 @@ const GUST_MPS: f64 = 0.3;
 /// It allows for the errors of the position and for gusts.
 const HOVER_M: f32 = 1.5;
 
-/// Command-line options for drones.
+/// Command-line options for simulated drones, their pilots and autopilots.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Drones")]
 pub struct Flight {
@@ -451,7 +451,7 @@ pub struct Flight {
     start: Option<PathBuf>,
 }
 
-/// Bound on |x|, |y| and height of a start position, m.
+/// Largest |x|, |y| and height of the start position that an option gives a drone, m.
 const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {
@@ -465,7 +465,7 @@ impl Flight {
         self.takeover.iter().map(name)
     }
 
-    /// Returns the end of each takeover by a pilot, or its start if it has no end.
+    /// Returns the end of each takeover by a pilot, or its start if it is permanent.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.takeover
             .iter()

@@ -74,13 +74,13 @@ pub struct Options {
     /// Write every transmitted frame to a pcapng capture with virtual times. `cargo decode` and Wireshark read it
     #[arg(long, value_name = "FILE", value_parser = file)]
     pub capture: Option<PathBuf>,
-    /// Measurement options.
+    /// Options for the relays' measurements of the interference.
     #[command(flatten)]
     pub listening: Listening,
-    /// Data traffic options.
+    /// Options for the simulated data traffic through the chain.
     #[command(flatten)]
     pub data: Data,
-    /// Failure, attack and upload options.
+    /// Options for failures, attacks and uploads during the run.
     #[command(flatten)]
     pub hostile: Hostile,
     /// Options of the page that shows the run.
@@ -210,7 +210,7 @@ pub struct Listening {
 }
 
 impl Listening {
-    /// Rejects options about measurements if `--listen` is missing.
+    /// Rejects options about measurements if `--listen` (the relays locate the interferer) is missing.
     pub fn agree(&self) -> Result<(), Failure> {
         let velocity = self
             .move_interferer

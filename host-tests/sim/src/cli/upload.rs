@@ -12,7 +12,7 @@ use uav_relay_scenario::number::narrow;
 
 use super::time::instant;
 
-/// Command-line options for uploads.
+/// Command-line options for missions that a ground station uploads during the run.
 #[derive(Args, Debug)]
 pub struct Uploads {
     /// Upload the scenario's mission with changed parameters at second S of virtual time. Keys as in a scenario file: x_m, y_m
@@ -119,7 +119,7 @@ const KEYS: [(&str, Key, f64, f64); 23] = [
 ];
 
 impl Uploads {
-    /// Returns true if the options request at least one upload.
+    /// Returns true if the options request at least one upload of a mission.
     pub fn are_planned(&self) -> bool {
         !self.upload.is_empty()
     }
@@ -129,7 +129,8 @@ impl Uploads {
         !self.no_store
     }
 
-    /// Returns the end of the chain whose ground station watches, and since when.
+    /// Returns the end of the chain whose ground station requests reports, and the start of the requests. `None` if
+    /// none does.
     pub fn watches(&self) -> Option<(Side, Instant)> {
         self.watch
             .map(|end| (end.side(), Instant::from_millis(1_000)))
@@ -160,7 +161,7 @@ impl Uploads {
         self.upload.iter().map(name)
     }
 
-    /// Returns the start time of each upload.
+    /// Returns the start time of each upload of a mission.
     pub fn times(&self) -> impl Iterator<Item = Instant> {
         self.upload.iter().map(|one| one.at)
     }

@@ -8,7 +8,7 @@ use uav_relay::Instant;
 use crate::command::number;
 use crate::simulator::setup::Setup;
 
-/// Command-line options for the screen.
+/// Command-line options for the browser page that shows the flight live.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Screen")]
 pub struct Web {

@@ -17,15 +17,15 @@ use crate::simulator::chain::Chain;
 use crate::simulator::setup::Setup;
 use alarms::Observe as _;
 
-/// View of a running chain, with the history that its snapshots need.
+/// Display of a running chain: computes its snapshots, and keeps the history that they need.
 #[derive(Debug)]
 pub struct LiveView {
     axis: Option<Axis>,
     geofence: Option<Geofence>,
     alarms: Alarms,
-    /// Number of log entries of the run that earlier snapshots contain.
+    /// Number of log entries of the run that were in earlier snapshots.
     told: usize,
-    /// Last report of each relay.
+    /// Newest report of each relay, by its number.
     known: BTreeMap<u16, Report>,
 }
 

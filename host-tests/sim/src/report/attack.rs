@@ -26,9 +26,9 @@ pub struct AttackCountsReport {
 pub struct AttackReport {
     /// True if the relays signed their frames.
     pub auth: bool,
-    /// Counts of the forged frames.
+    /// Numbers of forged frames: sent, accepted, and counted by the relays.
     pub forged: AttackCountsReport,
-    /// Counts of the replayed frames.
+    /// Numbers of replayed frames: sent, accepted, and counted by the relays.
     pub replayed: AttackCountsReport,
     /// True if the run with the attack ended differently from the run without the attack.
     pub ended_otherwise: bool,

@@ -67,10 +67,10 @@ pub struct ChainReport {
     /// Worst hop from Rx to Tx; absent if the mission requires no SIR in that direction.
     #[serde(flatten)]
     pub back: Option<WorstBack>,
-    /// Target SIR that the relays agreed on, linear.
+    /// Target SIR that the relays agreed on, linear; absent without an agreement.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<f64>,
-    /// True if `target` is optimal: no chain of equal relays can exceed it, apart from the tolerance.
+    /// True if `target` is proven optimal. No chain of equal relays can exceed it by more than the tolerance.
     ///
     /// The leader computes an upper bound on the SIR in a random field. False if this bound is higher than `target`,
     /// so that the optimum is unknown. Absent without a random field or a bound.
@@ -91,7 +91,7 @@ pub struct ChainReport {
     /// Time slots of every hop on which the relays agreed; empty unless the mission has fitted slots.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hop_slots: Vec<HopSlots>,
-    /// Number of passes (messages forwarded along the whole chain) and view proposals that relays began.
+    /// Number of passes (messages forwarded along the whole chain) and view proposals that relays started.
     pub sweeps: u32,
     /// Number of frames sent on all links.
     pub messages: u64,
@@ -113,7 +113,7 @@ pub struct ChainReport {
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Availability of the chain over the whole run. Its fields are absent if the run does not record them.
+    /// Availability of the chain: the part of the run in which it had the best positions.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
     /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
@@ -388,7 +388,7 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` has all relays of one view (membership of the chain), ordered by index.
+/// Returns true if `part` is a complete view: all its relays, ordered by index. A view is a membership of the chain.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)
@@ -524,7 +524,7 @@ impl AirReport {
     }
 }
 
-/// Availability of the chain over a whole run. All fields are absent if the run does not record them.
+/// Availability of the chain over a whole run. All fields are absent unless the run records them.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct AvailabilityReport {
     /// Time when all relays of the chain first had agreed positions, s of virtual time.

@@ -11,7 +11,7 @@ pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 pub struct RelayReport {
     /// Number of the relay, from 1 next to Tx.
     pub index: u16,
-    /// Distance of the relay from Tx along the line to Rx, m.
+    /// Distance of the relay from Tx along the line to Rx, m, measured on the ground.
     pub x_m: f64,
     /// Distance of the relay from the line, m, positive to the right as seen toward Rx.
     pub y_m: f64,

@@ -18,7 +18,7 @@ use uav_relay_scenario::scene::Scene;
 /// Interferer as the relays estimate it from their measurements.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct BelievedReport {
-    /// Estimated transmit power, W.
+    /// Estimated transmit power of the interferer, W.
     pub power_w: f32,
     /// Estimated position along the line from Tx to Rx, m.
     pub x_m: f32,

@@ -89,7 +89,7 @@ pub struct QueueReport {
     pub node: String,
     /// Mean length of the queue over the time of the traffic, packets.
     pub mean_packets: f64,
-    /// Largest length of the queue, packets.
+    /// Largest length that the queue had, packets.
     pub most_packets: usize,
 }
 
@@ -101,7 +101,7 @@ pub struct QueueReport {
 pub struct PeriodReport {
     /// Start of the period, s of virtual time.
     pub from_s: f64,
-    /// End of the period, s of virtual time.
+    /// End of the period of the traffic, s of virtual time.
     pub until_s: f64,
     /// Number of the view (membership of the chain) in this period.
     pub view: u32,

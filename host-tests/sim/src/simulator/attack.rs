@@ -28,7 +28,7 @@ pub struct Attack {
     pub forged: u32,
     /// Number of recorded frames that the attacker sends again.
     pub replayed: u32,
-    /// Time of the last frame of the attack; frames that are sent back to back may end slightly later.
+    /// Time of the attack's last frame. Frames that are sent back to back may end slightly later.
     pub until: Instant,
 }
 
@@ -52,7 +52,7 @@ pub struct AttackCounts {
 
 #[derive(Clone, Debug)]
 pub(super) struct Recorded {
-    /// Time when the recorded frame arrives at its receiver. The attacker does not replay it earlier.
+    /// Time at which the recorded frame arrives at its receiver; the attacker does not replay it earlier.
     pub(super) arrived: Instant,
     /// Port at which the receiver gets the recorded frame.
     pub(super) port: Port,
@@ -87,7 +87,7 @@ impl Attacker {
         }
     }
 
-    /// Draws the time and the kind of every frame of the attack. The list is not sorted by time.
+    /// Draws the time and the kind of every frame of the attack; the list is not sorted by time.
     ///
     /// Frames that are sent back to back are spaced by the time that the longest message takes on `link`.
     pub(super) fn plan(&mut self, link: &LinkSpec) -> Vec<(Instant, AttackKind)> {
@@ -177,7 +177,7 @@ const CHECK: usize = 4;
 
 const HELLO_BODY: usize = 17;
 
-/// Claimed sender and destination of a forged frame.
+/// Sender and destination that a forged frame claims.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct ForgedRoute {
     pub(super) from: u16,

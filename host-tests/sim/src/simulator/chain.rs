@@ -256,7 +256,8 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Sends the pending frames of relay `index` (from 0), logs its events, and schedules its next timer.
+    /// Handles all outputs of relay `index` (from 0). It sends frames, logs events, and schedules the relay's next
+    /// timer.
     fn drain(&mut self, index: usize) {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];
@@ -320,8 +321,8 @@ struct Member {
     /// Last setpoint that [`Chain::check`] found within the limits. It is stored so that the same setpoint is not
     /// checked again.
     safe: Option<Placement>,
-    /// Range of the setpoints: smallest and largest coordinates since the relay last had no setpoint. With a guard, a
-    /// setpoint may be outside the geofence only within this range.
+    /// Smallest and largest coordinates of the setpoints since the relay last had none. With a guard, a setpoint may
+    /// be outside the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -589,13 +590,13 @@ pub enum QueuedEvent {
         /// Bytes that arrive at the ground station.
         bytes: Vec<u8>,
     },
-    /// A ground station's timer expires.
+    /// The timer of a ground station expires.
     StationTimeout,
     /// A ground station begins an upload. The event's relay index is the upload's index in the setup.
     Upload,
     /// A ground station begins to watch. The event's relay index is that of the setup's `watches`.
     Watch,
-    /// A time step of the drones' flight.
+    /// The drones fly for one time step of the flight simulation.
     Fly,
     /// The autopilot of the relay's drone restarts.
     Restart,
@@ -613,7 +614,7 @@ pub enum QueuedEvent {
     ///
     /// The event's relay index is unused.
     Air(AirEvent),
-    /// Measurement of the interference by every relay at its position.
+    /// Every relay measures the interference at its position.
     Measure,
     /// The attacker sends a frame to a relay.
     Attack(AttackKind),

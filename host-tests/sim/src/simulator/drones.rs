@@ -23,15 +23,15 @@ pub(crate) fn placement(at: Point) -> Placement {
     }
 }
 
-/// Random-number stream of the drones' position errors.
+/// Number of the random-number stream from which the drones' position errors are drawn.
 const ERRORS: u64 = 2;
 
 /// Parameters of simple drones, which fly to their setpoints without an autopilot.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FlightSpec {
-    /// Initial hover position of each drone: x, y and altitude, m.
+    /// Initial hover position of each drone: x, y and altitude, m; relay 1 first.
     pub start: Vec<Point>,
-    /// Largest speed of each drone per axis, m/s, above 0.
+    /// Maximum speed of each drone per axis, m/s, above 0; relay 1 first.
     pub speed_mps: Vec<f64>,
     /// Largest acceleration of each drone per axis, m/s^2, above 0. Infinite for instant changes of speed.
     pub acceleration_mps2: f64,
@@ -79,9 +79,9 @@ impl FlightSpec {
 /// Point mass that flies to a goal and stops there, with limited speed and acceleration per axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
-    /// True position of the body, m.
+    /// True position of the simulated drone, m.
     pub at: Point,
-    /// Velocity of the body, m/s.
+    /// True velocity of the simulated drone, m/s.
     pub velocity_mps: Point,
 }
 
@@ -132,7 +132,7 @@ pub struct Nearest {
     pub apart_m: f64,
     /// Indices of the two drones, from 1.
     pub pair: [usize; 2],
-    /// Time of the closest approach.
+    /// Time of the closest approach of the two drones.
     pub at: Instant,
 }
 

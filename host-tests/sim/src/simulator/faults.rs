@@ -23,7 +23,7 @@ pub struct Faults {
 /// Counts of the frame faults that the simulated links caused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Injected {
-    /// Number of frames that never arrived.
+    /// Number of frames that were sent but never arrived.
     pub lost: u64,
     /// Number of frames whose bytes were changed.
     pub corrupted: u64,
@@ -43,7 +43,7 @@ pub struct Arrival {
 }
 
 impl Faults {
-    /// Probabilities of a bad link: 30 % lost, 15 % corrupted, 10 % duplicated and 10 % delayed.
+    /// Fault probabilities of a bad link: 30 % lost, 15 % corrupted, 10 % duplicated and 10 % delayed.
     pub const BAD_DAY: Self = Self {
         loss: 0.3,
         corrupt: 0.15,
@@ -56,7 +56,7 @@ impl Faults {
         *self == Self::default()
     }
 
-    /// Draws the faults of a frame, counts them in `injected`, and returns its arrivals: none, one or two.
+    /// Draws the faults of a frame, and counts them in `injected`. Returns the frame's arrivals: none, one or two.
     pub fn inject(
         &self,
         frame: &[u8],

@@ -72,7 +72,7 @@ pub struct Medium {
     counts: AirCounts,
 }
 
-/// Random-number stream of the radios' back-offs.
+/// Number of the random-number stream from which the radios' back-offs (random waits) are drawn.
 const BACKOFFS: u64 = 3;
 
 impl Medium {
@@ -92,7 +92,7 @@ impl Medium {
         }
     }
 
-    /// Returns the counters of the channel.
+    /// Returns the counters of the frames on the shared channel.
     pub fn counts(&self) -> AirCounts {
         self.counts
     }
@@ -318,7 +318,7 @@ pub enum Access {
 /// Number of bytes sent before a frame: preamble, start of frame and length (SHR and PHR).
 pub const HEADER: usize = 6;
 
-/// Time in which a radio turns from receiving to sending, in bytes: `aTurnaroundTime`, 12 symbols.
+/// Time in which a radio turns from receiving to sending, in byte times: `aTurnaroundTime`, 12 symbols.
 ///
 /// The radio neither sends nor receives meanwhile.
 pub const TURNAROUND: usize = 6;
@@ -326,7 +326,7 @@ pub const TURNAROUND: usize = 6;
 /// Time on the air that a frame takes in addition to its bytes, as a number of bytes.
 pub const OVERHEAD: usize = HEADER + TURNAROUND;
 
-/// Unit of the random wait before sending, in bytes: `aUnitBackoffPeriod`, 20 symbols.
+/// Unit of the random wait before sending, in byte times: `aUnitBackoffPeriod`, 20 symbols.
 ///
 /// It is longer than the turnaround, so a radio that senses in a later slot finds the sender.
 pub const SLOT: usize = 10;
@@ -388,7 +388,7 @@ impl Radio {
         matches!(self.state, State::Turnaround { .. } | State::Sending)
     }
 
-    /// Returns the number of frames in the radio, including the one that it sends.
+    /// Returns the number of frames in the radio's queue, including the one that it sends.
     fn held(&self) -> usize {
         self.queue.len() + usize::from(self.state == State::Sending)
     }

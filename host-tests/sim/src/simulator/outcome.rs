@@ -92,11 +92,11 @@ pub enum TimelineEvent {
 /// Entry in the log of a run: an event at one node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Moment {
-    /// Time of the event.
+    /// Time of the event in the run.
     pub at: Instant,
     /// Node that the entry is about: a relay's number from 1, 0 for Tx, N + 1 for Rx.
     pub relay: u16,
-    /// Kind of the event.
+    /// Kind of the event, with its data.
     pub what: TimelineEvent,
     /// Other node that the event concerns, such as a lost neighbour, by number from 1.
     pub other: Option<u16>,
@@ -138,7 +138,7 @@ pub struct RelayEnd {
     pub bound: Option<f32>,
     /// Shares of the frame time for the relay's fitted slots; `None` with equal slots.
     pub slot_shares: Option<SlotShares>,
-    /// Altitude and power of the relay.
+    /// Altitude and transmit power of the relay.
     pub profile: Profile,
     /// Counters of the relay since its last start.
     pub stats: Stats,
@@ -152,7 +152,7 @@ pub struct RelayEnd {
     pub view: u32,
     /// Version of the relay's mission; 0 for the mission loaded before the start.
     pub version: u16,
-    /// Interference estimate of the relay.
+    /// Interference estimate that the relay used at the end of the run.
     pub believed: NumberedEstimate,
     /// Geographic positions of Tx and Rx in the relay's mission; `None` unless an upload has moved them.
     pub sites: Option<Sites>,
@@ -163,7 +163,7 @@ pub struct RelayEnd {
 /// Availability of the chain over a whole run.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Watched {
-    /// Time when all relays of a view first had agreed positions; `None` if they never had.
+    /// Time when all relays of a view (membership of the chain) first had agreed positions. `None` if they never had.
     pub first_agreement: Option<Instant>,
     /// Fraction, 0 to 1, of the time since the first agreement in which the chain was available.
     ///
@@ -176,7 +176,8 @@ pub struct Watched {
     pub longest_wrong: Option<Duration>,
     /// Largest number of groups of relays that flew by separate agreements at the same time.
     pub most_flying: usize,
-    /// Smallest distance of two relays during the run, m: of drones if simulated, else of setpoints.
+    /// Minimum distance of two relays during the run, m. It is that of their drones if simulated, else of their
+    /// setpoints.
     pub least_separation_m: Option<f64>,
 }
 
@@ -206,14 +207,15 @@ pub struct Outcome {
     ///
     /// The key is the reporting relay's number from 1, and the side of the lost neighbour.
     pub noticed: BTreeMap<(u16, Side), Instant>,
-    /// Log of the run.
+    /// Log of the run: its events with their times.
     pub moments: Vec<Moment>,
     /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
     /// never two.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest margin, m: the distance of two drones minus the distance that they have to keep.
+    /// Smallest margin during the run, m. The margin is the distance of two drones minus the distance that they have
+    /// to keep.
     ///
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
@@ -321,7 +323,7 @@ pub enum Link {
 pub struct OnAir {
     /// Time when the last bit of the frame was sent.
     pub at: Instant,
-    /// Number of the frame in the order of sending. It sorts frames that end at the same time.
+    /// Sequence number of the frame, which sorts frames that end at the same time.
     order: u64,
     /// Link on which the frame was sent.
     pub link: Link,

@@ -38,7 +38,7 @@ const MICRO: Ps = 1_000_000;
 /// Number of picoseconds in a second.
 pub const SECOND: f64 = 1e12;
 
-/// Longest time that a hop may need for one packet, 1000 s in ps. A slower hop counts as broken.
+/// Longest time that a hop may take for one packet, ps: 1000 s. A slower hop counts as broken.
 const SLOWEST: f64 = 1e15;
 
 /// Distance, m, that a drone has to move before its new position is recorded.
@@ -47,7 +47,7 @@ const MOVED_M: f64 = 0.1;
 /// Distance of a drone from its agreed position, m, below which it has arrived.
 const THERE_M: f64 = 5.0;
 
-/// Period for which the positions of moving interferers are taken as constant: 1 s in ps.
+/// Time for which the positions of moving interferers are taken as constant, ps: 1 s.
 const FIXED: Ps = 1_000_000 * MICRO;
 
 /// Converts a virtual time to picoseconds since the start of the run.
@@ -130,7 +130,7 @@ pub struct TrueHops {
     ///
     /// `None` in a random field and in a run with uploads.
     scene: Option<(Scene, [f64; 2])>,
-    /// Missions by version, for runs in which `scene` is `None`. Version 0 is the mission at the start of the run.
+    /// Missions by version, used if `scene` is `None`. Version 0 is the mission at the start of the run.
     missions: Vec<(u16, Mission)>,
     /// Altitude and power of each relay, from relay 1.
     profiles: Vec<Profile>,
@@ -216,13 +216,13 @@ impl TrueHops {
 /// Recurring time slot of a hop: the same part of every TDMA frame. In a TDMA frame each hop has one slot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Window {
-    /// Start of the first TDMA frame, ps.
+    /// Start of the first TDMA frame of the link, ps.
     anchor: Ps,
     /// Duration of a TDMA frame, ps.
     frame: Ps,
     /// Time from the start of a TDMA frame to the start of the slot, ps.
     opens: Ps,
-    /// Duration of the slot, ps, at least 1.
+    /// Duration of the time slot, ps, at least 1.
     open_for: Ps,
 }
 
@@ -261,11 +261,11 @@ impl Window {
 /// Hop of the route while nothing changes. Node 0 is Tx, and the node after the last relay is Rx.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hop {
-    /// Number of the node that sends.
+    /// Number of the node that sends over this hop.
     pub from: usize,
-    /// Number of the node that receives.
+    /// Number of the node that receives over this hop.
     pub to: usize,
-    /// Time that one packet takes at the present data rate of the hop, ps, above 0.
+    /// Time that one packet takes on this hop at its present data rate, ps, above 0.
     pub packet: Ps,
     /// Time slots in which the hop may send.
     pub window: Window,
@@ -294,7 +294,7 @@ pub struct Period {
     pub relays: u16,
     /// Number of the view (membership of the chain).
     pub view: u32,
-    /// State of the chain in this period.
+    /// State of the chain in this period of the traffic.
     pub state: ChainState,
     /// Data rates at the agreed positions by the planner's formula, bit/s: to Rx, then back to Tx.
     ///
@@ -302,7 +302,7 @@ pub struct Period {
     pub promised_bps: Vec<f64>,
 }
 
-/// Period in which no hop of the route changes.
+/// Period in which no hop of the data's route changes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Stage {
     /// Start of this stage of the route, ps.
@@ -321,7 +321,8 @@ pub struct Stage {
 pub struct Route {
     /// Stages, in which no hop changes, in order of time; at least one.
     pub stages: Vec<Stage>,
-    /// Periods with a constant view, state of the chain and promised data rate, in order of time. At least one.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time. A view is a
+    /// membership of the chain. At least one.
     pub periods: Vec<Period>,
     /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
     pub promised_bps: Vec<f64>,
@@ -415,7 +416,8 @@ impl Members {
     }
 }
 
-/// Time slots of all hops, for each direction. The slots are assigned anew at each agreement and for each new view.
+/// Time slots of all hops, for each direction. They are assigned anew at each agreement and for each new view
+/// (membership).
 struct Layout {
     view: ViewId,
     agreed: Option<Vec<(usize, Point)>>,

@@ -19,7 +19,7 @@ use super::true_interference::TrueInterference;
 pub struct Partition {
     /// Number, from 1, of the relay after which the partition cuts the chain.
     pub after: u16,
-    /// Start of the partition.
+    /// Time at which the partition begins.
     pub from: Instant,
     /// End of the partition; `None` if it is permanent.
     pub until: Option<Instant>,
@@ -38,9 +38,9 @@ impl Partition {
 pub struct UploadSpec {
     /// End of the chain that uploads: upstream for the transmitter Tx, downstream for the receiver Rx.
     pub end: Side,
-    /// Start of the upload.
+    /// Time at which the upload begins.
     pub at: Instant,
-    /// Mission that is uploaded.
+    /// Mission that the ground station uploads.
     pub upload: Upload,
 }
 
@@ -57,7 +57,7 @@ pub struct Channel {
     pub overhead: usize,
 }
 
-/// Random-number stream from which the network key is drawn.
+/// Number of the random-number stream from which the network key is drawn.
 const KEYS: u64 = 1;
 
 /// Setup of a simulated run: mission, links, faults, events and records.
@@ -79,7 +79,7 @@ pub struct Setup {
     pub settings: Settings,
     /// Data rate and latency of the links.
     pub link: LinkSpec,
-    /// Probabilities of frame faults on all links.
+    /// Probabilities of faults (loss, corruption, duplication, delay) of a frame on any link.
     pub faults: Faults,
     /// Relays that are switched off: number from 1 and time.
     pub kills: Vec<(u16, Instant)>,
@@ -101,7 +101,8 @@ pub struct Setup {
     pub auth: bool,
     /// Uploads of missions during the run. Without `auth` none takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
-    /// Ends of the chain whose ground stations watch the relays from a time on. None without `auth`, as for uploads.
+    /// Ends of the chain whose ground stations request reports from the relays, each with its start. None without
+    /// `auth`, as for uploads.
     pub watches: Vec<(Side, Instant)>,
     /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,

@@ -92,20 +92,20 @@ pub struct Packets {
 /// Packets of a period and the delays of the delivered ones.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Delivery {
-    /// Numbers of packets in the period.
+    /// Numbers of packets offered, delivered, dropped and lost in the period.
     pub packets: Packets,
     /// Delays of the delivered packets from end to end, ps; sorted once the traffic has ended.
     pub delays: Vec<Ps>,
 }
 
-/// Statistics of the queue of a node.
+/// Length of a node's packet queue over the time of the traffic.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct QueueLength {
     /// Number of the node: 0 is Tx, then the relays follow, the last one is Rx.
     pub node: usize,
     /// Mean length of the queue over the time of the traffic, packets.
     pub mean: f64,
-    /// Largest length of the queue, packets.
+    /// Largest length of the queue during the traffic, packets.
     pub most: usize,
 }
 
@@ -128,7 +128,7 @@ pub struct Flow {
     pub delays: Vec<Ps>,
     /// Queue statistics of every node that sends.
     pub queues: Vec<QueueLength>,
-    /// Packets and delays in each period of [`Traffic::periods`].
+    /// Packets and their delays in each period of [`Traffic::periods`].
     pub periods: Vec<Delivery>,
 }
 
@@ -139,7 +139,8 @@ pub struct Traffic {
     pub from: Ps,
     /// End of the traffic in the direction that ends last, ps of virtual time.
     pub until: Ps,
-    /// Periods with a constant view, state of the chain and promised data rate, in order of time.
+    /// Periods with a constant view, state of the chain and promised data rate, in order of time. A view is a
+    /// membership of the chain.
     pub periods: Vec<Period>,
     /// Traffic to Rx and, if data goes both ways, traffic back to Tx.
     pub flows: Vec<Flow>,
@@ -248,7 +249,7 @@ struct Queue {
     packets: VecDeque<Ps>,
     /// Hop on which the node sends; `None` while it cannot send.
     hop: Option<Hop>,
-    /// Slot time, ps, that the first packet still needs, counted from `since`. 0 before its transmission.
+    /// Slot time that the first packet still needs, ps, as of `since`; 0 before its transmission starts.
     rest: Ps,
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
@@ -300,9 +301,8 @@ impl Queue {
     }
 }
 
-/// End of a transmission, as an event in a queue: time, order, node, and number of the transmission.
-///
-/// If several end at the same time, `order` puts the node first that is nearest to the destination of the packets.
+/// End of a packet's transmission: time, order, node, and number of the transmission. If several end at the same
+/// time, `order` puts the node first that is nearest to the destination of the packets.
 type End = Reverse<(Ps, usize, usize, u32)>;
 
 /// Simulation of the traffic in one direction, while it runs.

@@ -22,9 +22,8 @@ pub struct TrueInterference {
     pub period: Duration,
     /// True if a relay measures only once at each of its positions.
     pub once: bool,
-    /// Samples that relays get in place of all measurements: the relay's number from 1, and the sample.
-    ///
-    /// The relays get these samples at the time of the first measurement.
+    /// Samples that relays get instead of measurements: the relay's number from 1, and the sample. They get them at
+    /// the time of the first measurement.
     pub handed: Vec<(u16, Sample)>,
     /// Measuring receivers that report wrong powers.
     pub broken: Vec<BrokenReceiver>,
@@ -37,7 +36,7 @@ pub struct TrueInterference {
     pub ends: bool,
     /// Time of the last measurement, which ends the run.
     pub until: Instant,
-    /// Seed of the shadowing at each position.
+    /// Seed of the random shadowing at each position.
     pub seed: u64,
 }
 
@@ -55,13 +54,13 @@ pub struct BrokenReceiver {
 /// Power that a broken receiver reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BrokenReading {
-    /// The true interference times this factor.
+    /// The true interference power times this factor.
     Times(f64),
     /// A constant power, W, whatever the true interference.
     Always(f64),
 }
 
-/// Edge of the cubes in which space is divided, m. All positions in a cube have the same shadowing.
+/// Edge length of the cubes of constant shadowing, m. All positions in one cube have the same random loss.
 const SHADOW_M: f64 = 5.0;
 
 impl TrueInterference {
@@ -150,7 +149,8 @@ impl TrueInterference {
         self.ends && now >= from && now < until
     }
 
-    /// Draws the random factor of a measured power: the mean of `samples` exponential variables of mean 1.
+    /// Draws the random factor of a measured power. It is the mean of `samples` exponential random variables of mean
+    /// 1.
     fn mean(&self, rng: &mut impl Rng) -> f64 {
         let samples = f64::from(self.samples);
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
@@ -175,7 +175,7 @@ fn decibel(db: f64) -> f64 {
 /// Snapshot of the relays' positions and estimate at the time of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
-    /// Time of the snapshot.
+    /// Time of the snapshot of the interference.
     pub at: Instant,
     /// Numbers of the relays that are on, from 1.
     pub nodes: Vec<u16>,

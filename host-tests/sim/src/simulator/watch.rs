@@ -29,7 +29,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Starts the statistics with the states `seen` of the relays.
+    /// Starts the statistics of a run with the relays' states `seen`.
     ///
     /// `run` simulates a chain without faults, to compute the positions with which this chain is compared.
     pub fn new(seen: Vec<ObservedState>, run: Run) -> Self {
@@ -332,7 +332,7 @@ pub type Places = Option<Vec<Point>>;
 /// Function that runs a simulated chain to its end; `None` if a relay rejects its settings.
 pub type Run = fn(Setup) -> Option<Outcome>;
 
-/// Cache of the positions in which chains settle without faults, by relays and mission version.
+/// Cache of the positions that chains reach without faults, by their relays and mission version.
 #[derive(Debug)]
 pub struct Optima {
     run: Run,

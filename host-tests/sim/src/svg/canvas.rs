@@ -82,7 +82,7 @@ impl Canvas {
         ));
     }
 
-    /// Draws a sample of a hop's line for the legend: from (`x`, `y`) to the right, `length` long.
+    /// Draws a short sample of a hop's line in the legend, from (`x`, `y`) to the right, `length` long.
     pub(super) fn swatch(&mut self, (x, y): Point, length: f64, (colour, width): (&str, f64)) {
         let [x, y, end, width] = [x, y, x + length, width].map(short);
         self.put(format_args!(
@@ -205,7 +205,7 @@ fn escape(words: &str) -> String {
     out
 }
 
-/// Linear map from a quantity, such as a distance in metres, to a coordinate of the picture.
+/// Linear scale from a quantity, such as a distance in metres, to a coordinate of the picture.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     from: (f64, f64),
@@ -231,7 +231,7 @@ impl Scale {
         self.to.0 + share * (self.to.1 - self.to.0)
     }
 
-    /// Returns true if a quantity is within the range of the scale.
+    /// Returns true if `value` is within the range of the scale.
     pub(super) fn holds(&self, value: f64) -> bool {
         (self.from.0..=self.from.1).contains(&value)
     }

@@ -267,7 +267,7 @@ fn draw_legend(canvas: &mut Canvas, picture: &Picture) {
 
 const STRIP: f64 = 84.0;
 
-/// Distance of the line with the events from the bottom of the legend, in picture units.
+/// Distance of the line of events from the bottom of the legend, in picture units.
 const LINE: f64 = 48.0;
 
 /// Distance of the first and the last event from the picture's left and right edge, in picture units.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
-/// GeoTIFF to write: north-west height, size of a cell, EPSG code and nodata value.
+/// GeoTIFF that a test writes: north-west height, size of a cell, EPSG code and nodata value.
 pub(crate) struct Raster {
     pub(crate) corner: [f64; 2],
     pub(crate) cell: [f64; 2],
@@ -19,7 +19,7 @@ pub(crate) struct Raster {
 }
 
 impl Raster {
-    /// A geographic grid.
+    /// Creates a GeoTIFF with a geographic grid (longitude and latitude) for a test.
     pub(crate) fn geographic(west: f64, north: f64, cell: f64, size: [u32; 2]) -> Self {
         Self {
             corner: [west, north],
@@ -32,7 +32,7 @@ impl Raster {
         }
     }
 
-    /// Writes heights, given by the coordinates to the east and north.
+    /// Writes the GeoTIFF; `height` returns the height at coordinates to the east and north.
     pub(crate) fn write(&self, file: &PathBuf, height: impl Fn(f64, f64) -> f64) {
         let [columns, rows] = self.size;
         let mut values = Vec::new();
@@ -83,7 +83,7 @@ impl Raster {
     }
 }
 
-/// Writes an SRTM tile of 1201 x 1201 heights, given by longitude and latitude.
+/// Writes an SRTM tile of 1201 x 1201 heights for a test. `height` returns the height at a longitude and latitude.
 pub(crate) fn hgt(file: &PathBuf, [west, south]: [f64; 2], height: impl Fn(f64, f64) -> f64) {
     let mut bytes = Vec::new();
     for row in 0..1201 {

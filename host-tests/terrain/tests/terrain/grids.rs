@@ -6,7 +6,7 @@ use uav_relay_terrain::grid::Terrain;
 use crate::files::{Raster, hgt};
 use crate::{rng, seeds};
 
-/// Height of a tilted plane, which bilinear interpolation reproduces.
+/// Returns the height of a tilted plane, which bilinear interpolation reproduces exactly.
 fn plane(east: f64, north: f64) -> f64 {
     500.0 + 300.0 * (east - 8.0) - 200.0 * (north - 47.0)
 }

@@ -20,7 +20,7 @@ const LINKS: [[f64; 3]; 5] = [
     [70.0, 5.0, 150.0],
 ];
 
-/// Published losses La, Ls and Lsph, and the result, dB.
+/// Published losses of the ITU's examples: La, Ls, Lsph, and the resulting loss, dB.
 const PUBLISHED: [[f64; 4]; 20] = [
     [32.84284766, 13.74840484, 15.3485837, 34.44302652],
     [37.229036, 18.5970601, 23.6973069, 42.32928281],
@@ -109,7 +109,7 @@ fn both_implementations_give_the_losses_that_the_itu_published() {
     );
 }
 
-/// Random hilly profile: sums of a few sines, and antennas above or just below the hills.
+/// Draws a random hilly profile: sums of a few sines, with antennas above or just below the hills.
 fn random(rng: &mut impl rand::Rng) -> Path {
     let length: f64 = 10_f64.powf(rng.random_range(-1.0..1.7));
     let n = rng.random_range(20..400);

@@ -5,11 +5,11 @@
 
 use std::f64::consts::PI;
 
-/// Profile and link as the Recommendation has them.
+/// Profile and link in the form of the ITU Recommendation, for an independent computation of the loss.
 pub(crate) struct Path {
-    /// Distances, km, from 0.
+    /// Distances of the profile's points, km, from 0.
     pub(crate) d: Vec<f64>,
-    /// Heights, m above the sea.
+    /// Heights of the profile's points, m above the sea.
     pub(crate) h: Vec<f64>,
     pub(crate) hts: f64,
     pub(crate) hrs: f64,
@@ -21,7 +21,7 @@ pub(crate) struct Path {
 
 const AE_KM: f64 = 8500.0;
 
-/// Parts of the loss, dB.
+/// Parts of the diffraction loss of a hop as ITU-R P.526 defines them, dB.
 pub(crate) struct Loss {
     pub(crate) actual: f64,
     pub(crate) smooth: f64,
@@ -100,7 +100,7 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
     -fx - g(h1) - g(h2)
 }
 
-/// Loss of the smooth earth, dB.
+/// Returns the diffraction loss of the smooth earth, dB.
 ///
 /// The place of the smallest clearance, where the antennas have the same elevation (as for a reflection), is found by bisection.
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {

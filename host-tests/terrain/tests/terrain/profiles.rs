@@ -13,7 +13,7 @@ use uav_relay_terrain::report::{FreeSpace, TerrainReport};
 use crate::files::Raster;
 use crate::{rng, seeds};
 
-/// Hills of 100 m with slopes up to 45 %, by longitude and latitude.
+/// Returns the height of hills of up to 100 m with slopes up to 45 %, at a longitude and latitude.
 fn hills(lon: f64, lat: f64) -> f64 {
     let (x, y) = ((lon - 8.0) * 75_500.0, (lat - 47.0) * 111_200.0);
     600.0 + 60.0 * (x / 300.0).sin() * (y / 350.0).cos() + 40.0 * (x / 190.0 + y / 250.0).sin()
@@ -71,7 +71,8 @@ fn profiles_are_within_a_metre_of_the_hills_along_geodesics() {
     println!("largest error of a profile: {worst:.3} m");
 }
 
-/// A wall of 100 m across a plain of 500 m, 2 km from Tx on a line of 5 km to the east.
+/// Returns the height of a wall of 100 m on a plain of 500 m. The wall is 2 km from Tx, on a line of 5 km to the
+/// east.
 fn wall(lon: f64, _: f64) -> f64 {
     500.0 + (100.0 - 0.3 * (lon - 8.035_f64).abs() * 76_000.0).max(0.0)
 }

@@ -61,7 +61,7 @@ fn run(options: &Options) -> Result<(), FigureError> {
     Ok(())
 }
 
-/// Progress of a run: a bar on a terminal, otherwise a line on standard error per figure.
+/// Progress display of `cargo figures`. It is a bar on a terminal, otherwise a line on standard error per figure.
 struct Progress {
     bar: ProgressBar,
     is_terminal: bool,

@@ -21,7 +21,7 @@ pub const EXPLORE_M: f32 = 10.0;
 /// Numbers of rounds of Algorithm 2 after which the figure shows the relays' positions.
 pub const ROUNDS: [u16; 4] = [0, 10, 50, 500];
 
-/// Search of each relay's best position on a grid, for comparison with the coarse-to-fine search.
+/// Search on a grid for a relay's best position, for comparison with the coarse-to-fine search.
 pub const GRID: Local = Local::Grid {
     columns: 41,
     rows: 21,
@@ -135,7 +135,7 @@ fn taken() -> Vec<String> {
     ]
 }
 
-/// Formats the horizontal distances of neighbours near Tx, in the middle, and near Rx.
+/// Formats the horizontal distances of neighbouring relays near Tx, in the middle, and near Rx.
 ///
 /// The relays' positions are those after `round` rounds of Algorithm 2.
 fn steps(rows: &[ShapeRow], round: u16) -> String {

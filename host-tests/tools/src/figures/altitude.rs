@@ -35,7 +35,7 @@ struct Row {
 /// Lowest and highest altitude, m, of the close-up around the paper's best altitude, in steps of 0.5 m.
 const CLOSE_UP_M: (u32, u32) = (195, 230);
 
-/// Computes a table row for each pair of an interferer's offset and a common altitude, both in m.
+/// Returns a table row for each pair of an interferer's offset and a common altitude, both in m.
 fn data(pairs: &[(f64, f64)]) -> Result<Vec<Row>, FigureError> {
     pairs.par_iter().map(|&(y, h)| row(y, h)).collect()
 }

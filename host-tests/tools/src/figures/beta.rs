@@ -18,14 +18,14 @@ pub const STEPS: u32 = 100;
 struct Row {
     alpha: f64,
     beta: f64,
-    /// Ratio of the maximum interference power to the effective power that the relays use, 1 / E[1 / I].
+    /// Largest interference power `I_max` times Upsilon = E[1/I]. 1 / Upsilon is the effective power that relays use.
     upsilon_times_i_max: f64,
     /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,
     density: f64,
 }
 
-/// Returns the densities of all distributions at `steps` + 1 equally spaced points from 0 to 1.
+/// Returns points of all Beta densities, at `steps` + 1 equally spaced values from 0 to 1.
 fn data(steps: u32) -> Vec<Row> {
     let mut rows = Vec::new();
     for (alpha, beta) in SHAPES {

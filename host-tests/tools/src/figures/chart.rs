@@ -18,9 +18,9 @@ pub struct Chart {
 pub struct Panel {
     /// Heading that tells this panel from the chart's others; empty for a single panel.
     pub heading: String,
-    /// Horizontal axis.
+    /// Horizontal axis of the panel.
     pub x: Axis,
-    /// Vertical axis.
+    /// Vertical axis of the panel.
     pub y: Axis,
     /// Curves in drawing order: later ones are on top.
     pub lines: Vec<Line>,
@@ -50,19 +50,18 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Style of a curve. Curves of a chart differ in colour, stroke and marker, so that a reader who cannot tell the
-/// colours apart recognises them, too.
+/// Style of a curve: colour, stroke and markers, all different from other curves of the chart.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Look {
     /// Number of the colour, from 0 to 6, which also selects the shape of the markers.
     pub hue: usize,
-    /// Stroke of the line between the points.
+    /// Stroke of the line between the curve's points: full, dashed or dotted.
     pub stroke: Stroke,
     /// Choice of the points that get a marker.
     pub signs: Signs,
 }
 
-/// Choice of the points of a curve that get a marker.
+/// Points of a curve that get a marker.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signs {
     /// Curve without markers.
@@ -78,11 +77,11 @@ pub enum Signs {
 pub enum Stroke {
     /// Points are not connected; only their markers are drawn.
     None,
-    /// Solid line.
+    /// Solid line through the curve's points.
     Full,
-    /// Dashed line.
+    /// Dashed line through the curve's points.
     Dashed,
-    /// Dotted line.
+    /// Dotted line through the curve's points.
     Dotted,
 }
 
@@ -139,7 +138,7 @@ impl Look {
         }
     }
 
-    /// Changes the style to markers that are well apart in the picture.
+    /// Changes the style so that markers are well apart in the picture.
     pub const fn spaced(self) -> Self {
         Self {
             signs: Signs::Spaced,
@@ -147,7 +146,7 @@ impl Look {
         }
     }
 
-    /// Changes the style to a curve without markers.
+    /// Changes the style so that no point gets a marker.
     pub const fn unsigned(self) -> Self {
         Self {
             signs: Signs::None,
@@ -155,7 +154,7 @@ impl Look {
         }
     }
 
-    /// Changes the stroke of the line between the points.
+    /// Changes the stroke of the line between the points to `stroke`.
     pub const fn joined(self, stroke: Stroke) -> Self {
         Self { stroke, ..self }
     }
@@ -234,7 +233,7 @@ impl Scale {
         Self { kind, from, to }
     }
 
-    /// Creates an axis for data from `least` to `most`, with its ends at the next round numbers.
+    /// Creates an axis for data from `least` to `most`; its ends are the next round numbers outside.
     pub fn around(kind: Kind, least: f64, most: f64) -> Self {
         match kind {
             Kind::Linear => {
@@ -307,7 +306,7 @@ impl Scale {
     }
 }
 
-/// Returns the exponent of the largest power of ten that is at most `value`, which is above 0.
+/// Returns the exponent of the largest power of ten that is at most `value`, a number above 0.
 #[expect(clippy::cast_possible_truncation, reason = "the exponent of an f64")]
 fn decade(value: f64) -> i32 {
     (value.log10() + ROUNDING).floor() as i32

@@ -10,8 +10,8 @@ use super::{paper, walk};
 /// Numbers of relays in the chains of the figure, one chain for each curve.
 pub const RELAYS: [u16; 5] = [2, 8, 20, 50, 100];
 
-/// Decrease of the target SIR from one pass of messages along the chain to the next, linear. It is that of the
-/// paper's Algorithm 1.
+/// Decrease of the target SIR from one pass to the next, linear, as in the paper's Algorithm 1. A pass is a series of
+/// messages along the chain.
 pub const STEP: f64 = 0.1;
 
 /// Table row: SIR of a chain after one pass of messages along the chain (a sweep).
@@ -50,8 +50,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the passes of messages to draw, the last ones more densely. They are the first, every hundredth, every
-/// tenth of the last 1 000, and the last twenty.
+/// Selects the passes (messages along the chain) that the figure draws, the last ones more densely.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()

@@ -25,7 +25,7 @@ const GRID: RGBColor = RGBColor(205, 205, 205);
 const FINE_GRID: RGBColor = RGBColor(236, 236, 236);
 const PEN: u32 = 4;
 const APART: f64 = 105.0;
-/// Shift of a curve's markers along the curve, in picture units, for each step of the colour number.
+/// Shift of a curve's markers along the curve per colour number, in picture units.
 ///
 /// It puts the markers of curves that coincide side by side instead of on top of each other.
 const APART_BY_HUE: u8 = 25;
@@ -183,7 +183,7 @@ const fn dash(stroke: Stroke) -> Option<(i32, i32)> {
     }
 }
 
-/// Returns the entries of the legend: each curve's name once, with the style of its first curve.
+/// Returns the entries of the legend: the name of each curve once, with the style of its first curve.
 fn entries(chart: &Chart) -> Vec<(&str, Look)> {
     let mut entries: Vec<(&str, Look)> = Vec::new();
     for line in chart.panels.iter().flat_map(|panel| &panel.lines) {

@@ -18,7 +18,7 @@ pub const PASSES: u64 = 6;
 /// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Table row: a chain's SIR as a fraction of the best possible SIR, after a number of agreements.
+/// Table row: SIR of chains over the best possible SIR, after a number of agreements on positions.
 ///
 /// The row summarises many random arrangements of the interferers.
 #[derive(Clone, PartialEq, Debug, Serialize)]

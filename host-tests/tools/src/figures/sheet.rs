@@ -17,9 +17,9 @@ use super::draw::{NotDrawn, draw};
 pub struct Sheet {
     /// Name of the figure on the command line, and of its file without `.svg`.
     pub name: &'static str,
-    /// Title of the figure.
+    /// Title of the figure, shown above it.
     pub title: &'static str,
-    /// Texts of the figure's caption, a paragraph each: what the figure shows.
+    /// Paragraphs of the figure's caption, which say what the figure shows.
     pub says: Vec<String>,
     /// Notes below the figure: the parameters with which it is computed, and those that the paper omits.
     pub taken: Vec<String>,
@@ -27,7 +27,7 @@ pub struct Sheet {
     pub chart: Chart,
     /// Tables with the figure's numbers, written as CSV files.
     pub tables: Vec<Table>,
-    /// Cells of a short table in the figure's caption: a row of headings, then the other rows.
+    /// Cells of a short table in the figure's caption; the first row has the headings. Empty for no table.
     pub shown: Vec<Vec<String>>,
 }
 
@@ -177,19 +177,19 @@ fn escape(words: &str) -> String {
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum FigureError {
-    /// Error: the scenario of the figure is not a valid mission, for this reason.
+    /// The scenario of the figure is not a valid mission, for this reason.
     Mission(Refusal),
-    /// Error: a relay rejects the settings of the figure, for this reason.
+    /// A relay rejects the settings of the figure, for this reason.
     Setup(SetupError),
-    /// Error: a target SIR cannot be met, or a simulated chain has not settled. The text names the chain.
+    /// A target SIR cannot be met, or a simulated chain has not settled. The text names the chain.
     Unsettled(&'static str),
-    /// Error: the chart of the figure cannot be drawn, for this reason.
+    /// The chart of the figure cannot be drawn, for this reason.
     Drawing(NotDrawn),
-    /// Error: a table of the figure cannot be written as CSV, for this reason.
+    /// A table of the figure cannot be written as CSV, for this reason.
     Table(csv::Error),
-    /// Error: the table with this file name contains a number that is not finite.
+    /// The table with this file name contains a number that is not finite.
     NotFinite(String),
-    /// Error: the file with this path cannot be written, for this reason.
+    /// The file with this path cannot be written, for this reason.
     File(String, std::io::Error),
 }
 

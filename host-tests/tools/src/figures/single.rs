@@ -126,22 +126,22 @@ pub const PRINTED_PERCENT: (f64, f64) = (30.14, 25.73);
 
 const PRINTED_LARGEST_PERCENT: f64 = 65.0;
 
-/// Largest difference between a computed and a printed average that counts as equal, percentage points.
+/// Largest difference of a computed and a printed average gain that count as equal, percentage points.
 const NEAR: f64 = 0.5;
 
 /// Interpretation of the paper's "average gain": the quantity that is averaged over the altitudes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub enum Reading {
-    /// Average gain: the gain in linear SIR at each altitude, averaged over the altitudes.
+    /// Gain in linear SIR at each altitude, averaged over the altitudes.
     #[serde(rename = "mean of linear gains")]
     LinearGains,
-    /// Average gain: the gain in linear SIR after the SIRs are averaged over the altitudes.
+    /// Gain in linear SIR after the SIRs are averaged over the altitudes.
     #[serde(rename = "gain of mean linear SIR")]
     LinearMeans,
-    /// Average gain: the gain after the SIRs in dB are averaged over the altitudes.
+    /// Gain after the SIRs in dB are averaged over the altitudes.
     #[serde(rename = "gain of mean dB")]
     Decibels,
-    /// Average gain: the gain after log2(1 + SIR) is averaged over the altitudes.
+    /// Gain after log2(1 + SIR) is averaged over the altitudes.
     #[serde(rename = "gain of mean log2(1 + SIR)")]
     Rates,
 }
@@ -235,7 +235,7 @@ fn four(row: &Row, reading: Reading) -> [f64; 4] {
     }
 }
 
-/// Averages the gains in `rows`, the altitudes of one pair of powers, as `reading` states.
+/// Averages the gains in `rows` (the altitudes of one pair of powers) by the interpretation `reading`.
 ///
 /// `None` without rows.
 fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
@@ -274,7 +274,7 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference of a row's two averages from those that the paper prints.
+/// Returns the larger difference of a row's two average gains from the printed ones, percentage points.
 ///
 /// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, else over the
 /// blind method.

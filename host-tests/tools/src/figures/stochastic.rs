@@ -69,7 +69,7 @@ fn lambda_w(mission: &Mission) -> f64 {
     1.0 / (mission.config().channel.eta() * height * height)
 }
 
-/// Returns the distributions of the interference power of this `kind`, at points of the line Tx-Rx.
+/// Returns the distributions of the interference power of this `kind`, at points along the line Tx-Rx.
 ///
 /// The relays interpolate between the points. If the interference is the same everywhere, there is one point.
 fn field(kind: Kind) -> Result<Vec<PointRow>, FigureError> {
@@ -170,7 +170,7 @@ fn shown() -> Result<Vec<Vec<String>>, FigureError> {
     Ok(rows)
 }
 
-/// Returns the curve of one chain: its SIR after each pass of messages along the chain.
+/// Creates the curve of one chain: its SIR after each pass of messages along the chain.
 ///
 /// A chain that settles early keeps its last SIR up to the right end of the picture.
 fn line(rows: &[Row], field: Kind, index: usize, relays: u16) -> Line {

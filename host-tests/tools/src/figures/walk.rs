@@ -17,11 +17,11 @@ use super::sheet::FigureError;
 pub struct Chain {
     /// Positions of the relays in order from Tx to Rx.
     pub places: Vec<Placement>,
-    /// SIR of the worst hop, linear.
+    /// SIR of the chain's worst hop, linear.
     pub sir: f64,
 }
 
-/// Places each relay as far along the chain as the target SIR `target` (linear, > 0) allows.
+/// Places each relay as far toward Rx as the target SIR `target` (linear, > 0) allows.
 ///
 /// `None` if a hop cannot meet the target. If the target is too high, the last relay is far from the end of the
 /// chain, and the last hop has a lower SIR. The cost is one search for a farthest position for each relay.
@@ -158,7 +158,7 @@ pub fn worst(mission: &Mission, places: &[Placement]) -> f64 {
 pub struct Flown {
     /// Positions of the relays in order from Tx to Rx.
     pub places: Vec<Placement>,
-    /// SIR of the worst hop, linear.
+    /// SIR of the chain's worst hop, linear.
     pub sir: f64,
     /// SIR of the worst hop before Algorithm 2 and after each of its rounds, linear.
     pub rounds: Vec<f32>,

@@ -8,7 +8,7 @@ const TOLERANCE: f64 = 1e-13;
 
 const LEAST_TARGET: f64 = 1e-250;
 
-/// Relative allowance for rounding on the minimum separation.
+/// Relative tolerance of the minimum separation, for rounding.
 ///
 /// Without it a thousand relays that just fit on the line could be rejected.
 const ROUNDING: f64 = 1e-12;
@@ -116,7 +116,7 @@ fn best_target(line: &Line, apart: f64, tolerance: f64) -> Option<f64> {
     Some(below)
 }
 
-/// Number of intervals into which the range of altitudes is divided for the scan.
+/// Number of intervals into which the range of altitudes is divided for the first scan.
 ///
 /// The range is divided twice: into intervals of equal length, and into intervals of equal ratio.
 const SCANNED: u32 = 24;
@@ -229,7 +229,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// x of the receiver, within `to`, that belongs to the smallest feasible x of the sender.
+    /// x of the receiver (within `to`) for which the sender's x is smallest.
     farthest: f64,
 }
 
@@ -251,7 +251,7 @@ pub(super) struct Stages<'a> {
     first: Vec<Span>,
 }
 
-/// Data of hops for one target SIR and one transmit power, reused for relays of equal power.
+/// Data of feasible hops for one target SIR and one transmit power, reused for relays of equal power.
 struct Reach {
     stride: Stride,
     hearing: Vec<Span>,
@@ -368,7 +368,7 @@ fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Returns the last point on the way from `sure` to `wish` up to which `holds` is true.
+/// Returns the last point on the way from `sure` to `wish` up to which `holds` returns true.
 ///
 /// `holds` must be true at `sure`.
 fn toward(sure: f64, wish: f64, holds: impl Fn(f64) -> bool) -> f64 {
@@ -528,7 +528,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns the positions of those crossings in `turns` at which a function falls through a given level.
+/// Returns those of the crossings `turns` at which the function falls through its level, as positions.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()

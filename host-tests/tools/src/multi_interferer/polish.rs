@@ -9,18 +9,18 @@ use uav_relay_scenario::scene::{Corridor, Place, Relay, Scene, Sender};
 
 const ROUNDS: u32 = 200;
 
-/// Smallest relative gain in SIR for a round of the search to count as progress.
+/// Smallest relative gain in SIR for which a round of the local search counts as progress.
 const GAIN: f64 = 1e-6;
 
-/// Number of consecutive rounds without progress after which the search ends.
+/// Number of consecutive rounds without progress after which the local search ends.
 ///
 /// It is above 1, because a round without progress may prepare the gain of the next.
 const PATIENCE: u32 = 3;
 
-/// Number of equal steps in which the range along x is scanned before the best position is refined.
+/// Number of equal steps along x in the scan for a relay's best position, before it is refined.
 const PLACES: u32 = 16;
 
-/// Number of equal steps in which the first round scans the altitudes, and the lateral positions.
+/// Number of equal steps in which the first round scans a relay's altitudes, and its lateral positions.
 ///
 /// Later rounds search only one such step on either side of the present value.
 const LEVELS: u32 = 8;
@@ -40,13 +40,13 @@ pub struct Polished {
     pub rounds: u32,
 }
 
-/// Search for one relay's best position while its two neighbours stay where they are.
+/// Search for the best position of one relay while its two neighbours stay where they are.
 struct Turn<'a> {
     scene: &'a Scene,
     relay: &'a Relay,
     before: Sender,
     next: Option<Place>,
-    /// Least distance from the previous relay, m; 0 if the relay receives from Tx.
+    /// Minimum distance from the previous relay, m; 0 if the relay receives from Tx.
     apart_before: f64,
 }
 

@@ -176,7 +176,7 @@ fn link_of_one(y_i: f64) -> Link {
     }
 }
 
-/// Returns the best SIR of one relay by the reference, linear, with an interferer at y = `y_i`, m.
+/// Returns the best SIR of one relay by the reference search, linear. The interferer is at y = `y_i`, m.
 ///
 /// The relay may be up to `room_m` beside the line and `most_m` high.
 fn judged(y_i: f64, room_m: f64, most_m: f64) -> f64 {

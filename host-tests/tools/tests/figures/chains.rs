@@ -284,7 +284,7 @@ fn densities_are_beta_distributions() {
     }
 }
 
-/// Returns E[1 / y] of a Beta distribution as the ratio of two integrals, without its normalisation.
+/// Returns E[1 / y] for a Beta-distributed y, as the ratio of two integrals without the normalisation.
 ///
 /// Substitutes y = t^8 near 0 and 1 - s^8 near 1, to remove the singularities.
 fn mean_of_inverse(alpha: f64, beta: f64) -> f64 {

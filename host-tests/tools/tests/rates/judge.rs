@@ -10,7 +10,8 @@ pub(crate) enum Model {
     Steps(Vec<(f64, f64)>),
 }
 
-/// Independent model of a chain and its data rate: relays at one altitude above the line from Tx to Rx.
+/// Independent model of a chain and its data rate, for comparison with the planner. All relays are at one altitude
+/// above the line from Tx to Rx.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     /// Distance from Tx to Rx, m.
@@ -38,8 +39,7 @@ pub(crate) struct Chain {
 /// Number of grid points along the whole line. There are more, dense ones near Tx, Rx and the interferer.
 const EVEN: usize = 171;
 
-/// Number of equal cells of the line in the search for a radio with rate steps. This search tries the edges of the
-/// cells in addition to the points of the ordinary grid.
+/// Number of equal cells of the line whose edges the search tries, too, for a radio with rate steps.
 const CELLS: usize = 400;
 
 /// Maximum number of chains that each cell keeps in the search for a radio with rate steps.
@@ -210,8 +210,8 @@ impl Chain {
         all
     }
 
-    /// Returns the x of the relays with the largest rate, for a radio with rate steps. There is a list of x for each
-    /// number of relays from 1.
+    /// Returns the x of the relays with the largest rate, m, for a radio with rate steps. There is a list of x for
+    /// each number of relays from 1.
     ///
     /// Each cell of a grid keeps a few first parts of chains, at their exact positions: those with the least times,
     /// and of two with equal times the farther one. The next relay is tried at all grid points, and at all x, found
@@ -337,8 +337,8 @@ impl Chain {
         x
     }
 
-    /// Returns the largest data rates that two searches find with all relays, bit/s/Hz. The first search starts from
-    /// the judge's own grid, the second one also from the x `others`, m.
+    /// Returns the largest data rates that two independent searches find with all relays, bit/s/Hz. The first starts
+    /// from its own grid, the second one also from the x `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
         let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];

@@ -23,7 +23,7 @@ use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 use judge::{Chain, Model};
 
-/// Relative tolerance of the SIR in the plans that the tests request.
+/// Relative tolerance of the SIR that the tests request from the planner.
 const TOLERANCE: f64 = 1e-5;
 
 /// Bandwidth of the data link in the tests, Hz.

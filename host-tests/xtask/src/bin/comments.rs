@@ -40,7 +40,7 @@ const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
 /// Files that may contain old names of items: the list of them, and the table of old and new names.
 const WITH_OLD_NAMES: [&str; 2] = ["host-tests/xtask/data/old_names.txt", "CHANGELOG.md"];
 
-/// Doc comment in a source file: the number of its first line, from 1, and its first paragraph.
+/// Doc comment in a source file: number of its first line, from 1, and its first paragraph.
 struct Comment {
     line: usize,
     paragraph: String,

@@ -302,8 +302,8 @@ fn only_members_may_be_relied_on() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Checks that a refused proposal takes no place in the limited list of votes. The list is for proposals with an
-/// unknown decision.
+/// Checks that a refused view proposal is removed from the list of votes. That list is for proposals with an unknown
+/// decision.
 #[test]
 fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);

@@ -21,8 +21,8 @@ use super::super::chain::{Seat, SolverContext};
 use super::super::hop::{Triple, minus};
 use crate::sir::{Sender, transmitter_gain};
 
-/// Amount added to each squared hop length, so that its logarithm is finite. Two relays may be at one place. The
-/// amount is in units of D^2; D is the distance from Tx to Rx.
+/// Amount added to each squared hop length, so that its logarithm is finite. In units of the squared distance Tx to
+/// Rx.
 const SHORTEST: f32 = 1e-8;
 
 /// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
@@ -146,8 +146,8 @@ impl Gains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q, with q the inverse of interference plus noise at the position `at`. The unit of interference is
-    /// the interferer's power received at the distance from Tx to Rx.
+    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. Interference is relative to
+    /// the interferer's power at the distance from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;

@@ -34,60 +34,54 @@ use core::task::Poll;
 use hop::{Derivatives, Gains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight mu for all levels together, for a start that may be far from the result. mu of one level is
-/// this over the number of levels. A chain has two levels per hop: the logarithms of its forward and backward SIR.
+/// First barrier weight mu of the interior-point method for a start far from the result. It is divided among all hops
+/// and directions.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight mu for all levels together (two per hop), for a start close to the result.
+/// First barrier weight mu of the interior-point method for a start near the result. It is divided among all hops and
+/// directions.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight mu for all levels together (two per hop). The result is within this of a local optimum, in
-/// ln(SIR), if the problem is concave around it.
+/// Last barrier weight mu of the interior-point method, divided among all hops and directions. The result is within
+/// this of a local optimum, in ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight mu falls once the positions have settled for the current mu.
+/// Factor by which the interior-point method's barrier weight mu falls once positions have settled.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit below which the positions count as settled, after more than half of a Newton step. The barrier
-/// weight mu then falls. The merit is the target plus the barrier; its gain is in units of mu times the number of
-/// levels (two per hop).
+/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
+/// number of levels. For steps of more than half a Newton step.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit below which the positions count as settled, after any fraction of a Newton step. The barrier
-/// weight mu then falls. The merit is the target plus the barrier; its gain is in units of mu times the number of
-/// levels (two per hop).
+/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
+/// number of levels. For Newton steps shortened by any factor.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
-/// Maximum step of a coordinate toward its limit, as a fraction of its distance from that limit.
+/// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a step is shortened for the next try, after a try that lowers the merit.
+/// Factor by which a Newton step is shortened after a try that lowers the merit (target plus barrier).
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and mu / s, its value at the optimum for this mu. After each Newton
-/// step a multiplier outside these limits is set to the nearer limit. mu is the barrier weight. s is the amount by
-/// which the logarithm of a hop's SIR in one direction exceeds the target.
+/// Maximum factor between a Lagrange multiplier and mu / s, its value at the optimum. mu is the barrier weight, s the
+/// excess of ln(SIR) of a hop over the target. Multipliers outside are moved to the limit.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target T in one portion of the work. T, in ln(SIR), is slightly below the chain's
-/// worst SIR.
+/// Number of Newton steps for the target T that one call makes. T is slightly below the worst SIR, in ln(SIR).
 const STEPS: u8 = 4;
-/// Index of the last Newton step for the target T, counted from 0. T, in ln(SIR), is slightly below the chain's worst
-/// SIR.
+/// Index, from 0, of the last Newton step for the target T. T is slightly below the worst SIR, in ln(SIR).
 const TARGETS: u8 = 12;
-/// Relative error at which the Newton steps for the target T end. T, in ln(SIR), is slightly below the chain's worst
-/// SIR.
+/// Relative error at which the Newton steps for the target T end. T is slightly below the worst SIR, in ln(SIR).
 const EXACT: f32 = 5e-4;
 
-/// Number of relays in a segment, a part of the chain that one portion of the work handles.
+/// Number of relays in a segment, the part of the chain that one call handles.
 const AT_ONCE: u16 = 10;
-/// Number of relays in the first part of a segment; the second part has the others.
+/// Number of relays in the first of a segment's two parts; the other part has the rest.
 const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Two levels of a hop, and their Lagrange multipliers `lambda`. The levels are ln(forward SIR) and ln(backward SIR /
-/// r); r is the required ratio of backward to forward SIR. A multiplier is stored as the upper half of an f32: three
-/// digits.
+/// Both levels of a hop, and their Lagrange multipliers `lambda`. The levels are ln(forward SIR) and ln(backward SIR
+/// / r). r is the required ratio of backward to forward SIR. A multiplier is the upper half of an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: [f32; 2],
@@ -113,14 +107,13 @@ type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
 enum Segment {
-    /// Rows of the Newton system for the segment's first relay, after the elimination of all relays before.
+    /// Equations of the segment's first relay, after all earlier relays are eliminated.
     Front(Front),
-    /// Newton steps of the segment's relays: of its first six, and of the other four.
+    /// Newton steps of the segment's relays: of its first six and of its last four.
     Steps([Step; FIRST], [Step; SECOND]),
 }
 
-/// Position (x, y, h) of a node, and the lower and upper limits of the coordinates. All are in units of the distance
-/// from Tx to Rx.
+/// Position (x, y, h) of a node and its limits, in units of the distance from Tx to Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -147,8 +140,8 @@ impl Spot {
         minus(self.high, self.at)
     }
 
-    /// Moves each coordinate between its limits, at least `margin` away from them. `margin` is a fraction of the
-    /// distance between the coordinate's lower and upper limit.
+    /// Moves each coordinate at least `margin` inside its limits. `margin` is a fraction of the distance between the
+    /// two limits.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -160,14 +153,12 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of all hops' levels at the tried positions; the field is the next hop. A level is the logarithm of
-    /// a hop's SIR in one direction.
+    /// Computation of all hops' levels (logarithms of their SIRs) at the tried positions. The field is the next hop.
     Levels(u16),
-    /// Computation of the target T from all levels; the field is the number of Newton steps already done. T, in
-    /// ln(SIR), is slightly below the chain's worst SIR.
+    /// Computation of the target T from all levels; the field is the number of Newton steps done. T is slightly below
+    /// the worst SIR, in ln(SIR).
     Target(u8),
-    /// Summation of the merit over all hops; the field is the next hop. The merit (target plus barrier) decides if a
-    /// step is accepted.
+    /// Summation of the merit (target plus barrier), which decides if a step is accepted. The field is the next hop.
     Merit(u16),
     /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),
@@ -178,15 +169,15 @@ enum Work {
     Substitute(u16, bool),
 }
 
-/// State of the interior-point method: the positions of all relays, and the current Newton step. The method maximises
-/// the worst SIR of both directions.
+/// State of the interior-point method: all positions and the Newton step. It maximises the worst SIR of both
+/// directions.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: Gains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Parts of the line Tx-Rx that are closed to two relays: next to Rx to relay 1, next to Tx to relay N. In units
-    /// of the distance from Tx to Rx.
+    /// Lengths of the line Tx-Rx that are closed to two relays. They are next to Rx for relay 1, and next to Tx for
+    /// the last relay. In units of the distance from Tx to Rx.
     pub(super) closed: [f32; 2],
     nodes: [Node; RELAYS],
     last: Hop,
@@ -202,14 +193,14 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     /// Merit (target plus barrier) at the stored positions, before the current step. The step is accepted if it does
     /// not lower the merit.
     merit: f32,
-    /// Sum of the barrier's logarithms so far, at the positions that are tried.
+    /// Sum of the barrier's logarithms over the hops handled so far, at the positions that are tried.
     sum: f32,
-    /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions.
+    /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions only.
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// True if the stored Lagrange multipliers are to be replaced by mu / s, their values at the optimum. mu is the
-    /// barrier weight, s the excess of a level (logarithm of a hop's SIR in one direction) over the target.
+    /// True to replace the stored Lagrange multipliers by mu / s, their values at the optimum. mu is the barrier
+    /// weight, s the excess of a level (ln(SIR) of a hop in one direction) over the target.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -293,8 +284,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Stores two values for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. They take the
-    /// memory of a hop's levels, so they are lost when the interior-point method runs.
+    /// Stores two lengths for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. They
+    /// overwrite a hop's levels, so that they are lost when the interior-point method runs.
     pub(super) fn note(&mut self, index: u16, lengths_m: [f32; 2]) {
         if let Some(node) = self.node(index) {
             node.hop.level = lengths_m;
@@ -338,7 +329,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the stored Newton step of relay `index`; 0 for Tx.
+    /// Returns the stored Newton step of relay `index` in x, y and h; zeros for Tx.
     fn step_of(&self, index: u16) -> Triple {
         let at = usize::from(index).wrapping_sub(1);
         let (segment, k) = (at / (FIRST + SECOND), at % (FIRST + SECOND));
@@ -351,7 +342,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         step.map_or([0.0; 3], |step| step.map(widened))
     }
 
-    /// Returns the position of node `index` plus the tried fraction of its Newton step, and its limits.
+    /// Returns the position of node `index` after the tried fraction of its Newton step, and its limits.
     #[inline(never)]
     fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
@@ -362,7 +353,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the levels and multipliers of hop `k`, 1..=N + 1. Hop k leads to relay k, the last one to Rx.
+    /// Returns the stored levels and multipliers of hop `k`, which leads to relay `k`, or to Rx for N + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -371,8 +362,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Begins to evaluate the stored positions, without a step. If `resets` is true, new Lagrange multipliers then
-    /// replace the stored ones.
+    /// Prepares the evaluation of the stored positions, without a step. If `resets` is true, the Lagrange multipliers
+    /// are then replaced by new ones.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -385,9 +376,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Processes one portion of the interior-point method. After the last portion it is ready with a target in
-    /// ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is each
-    /// backward SIR over r, the required ratio of backward to forward SIR.
+    /// Continues the interior-point method by one bounded portion. After the last portion it is ready with a target
+    /// in ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is
+    /// each backward SIR over r, the required ratio of backward to forward SIR.
     pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let relays = chain.mission.relays();
         let done = match self.work {
@@ -435,9 +426,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds the part of their ends to the barrier. A level is
-    /// ln(forward SIR) or ln(backward SIR / r); r is the required ratio of backward to forward SIR. The barrier keeps
-    /// positions between their limits: it is the sum of ln(distance to a limit).
+    /// Computes the levels of ten hops from hop `k` on, and adds their ends' barrier. The barrier is the sum of
+    /// ln(distance to a limit). A level is ln(forward SIR) or ln(backward SIR / r); r is the required ratio of both.
     fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -468,8 +458,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T, at which the sum of mu / (c - T) over all levels c is 1. mu is the barrier weight, and
-    /// a level is the logarithm of a hop's SIR in one direction.
+    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1. mu is the
+    /// barrier weight, and each level c belongs to one hop in one direction.
     ///
     /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to
     /// it.
@@ -495,8 +485,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the Lagrange multipliers of hop `k`, the slacks of its levels, and the barrier weight mu. A slack is a
-    /// level (logarithm of the hop's SIR in one direction) minus the target.
+    /// Returns the Lagrange multipliers of hop `k`, the slacks of its levels, and the barrier weight mu. A slack is
+    /// ln(SIR) in one direction minus the target.
     fn weights(&mut self, relays: u16, k: u16) -> Weights {
         let (target, mu) = (self.target, self.mu);
         let Hop { level, lambda } = *self.hop(relays, k);
@@ -535,9 +525,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`, and corrects the multipliers of the hop that ends there. A Lagrange
-    /// multiplier stays within the factor [`APART`] of mu / s; mu is the barrier weight, s the excess of a level
-    /// (logarithm of the SIR) over the target.
+    /// Stores the new position of relay `k`, and limits the Lagrange multipliers of the hop to it. They stay within
+    /// the factor [`APART`] of their values at the optimum.
     fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         if self.share > 0.0 && k <= relays {
@@ -556,8 +545,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Begins the next Newton step from the accepted positions, or lowers the barrier weight mu. After the maximum
-    /// number of steps the method ends: ready with the target, in ln(SIR).
+    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight mu. Ready after the
+    /// maximum number of steps, with the target, in ln(SIR).
     fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -594,8 +583,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives of the levels of hop `k` by its `ends`, and its multipliers and slacks. A level is the
-    /// logarithm of the hop's SIR in one direction, and its slack the excess over the target.
+    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, its multipliers and slacks. A level is
+    /// ln(SIR) in one direction, a slack its excess over the target.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
@@ -603,8 +592,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         (hop, weights)
     }
 
-    /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the system's rows for the next
-    /// relay, or `None` if a pivot is not positive. `factors` receives the factors of the last six eliminated relays.
+    /// Eliminates the first `count` relays of `segment` from the Newton system. Returns the equations of the next
+    /// relay; `None` if a pivot is not positive. `factors` receives the factors of the last six eliminated relays.
     #[inline(never)]
     fn eliminate(
         &mut self,
@@ -716,8 +705,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Shortens the Newton steps of all relays, so that the relay at `spot` stays within its limits. `step` is that
-    /// relay's whole step.
+    /// Lowers the common factor on all Newton steps, so that the relay at `spot` stays within its limits. `step` is
+    /// that relay's whole step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let spans = (spot.room_below(), spot.room_above());
         for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {

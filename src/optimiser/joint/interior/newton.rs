@@ -26,26 +26,25 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest pivot that counts as positive, relative to the diagonal element before the elimination.
+/// Smallest pivot that counts as positive, relative to the diagonal element before any elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
 /// Curvature of a coordinate whose two limits are equal. It is so large that the Newton step does not move it.
 const STIFF: f32 = 1e18;
 
-/// Rows of the Newton system for one relay, after the elimination of all relays before. The hop from this relay to
-/// the next one is not yet included.
+/// Equations of the Newton system for one relay, after the elimination of all relays before it. They lack the hop to
+/// the next relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,
     slope: Triple,
     column: Triple,
-    /// Amount that the elimination of the relays before has subtracted from the diagonal of `bend`.
+    /// Amount that the elimination of earlier relays has subtracted from the diagonal of `bend`.
     taken: Triple,
 }
 
-/// Row of an eliminated relay's equations, after forward substitution with its Cholesky factor. The first three values
-/// are the coefficients of the steps in x, y and h of the next relay toward Rx. The last two are right sides: for a
-/// constant target, and per unit that the target changes.
+/// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the
+/// next relay's steps in x, y and h. The last two are right sides: constant, and per unit of the target's change.
 type Row = [f32; 5];
 
 /// Equations of one relay after its elimination, from which its Newton step follows.
@@ -54,7 +53,7 @@ pub(super) struct Factor {
     /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. Those of the
     /// diagonal are stored inverted, because they are divisors.
     lower: [f32; 6],
-    /// Rows of the equations for the relay's x, y and h.
+    /// Linear equations for the relay's steps in x, y and h, one row each.
     rows: [Row; 3],
 }
 
@@ -66,9 +65,8 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Lagrange multipliers of both levels of a hop, and their slacks. The levels are ln(forward SIR) and ln(backward SIR
-/// / r); r is the required ratio of backward to forward SIR. A slack is a level minus the target; `mu` is the barrier
-/// weight.
+/// Lagrange multipliers of both directions of a hop, their slacks, and the barrier weight `mu`. A slack is ln(forward
+/// SIR) or ln(backward SIR / r) minus the target; r is the required ratio of both.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -77,23 +75,21 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier divided by the slack, for each direction of the hop. The slack is the amount
-    /// by which the logarithm of the SIR in that direction exceeds the target.
+    /// Returns the Lagrange multiplier over the slack for each direction of the hop. The slack is ln(SIR) in that
+    /// direction minus the target.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the barrier weight mu divided by the slack, for each direction of the hop. The slack is the amount by
-    /// which the logarithm of the SIR in that direction exceeds the target. At the optimum of the problem with the
-    /// barrier weight mu, the Lagrange multipliers are equal to these quotients.
+    /// Returns the barrier weight mu over the slack for each direction of the hop. These are the Lagrange multipliers
+    /// at the optimum. The slack is ln(SIR) in that direction minus the target.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the Lagrange multipliers of both directions after a Newton step. The step changes the slacks of the
-    /// two directions by a and b. A slack is the amount by which the logarithm of the SIR in its direction exceeds
-    /// the target.
+    /// Returns the hop's Lagrange multipliers after a Newton step that changes its slacks by a and b. A slack is
+    /// ln(SIR) in one direction minus the target.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -163,7 +159,7 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds to this relay's rows the hop that leads to the next node, and eliminates this relay. `None` if a pivot is
+    /// Adds the hop to the next node to this relay's equations, and then eliminates this relay. `None` if a pivot is
     /// not positive.
     fn eliminate(
         &mut self,
@@ -196,8 +192,8 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated relay before from this node's rows. `factor` is the result of
-    /// that elimination. Products of its values are added to `sums`, from which the target's Newton step follows.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`, from this node's equations. Also
+    /// updates `sums`, from which the target's Newton step follows.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -229,8 +225,9 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of mu (ln a + ln b), the barrier of one coordinate; the second one negated. a and b are the
-/// distances of the coordinate to its lower and upper limit, mu the barrier weight.
+/// Adds the derivatives of one coordinate's barrier to `slope` and `bend`. The barrier is mu (ln a + ln b); the
+/// second derivative is negated. a and b are the distances to the lower and the upper limit, mu is the barrier
+/// weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -262,8 +259,7 @@ fn combine(to: &mut Row, from: &Row, part: f32, scale: f32) {
     }
 }
 
-/// Returns the solution z of L' z = v. L' is the transpose of the Cholesky factor L, the first argument. The vector v
-/// is the second.
+/// Returns the solution z of L' z = v. L' is the transpose of the Cholesky factor, the first argument.
 fn backward([a, b, c, d, e, f]: [f32; 6], [x, y, z]: Triple) -> Triple {
     let z = z * f;
     let y = (y - e * z) * d;

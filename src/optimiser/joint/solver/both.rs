@@ -26,39 +26,37 @@ use crate::root::sqrt;
 use crate::sir::square;
 use core::task::Poll;
 
-/// Number of relays for which one portion of the solver's work continues Algorithm 1. The algorithm computes the x of
-/// all relays for one target.
+/// Number of relays for which one call of the solver continues Algorithm 1. The algorithm computes the x of all
+/// relays for one target.
 const LINE: u16 = 2;
-/// Number of relays that get their initial positions in one portion of the solver's work. The work is done in
-/// portions so that each call of the solver is short.
+/// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
 /// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays
-/// at the same x. The fraction is also the relays' minimum distance to their limits, relative to the permitted range.
-/// The first value is for the first run of the method, the second for its repetitions.
+/// at the same x. The first value is for its first run, the second for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
-/// Initial chain of the search, described from the end (Tx or Rx) with more power to the other end.
+/// Description of an initial chain, from the end with more power (Tx or Rx) to the other end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
     /// Lateral offsets away from the interferer, as fractions of the largest permitted one. The values are for the
     /// first, the middle and the last relay.
     aside: [f32; 3],
-    /// Altitudes of the first and the last relay: 0 is the lowest permitted one, 1 the highest.
+    /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
     along: Along,
 }
 
-/// Initial x of the relays.
+/// Way to choose the initial x of the relays along the line from Tx to Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Along {
-    /// x that Algorithm 1 computes for the relays' cross-sections.
+    /// x from Algorithm 1, for the relays' lateral offsets and altitudes.
     Line,
     /// First and last x of evenly spaced relays, as fractions of the distance from Tx to Rx. They are counted from
     /// the end with more power.
     Even([f32; 2]),
-    /// x that Algorithm 1 computes without those closed by `close_beyond`. The cross-sections lead down to the end with
-    /// less power, as part of an ellipse.
+    /// x from Algorithm 1 without those that `close_beyond` closes. Lateral offsets and altitudes follow part of an
+    /// ellipse down to the end with less power.
     Arc,
 }
 
@@ -140,37 +138,38 @@ impl Start {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search finds the highest target at the lateral offsets and altitudes of an interior-point run.
+    /// The search finds the highest target at the interior-point method's lateral offsets and altitudes.
     Result,
-    /// The search finds the highest target of the best chain more exactly, at the end of the solution.
+    /// The search finds the best chain's highest target more exactly, at the end of the whole solution.
     Last,
 }
 
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays that are
-    /// done.
+    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays done so
+    /// far.
     Begin(u16),
     /// Search for the highest target that Algorithm 1 meets at the current lateral offsets and altitudes.
     Seek(Seek, Purpose),
     /// Computation of the x of all relays by Algorithm 1 for this target, in ln(SIR).
     Settle(f32),
-    /// Choice of the positions at which the interior-point method starts. The field is the number of relays that are
-    /// done.
+    /// Choice of the positions at which the interior-point method starts. The field is the number of relays done so
+    /// far.
     Put(u16),
     Interior,
 }
 
-/// Progress of Algorithm 1 for one target: in its pass from Tx to Rx, or in its pass back to Tx.
+/// Progress of Algorithm 1 for one target. It has a pass over the relays to Rx, and a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
     /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
     /// back.
     index: u16,
-    /// True during the pass back to Tx.
+    /// True while the solver passes along the chain from Rx back to Tx.
     is_back: bool,
-    /// x of relay `index`, m: the farthest that meets the target, or in the pass back its final x.
+    /// x of relay `index`, m. In the pass to Rx it is the farthest that meets the target, in the pass back the final
+    /// one.
     x_m: f32,
     /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
     end_m: f32,
@@ -185,11 +184,11 @@ impl Pass {
     };
 }
 
-/// Solver of a chain that carries data in both directions.
+/// Joint solver of a chain that carries data in both directions.
 #[derive(Clone, Debug)]
 pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) interior: Interior<RELAYS, SEGMENTS>,
-    /// Best target found, in ln(SIR); `None` before the first.
+    /// Best target found, in ln(SIR); `None` before any is found.
     best: Option<f32>,
     /// Lateral offsets and altitudes of the chain that meets the best target.
     best_cells: Cells<RELAYS>,
@@ -197,7 +196,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pass: Pass,
     /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
-    /// Number of runs of the interior-point method from x of Algorithm 1, for the current initial chain.
+    /// Number of repeated runs of the interior-point method for the current initial chain.
     again: u8,
     /// Number of the current initial chain. In chain 0 all relays are at the common altitude.
     number: u8,
@@ -216,7 +215,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         number: 0,
     };
 
-    /// Processes one portion of the solution; ready with the target SIR, linear, at the end. A portion is two relays
+    /// Continues the solution by one portion; ready with the target SIR, linear, at the end. A portion is two relays
     /// of Algorithm 1, ten relays of a Newton step, or twenty relays of other work.
     pub(super) fn step(
         &mut self,
@@ -272,7 +271,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns true if the current initial chain is [`Along::Arc`].
+    /// Returns true if the initial x of the current chain are chosen by [`Along::Arc`].
     fn is_arc(&self) -> bool {
         self.start().is_some_and(|start| start.along == Along::Arc)
     }
@@ -320,8 +319,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Closes the x beyond the interferer to the relay next to the end with more power. At these x its SIR rises with
-    /// the distance from that end.
+    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x its
+    /// SIR rises with the distance from that end.
     ///
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
     /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The interferer is taken
@@ -448,7 +447,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Computes the farthest x at which the next relay toward Rx meets `target`. The last relay gets its final x.
+    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay its final x.
     /// `None` if the target cannot be met.
     fn line_there(
         &mut self,
@@ -505,7 +504,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Some(())
     }
 
-    /// Returns relay `index` and the hop to it for Algorithm 1, computed exactly as the relay will do it.
+    /// Returns relay `index` and its hop for Algorithm 1, computed exactly as the relay will compute them.
     fn line_link<'a>(
         &self,
         chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
@@ -552,7 +551,7 @@ fn before(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> u16 {
     }
 }
 
-/// Returns the coordinates of a point on the unit circle. For `part` from 0 to `whole` it goes from (1, 0) to (0, 1).
+/// Returns a point on the unit circle: from (1, 0) for `part` = 0 to (0, 1) for `part` = `whole`.
 fn quarter(part: u16, whole: u16) -> [f32; 2] {
     let [a, b] = [whole.saturating_sub(part), part].map(f32::from);
     let radius = sqrt(square(a) + square(b));
@@ -560,11 +559,11 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
 }
 
 /// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
-/// meets at the last result's lateral offsets and altitudes, less the target that the method itself has reached.
+/// meets at the last run's lateral offsets and altitudes, less the target of that run.
 const NEW: f32 = 3e-4;
-/// Maximum number of runs of the interior-point method from x of Algorithm 1, per initial chain.
+/// Maximum number of the interior-point method's runs per initial chain that start from Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Excess of the first target to try over the result of the interior-point method, in ln(SIR). The method may miss a
-/// local optimum by this much.
+/// Excess of the first target to try over the interior-point method's result, in ln(SIR). It is the method's possible
+/// error.
 const ABOVE: f32 = 1e-4;

@@ -13,15 +13,15 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision of the search for the highest target of a chain after its improvement, in ln(SIR).
+/// Precision of the search for the highest target that an improved chain meets, in ln(SIR).
 pub(super) const JUDGED: f32 = 4e-6;
 
 /// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). A chain within
 /// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Excess of a chain's first limit of the target SIR over the upper bound of all chains, in ln(SIR). At its limit the
-/// chain is checked against that bound, which the first and the last hop set.
+/// Excess of a chain's first limit of the target over the upper bound of all chains, in ln(SIR). At the limit the
+/// chain is checked against that bound.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -43,7 +43,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.tried(chain, seek, purpose, met.then_some(false))
     }
 
-    /// Checks in one more segment of ten relays that all of them have a position that meets the target.
+    /// Checks in one more segment (ten relays) that each relay has a position that meets the target.
     ///
     /// A relay may have to stay short of its farthest position for the sake of the next relay. The segments are
     /// checked from the last to the first; `place_m` is the x that the last relay of the segment has to take, m.
@@ -68,7 +68,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records the result of one target, and selects the next piece of work.
+    /// Records if the chain meets the target that was tried, and selects the next piece of work.
     ///
     /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
     /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
@@ -239,11 +239,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for which the last phase improves the chain by single-relay trial moves. Chains in which
-/// some relays have a fixed altitude are always improved so, since their path has kinks.
+/// Maximum number of relays for which the last phase tries moves of single relays. It always does if some relays have
+/// a fixed altitude, since the path then has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of times that the relays' trial moves are halved in the last phase of the solution.
+/// Number of times that the trial moves of single relays are halved, in the last phase of the solution.
 const HALVINGS: u16 = 12;
 /// First trial move of a relay in the last phase of the solution, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
@@ -254,9 +254,9 @@ pub(super) const GAIN: f32 = 2e-5;
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the current trial move: relay, kind of move, and number of halvings of its length. Kinds 0 to 3 move the
-    /// relay down, up, left or right. Kinds 4 and 5 copy the lateral offset and altitude of the relay with an index
-    /// larger, or smaller, by 2.
+    /// Returns the current trial move: the relay's index, the kind of move, and how often it was halved. Kinds 0 to 3
+    /// move it down, up, left or right. Kinds 4 and 5 copy the offset and altitude of the relay two places on or
+    /// back.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -317,7 +317,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Begins the ascent (improvement) of the next initial chain, or ends the search after the last one.
+    /// Begins the improvement of the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
@@ -388,8 +388,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. With the purpose [`Purpose::Start`] they are those
-    /// of a new initial chain, otherwise those stored for the current chain.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they are those of a new
+    /// initial chain, else the stored ones.
     pub(super) fn shaped(
         &self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

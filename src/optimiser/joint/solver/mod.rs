@@ -33,11 +33,11 @@ use both::Both;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {
-    /// Number of relays that the forward pass has completed.
+    /// Number of relays that the forward pass (the one that moves the relays) has completed.
     done: u16,
     /// Position to which the forward pass has moved the last relay that it has completed.
     from: Placement,
-    /// Old position, before the forward pass, of the last relay that the pass has completed.
+    /// Position of the last completed relay before the forward pass moved it.
     old: Placement,
     penalty: f32,
     end_m: f32,
@@ -62,17 +62,17 @@ enum Work {
     Begin,
     /// Search for the highest target SIR that the chain meets without moves of its relays.
     Seek(Seek, Purpose),
-    /// Compute the chain for one target SIR, in ln(SIR), and store it.
+    /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Check that all relays have a position if some have to stay short of their farthest one. The fields are the
+    /// Check that every relay has a position if some must stay short of their farthest one. The fields are the
     /// segment, the required x of its last relay, m, and the search with its purpose.
     HoldBack(u8, f32, Seek, Purpose),
-    /// Try the next move of one relay; the chain meets this target SIR, in ln(SIR).
+    /// Try the next move of one relay. The field is the target that the chain meets, as ln(SIR).
     Polish(f32),
-    /// Run the backward pass, which computes the relays' moves, for this segment of the chain.
+    /// Run the backward pass, which computes the relays' moves, for the segment with this number.
     Back(u8),
-    /// Run the forward pass with this fraction of the relays' moves and this target, in ln(SIR). The `bool` is true
-    /// to store the chain, false for a trial.
+    /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target as
+    /// ln(SIR), and true to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
@@ -80,12 +80,12 @@ enum Work {
 enum Purpose {
     /// The search finds the highest target that an initial chain meets.
     Start,
-    /// The search raises the target as far as the chain meets it without further moves of its relays.
+    /// The search raises the target as far as the current chain meets it without moves of its relays.
     Raise,
-    /// The work computes the chain's slack (spare length at Rx) again, after the slack's cap was lowered.
+    /// The work computes the chain's spare length at Rx again, after the cap on this length was lowered.
     Tighten,
-    /// The search finds the highest target of an improved chain. Hops are computed as in the improvement, with its
-    /// margins, and not as the relays compute them.
+    /// The search finds the highest target of an improved chain, with the improvement's margins. It does not compute
+    /// hops as the relays do.
     Judge,
     /// The search finds the highest target of an improved chain. Hops are computed exactly as the relays compute them
     /// from their messages. Some relays may then stay short of their farthest position.
@@ -125,12 +125,11 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// highest target starts there, so that the improvement is not repeated. `None` if a repetition would give
     /// another chain.
     best_judged: Option<f32>,
-    /// Target at which the improvement of the current chain ended, in ln(SIR). The search for the highest target that
-    /// the chain meets starts there. `None` before the end, and if the improvement was cut short.
+    /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
+    /// before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
-    /// True unless the improvement of the current chain was cut short. It is cut short if the chain is not expected to
-    /// become better than the best one. If true, a repetition of the improvement would give the same chain, so it can
-    /// be omitted.
+    /// True unless the current chain's improvement was cut short. It is if the chain is not expected to become the
+    /// best. If true, a repetition gives the same chain, so it can be omitted.
     is_whole: bool,
     /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
     /// relays try other positions.
@@ -140,16 +139,16 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     pass: ForwardPass,
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
-    /// True if the minimum separation has limited the improvement of any chain.
+    /// True if the minimum separation of relays has restricted the improvement of any chain.
     walled: bool,
     /// Index of the current trial move of a single relay, in the last phase of the solution. It counts the kinds of
     /// move fastest, then the relays, then the halvings of the moves.
     moving: u16,
     /// Number of trial moves of single relays that were accepted in the last phase of the solution.
     moved: u8,
-    /// Lateral offset and altitude that a relay had before its current trial move.
+    /// Lateral offset and altitude of a relay before its current trial move.
     kept: Cell,
-    /// Segment of the chain whose policies (relays' moves) are in memory; `None` if there is none.
+    /// Number of the segment whose computed moves are in memory; `None` if there is none.
     loaded_segment: Option<u8>,
     stages: [Stage; STAGES],
     marks: [Mark; SEGMENTS],
@@ -212,7 +211,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::NONE;
     }
 
-    /// Stores the lateral offset and altitude `cell` of relay `index`. If a segment begins with this relay, it also
+    /// Stores the lateral offset and altitude `cell` of relay `index`. If it is the first of a segment, it also
     /// stores `x_m`, the x of the relay before it, m.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
@@ -222,7 +221,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the stored state of the segment that begins with relay `index`; `None` if none does.
+    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins there.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -313,7 +312,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         cells.map_or(0.0, |cells| cells.end_m(mission, seat_of, index))
     }
 
-    /// Returns true if some relays have to stay short of their farthest position to meet the target found.
+    /// Returns true if some relays have to stay short of their farthest x to meet the target found.
     pub const fn holds_back(&self) -> bool {
         match &self.0 {
             Way::OneWay(solver) => solver.holds_back,
@@ -367,7 +366,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that the solver may store the best chain instead of computing it a second time at the end.
+/// Checks that storing the best chain gives the same result as computing it a second time.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,
@@ -446,9 +445,9 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the solved chain as the bits of f32 numbers, and the number of `step` calls. The first entry has the
-    /// target, and the others each relay's lateral offset and altitude. If `once_more`, the best chain is computed a
-    /// second time instead of stored.
+    /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is
+    /// the target, the others are each relay's lateral offset and altitude. If `once_more`, the best chain is
+    /// computed again instead of stored.
     fn solved(
         mission: &Mission,
         held: &[Option<f32>; 50],
@@ -483,7 +482,7 @@ mod tests {
     }
 
     /// Checks for random missions that the stored best chain equals one computed a second time, to the bit. The
-    /// environment variable `UAV_RELAY_KEPT` is the number of missions, 150 by default.
+    /// environment variable `UAV_RELAY_KEPT` sets the number of missions, 150 by default.
     #[test]
     fn what_is_kept_of_the_best_start_is_what_it_comes_to_once_more() {
         extern crate std;

@@ -190,16 +190,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays per call in a pass that only computes x, and no moves of the relays.
+/// Number of relays that one call handles in a pass that computes only their x.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty at which an improved chain counts as feasible. It is a fraction of the distance from Tx to Rx. The
-/// penalty is for relays too near the interferer.
+/// Maximum penalty at which an improved chain counts as feasible. It is for relays near the interferer, as a fraction
+/// of the distance from Tx to Rx.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues a pass that computes the x of the relays for the target `sigma`, in ln(SIR). Lateral offsets and
-    /// altitudes stay. Stores the chain if `kept`. Ready with the spare length at Rx, m, or with `None` if a hop
+    /// Continues a pass over the relays that computes only their x, for the target `sigma` = ln(SIR). Lateral offsets
+    /// and altitudes stay. Stores the chain if `kept`. Ready with the spare length at Rx, m, or with `None` if a hop
     /// cannot meet the target.
     pub(super) fn plain(
         &mut self,
@@ -263,8 +263,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index`, which receives from a relay at `from`. It has no minimum separation in initial chains
-    /// of the kind [`Start::Through`].
+    /// Returns relay `index` with its hop from a relay at `from`. In initial chains of the kind [`Start::Through`] no
+    /// minimum separation is required.
     pub(super) fn link<'a>(
         &self,
         chain: &SolverContext<'a, impl Fn(u16) -> Seat>,

@@ -35,7 +35,7 @@ static CLOCK: Mutex<()> = Mutex::new(());
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipe {
     bytes: Rc<RefCell<VecDeque<u8>>>,
-    /// Simulated time that each poll of a hanging writer takes, ms; 0 while the writer works.
+    /// Simulated time for which each poll of a hanging UART writer lasts, ms; 0 while the writer works.
     stall_ms: Rc<Cell<u64>>,
 }
 
@@ -224,7 +224,7 @@ fn why(board: Board<Ram>, autopilot: Option<(Pipe, Pipe)>) -> Refused {
 }
 
 thread_local! {
-    /// Times at which the test's drone has fed its watchdog.
+    /// Times at which the watchdog of the test's drone has been fed.
     pub(crate) static FED: RefCell<Vec<Instant>> = const { RefCell::new(Vec::new()) };
 }
 

@@ -19,7 +19,7 @@ pub(crate) struct Vehicle {
     pub(crate) place: Placement,
     /// True if the drone is armed and in the air.
     pub(crate) flies: bool,
-    /// True in PX4's OFFBOARD mode, which obeys the relay; otherwise the pilot controls the drone.
+    /// True in PX4's OFFBOARD mode, in which the relay controls the drone; otherwise the pilot does.
     pub(crate) granted: bool,
     /// Text messages for the operator that the autopilot has received from the relay.
     pub(crate) texts: Vec<String>,

@@ -197,7 +197,7 @@ fn count(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> u32 {
         .unwrap_or(fewest)
 }
 
-/// Draws the interferer's position along the line Tx-Rx, as a fraction of the distance from Tx to Rx.
+/// Draws the interferer's x as a fraction of the distance from Tx to Rx.
 fn along(rng: &mut impl Rng) -> f64 {
     match rng.random_range(0..40) {
         0..32 => rng.random_range(0.0..=1.0),

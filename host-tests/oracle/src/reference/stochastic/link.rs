@@ -7,7 +7,7 @@ use super::super::link::{Relay, received_w};
 /// The interference is given as Upsilon(x) = E[1/I], where I is the interference power at x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StochasticLink {
-    /// Tx-Rx distance D, m, > 0.
+    /// Distance D from Tx to Rx, m, > 0.
     pub distance_m: f64,
     /// Transmit power of Tx, W, > 0.
     pub tx_w: f64,

@@ -2,10 +2,10 @@
 
 use super::link::StochasticLink;
 
-/// Disjoint intervals of positions along the line, m, in ascending order.
+/// Disjoint intervals of x along the line, m, in ascending order.
 type Stretches = Vec<(f64, f64)>;
 
-/// Returns the minimum of a convex function `value` between `low` and `high`.
+/// Returns the minimum of a convex function `value` between `low` and `high`, by search.
 fn least(low: f64, high: f64, value: impl Fn(f64) -> f64) -> f64 {
     let (mut a, mut b) = (low, high);
     for _ in 0..80 {

@@ -201,7 +201,7 @@ impl Browser {
         }
     }
 
-    /// Returns a picture of the whole page as PNG bytes.
+    /// Returns a screenshot of the whole page as PNG bytes.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let parameters = json!({"format": "png", "captureBeyondViewport": true});
         let picture = self.call("Page.captureScreenshot", &parameters);
@@ -209,7 +209,7 @@ impl Browser {
         base64::prelude::BASE64_STANDARD.decode(data).unwrap()
     }
 
-    /// Returns a picture of the visible part of the page as PNG bytes.
+    /// Returns a screenshot of the visible part of the page as PNG bytes.
     pub(crate) fn seen(&mut self) -> Vec<u8> {
         let picture = self.call("Page.captureScreenshot", &json!({"format": "png"}));
         let data = picture["data"].as_str().unwrap();

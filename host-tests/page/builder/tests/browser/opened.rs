@@ -37,7 +37,7 @@ pub(crate) fn opened(width: u32, height: u32) -> Browser {
 const SETTLED: &str = "!engine.running && !engine.next && !hand.holds && window.last.toml === scenario() \
     && window.last.words === options() && window.last.runs > 1";
 
-/// Waits until the page has no run pending, then moves the playback to its end.
+/// Waits until the page has no run pending, then moves the playback to the end of the recording.
 pub(crate) fn settled(browser: &mut Browser) {
     browser.until(SETTLED);
     browser.run("player.stop(); player.seek(Math.max(0, player.ticks.length - 1))");

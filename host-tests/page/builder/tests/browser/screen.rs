@@ -27,7 +27,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// Shows ten snapshots of `next` a second.
+    /// Starts a screen that shows ten snapshots a second, which `next` returns.
     fn begin(next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
         let screen = Screen::start("127.0.0.1:0".parse().unwrap()).unwrap();
         Self::on(screen, next)
@@ -157,7 +157,7 @@ fn a_server_that_ends_is_noticed() {
     );
 }
 
-/// Returns the texts that the map writes when it is drawn again, in an array.
+/// Makes the page draw its map again, and returns the texts in it as a JSON array.
 fn written(browser: &mut Browser) -> String {
     browser.text(
         "(() => { const texts = [], plain = map.write; map.write = function (text, ...rest) { const is = plain.call(this, text, ...rest); if (is) texts.push(text); return is; }; map.draw(); delete map.write; return texts.join('|'); })()",
@@ -276,7 +276,7 @@ fn only_alarms_that_last_sound_and_are_in_the_title() {
     assert_eq!(listed, 2);
 }
 
-/// Returns the state of a station with a preview that can be uploaded.
+/// Returns the state of a ground station with a previewed mission that can be uploaded, as JSON.
 fn ready() -> Value {
     let place = |x_m: f64| serde_json::json!({ "x_m": x_m, "y_m": 0, "h_m": 40 });
     serde_json::json!({
@@ -577,7 +577,7 @@ fn a_hundred_relays_are_drawn_ten_times_a_second() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks names and roles for screen readers, and the keyboard.
+/// Checks that the screen has names and roles for screen readers, and can be used by keyboard.
 #[test]
 fn the_screen_can_be_heard_and_used_by_keyboard() {
     let shown = shown_full(8);

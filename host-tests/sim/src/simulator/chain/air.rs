@@ -278,7 +278,7 @@ pub(super) fn link(index: usize, port: Port) -> Link {
 const NEIGHBOUR: usize = 4;
 
 impl Chain {
-    /// Returns the number of relays, on each side, that a relay's frames reach: 1 on separate links.
+    /// Returns the number of relays on each side that receive a relay's frames: 1 on separate links.
     pub(super) fn reach(&self) -> usize {
         match self.setup.settings.wiring {
             Wiring::Pair => 1,

@@ -12,10 +12,10 @@ use crate::simulator::outcome::TimelineEvent;
 /// Time step of the simulation of drones with autopilots.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Distance of a drone from its agreed position below which it has arrived, m.
+/// Distance of a drone from its agreed position below which it counts as arrived, m.
 const ARRIVED_M: f64 = 1.0;
 
-/// Period in which the simulated operator looks for landed drones of lost relays.
+/// Interval at which the simulated operator looks for landed drones of lost relays.
 const LOOKS: Duration = Duration::from_millis(5_000);
 
 /// Distance to keep from moving drones during a hand-over, m, in addition to the required separation.
@@ -29,7 +29,7 @@ const TRAFFIC_M: f64 = 30.0;
 pub(super) const LANDS_AFTER: Duration = Duration::from_millis(30_000);
 
 impl Chain {
-    /// Creates the setup's drones with autopilots, if any, on the ground, and starts their time steps.
+    /// Creates the setup's drones with autopilots, if any, on the ground. Schedules their first time step.
     pub(super) fn line_up(&mut self) {
         if let Some(spec) = &self.setup.fleet {
             let all = 0..self.members.len();
@@ -243,7 +243,8 @@ impl Chain {
 }
 
 impl Chain {
-    /// Creates the drones of the setup, if any, with or without autopilots, and starts their time steps.
+    /// Creates the setup's drones, if any, and schedules their first time step. Drones without autopilots start in
+    /// the air.
     pub(super) fn take_off(&mut self) {
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));

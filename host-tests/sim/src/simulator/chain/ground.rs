@@ -333,7 +333,7 @@ impl Chain {
     }
 }
 
-/// Delay after which an attacker that has no frame to replay yet tries again.
+/// Delay before an attacker without a recorded frame tries again to replay one.
 const WAIT: Duration = Duration::from_millis(10);
 
 impl Chain {

@@ -56,7 +56,7 @@ impl Chain {
         self.watch = Some(watch);
     }
 
-    /// Records changed states of the relays `changed`, for the data traffic.
+    /// Records changed states of the relays `changed`, from which the data traffic is computed later.
     fn track(&mut self, changed: ChangedRelays) {
         let Some(mut track) = self.outcome.track.take() else {
             return;
@@ -249,7 +249,7 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` has all relays of one view (membership of the chain), ordered by index.
+/// Returns true if `part` is a complete view: all its relays, ordered by index. A view is a membership of the chain.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
@@ -278,7 +278,7 @@ fn is_cut(parts: &[Vec<&Member>]) -> bool {
     })
 }
 
-/// Returns true if all relays of `part` have positions, which were agreed on for the same target SIR.
+/// Returns true if all relays of `part` have agreed positions for the same target SIR.
 fn holds(part: &[&Member]) -> bool {
     let target = |member: &&Member| member.relay.target().map(f32::to_bits);
     part.iter()

@@ -124,12 +124,12 @@ const LAST_LINES: usize = 20;
 /// Largest number of lines repeated from each list of failures: panics, or names of failed tests.
 const LINES_OF_FAILURES: usize = 100;
 
-/// Relevant output of a failed step: the `failures:` of each test binary, or else the last lines.
+/// Relevant part of a failed step's output: the `failures:` of each test binary, or the last lines.
 #[derive(Default)]
 pub(crate) struct Evidence {
     failures: Vec<String>,
     last: VecDeque<String>,
-    /// Number of lines still to keep of the list of failures that is being read; `None` outside a list.
+    /// Number of further lines to keep of the failure list that is being read; `None` outside a list.
     remaining: Option<usize>,
 }
 

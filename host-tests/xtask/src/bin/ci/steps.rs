@@ -53,7 +53,7 @@ pub(crate) struct Step {
     pub(crate) lane: Lane,
 }
 
-/// Order in which a step runs relative to the other steps.
+/// Order of a step among the other steps: in which lane it runs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Lane {
     /// The step runs after the previous step of this lane.
@@ -88,7 +88,7 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
     }
 }
 
-/// Returns `steps` marked to run beside the other steps, at low priority.
+/// Returns `steps` marked to run in the background lane: beside the others, at low priority.
 ///
 /// They use idle time: many tests of the other steps wait for the wall clock.
 fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {

@@ -113,7 +113,7 @@ const SIGNED: &[Counted] = &[
     ),
 ];
 
-/// Table rows for the runners: functions that move bytes between the ports and a relay.
+/// Rows of the cost table for the runners: functions that move bytes between ports and a relay.
 const RUNNERS: &[Counted] = &[
     (
         "a sweep message of 16 targets on polled ports, from bytes to bytes",
@@ -148,7 +148,7 @@ const RUNNERS: &[Counted] = &[
     ),
 ];
 
-/// Table rows for the upload of a new mission in flight.
+/// Rows of the cost table for the upload of a new mission in flight.
 const UPLOADED: &[Counted] = &[
     (
         "an offer of a new mission, accepted",
@@ -443,7 +443,7 @@ const COUNTED: &[Counted] = &[
     ),
 ];
 
-/// Table rows for conversions between latitude, longitude and positions on the line Tx-Rx.
+/// Rows of the cost table for conversions between latitude, longitude and positions on the line Tx-Rx.
 ///
 /// They are measured in the image that also measures the runners.
 const FLOWN: &[Counted] = &[

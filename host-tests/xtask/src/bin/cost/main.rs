@@ -187,7 +187,7 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     Ok([results, readme])
 }
 
-/// Returns true if the documents state costs for these versions of compiler and emulator.
+/// Returns true if the documents state their costs for the installed versions of compiler and emulator.
 ///
 /// The costs depend on both, so other versions are not compared.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
