@@ -291,9 +291,10 @@ impl FenceOwner {
         self.clear && self.is_acknowledged && self.follower_low_m >= self.fence_m
     }
 
-    /// Returns the smallest distance along x to the downstream neighbour for both agreed positions, m. It is below
-    /// the minimum separation only if these are that close, and both relays have arrived at their lateral offsets and
-    /// altitudes.
+    /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
+    ///
+    /// It is the minimum separation, or less if the positions agreed on by the two relays are closer along x and both
+    /// relays are at their agreed lateral offsets and altitudes: these then keep them apart.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();

@@ -27,7 +27,7 @@ const HANDSHAKE_BODY: usize = 2 * NONCE + 1;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Nonce of this neighbour, larger after every start.
+    /// Nonce of the simulated neighbour itself, larger after every start.
     own: Vec<u8>,
     relay: Vec<u8>,
     counter: u32,

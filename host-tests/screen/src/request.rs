@@ -339,7 +339,7 @@ mod tests {
         status_of(&format!("{lines}\n\n"), &Access::default())
     }
 
-    /// Returns the status of the answer, 200 for a task, and 0 for an incomplete request.
+    /// Returns the HTTP status of the answer to `request`: 200 if it is accepted, 0 if it is incomplete.
     fn status_of(request: &str, access: &Access) -> u16 {
         let request = request.replace('\n', "\r\n");
         let own = ([127, 0, 0, 1], 8080).into();

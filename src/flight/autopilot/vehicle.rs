@@ -467,6 +467,8 @@ impl Echo {
     }
 
     /// Returns the earliest time at which a message received now can have been sent; `None` if unknown.
+    ///
+    /// It is the time of the last TIMESYNC request that the autopilot has answered: messages arrive in order.
     pub(super) const fn floor(&self) -> Option<Instant> {
         self.answered_at
     }

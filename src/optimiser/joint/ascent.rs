@@ -134,8 +134,9 @@ impl Ascent {
         }
     }
 
-    /// Returns this state with another `limit`, in ln(SIR). At this target the chain is checked against the upper
-    /// bound.
+    /// Returns this state with another upper limit of the target, in ln(SIR).
+    ///
+    /// When the target reaches the limit, the search checks if the chain reaches the upper bound of all chains.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,

@@ -71,8 +71,9 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Creates an entry on relay `relay`. `state` combines its phase, hold reasons, control state and flags: see
-    /// [`Entry::state`].
+    /// Creates an entry on relay `relay`, whose state is `age` tenths of a second old.
+    ///
+    /// `state` combines its phase, hold reasons, control state and flags: see [`Entry::state`].
     pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
         Self {
             relay: Word::new(relay),

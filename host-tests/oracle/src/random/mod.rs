@@ -49,12 +49,12 @@ pub struct Style {
 }
 
 impl Style {
-    /// Links of 1 to 50 identical relays.
+    /// Links with 1 to 50 relays of equal altitude and power.
     pub const ALIKE: Self = Self {
         relays: 1..=50,
         chain: Chain::Alike,
     };
-    /// Links of 1 to 50 relays, identical or not.
+    /// Links with 1 to 50 relays, whose altitudes and powers may differ.
     pub const ANY: Self = Self {
         relays: 1..=50,
         chain: Chain::Any,

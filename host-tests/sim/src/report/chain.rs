@@ -364,8 +364,8 @@ impl ChainReport {
 
 /// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
-/// The chain is the largest view that all its relays have accepted; without such a view, all relays that are on. If a
-/// relay failed on separate links, it is all relays. Without a quorum it is empty.
+/// The chain is the largest view that all its relays have accepted; without such a view, all relays that are on. If
+/// every hop has a link of its own and a relay failed, it is all relays. Without a quorum it is empty.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {

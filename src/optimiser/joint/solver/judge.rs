@@ -20,8 +20,9 @@ pub(super) const JUDGED: f32 = 4e-6;
 /// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Excess of a chain's first limit of the target over the upper bound of all chains, in ln(SIR). At the limit the
-/// chain is checked against that bound.
+/// Margin above the upper bound of all chains' SIR at which the ascent of a chain's target first stops, in ln(SIR).
+///
+/// There the search checks if the chain already reaches the bound, and then ends.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
