@@ -561,7 +561,7 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
 /// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
 /// meets at the last run's lateral offsets and altitudes, less the target of that run.
 const NEW: f32 = 3e-4;
-/// Maximum number of the interior-point method's runs per initial chain that start from a result of Algorithm 1.
+/// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
 /// Excess of the first target to try over the interior-point method's result, in ln(SIR). It is the method's possible

@@ -20,7 +20,7 @@ pub(super) const JUDGED: f32 = 4e-6;
 /// this tolerance of the bound ends the search for better ones.
 pub(super) const CEILING: f32 = 5e-5;
 
-/// Margin above the upper bound of all chains' SIR at which the ascent of a chain's target first stops, in ln(SIR).
+/// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
 ///
 /// There the search checks if the chain already reaches the bound, and then ends.
 const PROBED: f32 = 3e-4;
