@@ -41,6 +41,9 @@ pub struct NoFly {
     pub altitudes_m: RangeInclusive<f64>,
 }
 
+/// Least surface of a polygon, m2.
+const LEAST_M2: f64 = 1.0;
+
 /// Number of corners of the polygon around a circle.
 const CORNERS: u32 = 64;
 
@@ -148,6 +151,11 @@ impl Area {
             return Err(format!("has {} different corners", corners.len()));
         }
         let edges: Vec<_> = edges(&corners).collect();
+        let origin = corners.first().copied().unwrap_or_default();
+        let surface: f64 = edges.iter().map(|[a, b]| turn([origin, *a], *b)).sum();
+        if !(surface.abs() > 2.0 * LEAST_M2) {
+            return Err(format!("has a surface of less than {LEAST_M2} m2"));
+        }
         for (first, one) in edges.iter().enumerate() {
             for (second, other) in edges.iter().enumerate().skip(first + 1) {
                 let is_next = second == first + 1;

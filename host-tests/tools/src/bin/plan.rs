@@ -13,7 +13,7 @@ use uav_relay_sim::{command, svg};
 use uav_relay_terrain::report::TerrainReport;
 use uav_relay_tools::figures::draw::draw;
 use uav_relay_tools::plan;
-use uav_relay_tools::plan::area::{self, AreaReport};
+use uav_relay_tools::plan::area::{self, AreaReport, Criterion};
 use uav_relay_tools::plan::area_map;
 use uav_relay_tools::plan::carried::Carried;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
@@ -59,8 +59,12 @@ fn run(options: &Options) -> Result<(), Failure> {
             above_terrain(&scenario, &ask, elevation.as_ref(), radio.as_ref())
         }
         (Some(target_bps), Some(radio)) => by_rate(&scenario, &ask, radio, target_bps),
-        (_, None) if !scenario.areas.is_empty() => {
-            area::plan(&scenario, &ask, options.area.quantile).map(|plan| Planned {
+        (_, None) if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() => {
+            let criterion = Criterion {
+                quantile: options.area.quantile,
+                allow_crossing: options.area.allow_crossing,
+            };
+            area::plan(&scenario, &ask, criterion).map(|plan| Planned {
                 plan: Some(plan),
                 number,
                 rates: None,

@@ -53,20 +53,33 @@ const GRID: [u32; 3] = [40, 7, 5];
 /// Largest number of windows around the relays, and the factor on the width of the next one if a window gains little.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
+/// Largest number of times that the windows begin again with their full width.
+const RESTARTS: u32 = 5;
+
 /// Width of the narrowest window along x, relative to the line.
 const NARROWEST: f64 = 1e-7;
 
+/// Criterion by which positions are chosen.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Criterion {
+    /// Fraction of the interferers' positions and powers, 0.5 to 0.99; `None` for the worst case.
+    pub quantile: Option<f64>,
+    /// True if the ways between neighbours may cross no-fly areas.
+    pub allow_crossing: bool,
+}
+
 /// Finds the positions that `ask` requests, with the interferers anywhere in their areas and outside the no-fly areas.
 ///
-/// With a `quantile` the positions maximise this quantile over the areas, else the worst case. The SIRs of the plan are those of the
+/// With a quantile the positions maximise this quantile over the areas, else the worst case. The SIRs of the plan are those of the
 /// worst case.
-pub fn plan(scenario: &Scenario, ask: &PlanRequest, quantile: Option<f64>) -> Result<Plan, NoPlan> {
+pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Result<Plan, NoPlan> {
     let wrong = |line: &str| Err(NoPlan::Wrong(line.to_owned()));
     if scenario.areas.is_empty() {
         // Without areas the plan that ignores the no-fly areas is best, if it can be flown.
         let blind = super::plan(&anywhere(scenario), ask)?;
         let is_field = matches!(scenario.interference, Interference::Field(_));
-        if is_field || problem(&scenario.no_fly, &blind.chain(), false).is_none() {
+        if is_field || problem(&scenario.no_fly, &blind.chain(), criterion.allow_crossing).is_none()
+        {
             return Ok(blind);
         }
     }
@@ -78,13 +91,13 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest, quantile: Option<f64>) -> Re
             "link.access = \"fitted\": cannot be used with interferer.area or [[no_fly]] and --altitude free",
         );
     }
-    match (ask.number, quantile) {
-        (Number::Of(relays), _) => best(scenario, ask, relays, quantile),
+    match (ask.number, criterion.quantile) {
+        (Number::Of(relays), _) => best(scenario, ask, relays, criterion),
         (Number::Meeting(_), Some(_)) => {
             wrong("--quantile: needs --uavs N: it has no search for the number of relays")
         }
         (Number::Meeting(target), None) => {
-            let plan = |relays| best(scenario, ask, relays, None);
+            let plan = |relays| best(scenario, ask, relays, criterion);
             let plan = fewest_of(target, plan, Plan::sir)?;
             let most = Some(plan.sir());
             Ok(Plan {
@@ -97,7 +110,7 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest, quantile: Option<f64>) -> Re
 }
 
 /// Returns the scenario without its no-fly areas.
-fn anywhere(scenario: &Scenario) -> Scenario {
+pub(super) fn anywhere(scenario: &Scenario) -> Scenario {
     Scenario {
         no_fly: Vec::new(),
         ..scenario.clone()
@@ -131,8 +144,12 @@ fn best(
     scenario: &Scenario,
     ask: &PlanRequest,
     relays: u16,
-    quantile: Option<f64>,
+    criterion: Criterion,
 ) -> Result<Plan, NoPlan> {
+    let Criterion {
+        quantile,
+        allow_crossing,
+    } = criterion;
     let scene = Scene::new(scenario, relays)
         .ok_or_else(|| NoPlan::Wrong("there is no interferer".to_owned()))?;
     let briefed = profiles(scenario, relays, ask.tolerance)?;
@@ -141,7 +158,10 @@ fn best(
     } else {
         optimum(&scene)
     };
-    let search = Search::new(&scene, scenario, ask.free_altitude);
+    let search = Search {
+        allow_crossing,
+        ..Search::new(&scene, scenario, ask.free_altitude)
+    };
     let (places, proven) = match &exact {
         Some(chain) => {
             let places = chain.places.iter().map(|at| Place::from(*at)).collect();
@@ -238,7 +258,7 @@ pub fn problem(no_fly: &[NoFly], chain: &[Placement], allow_crossing: bool) -> O
             let crossing_m = area.crossing_m([*from, *to]);
             if crossing_m > ROUNDING_M && !allow_crossing {
                 lines.push(format!(
-                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m, and relays that close a gap fly there; --allow-crossing accepts it",
+                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m, and relays that close a gap fly there; `cargo plan --allow-crossing` accepts it",
                     index + 1
                 ));
             }
@@ -259,6 +279,7 @@ struct Search<'a> {
     scene: &'a Scene,
     no_fly: &'a [NoFly],
     is_free: bool,
+    allow_crossing: bool,
     /// Draws of the interferers that count; empty for the worst case.
     draws: Vec<Vec<Source>>,
 }
@@ -269,6 +290,7 @@ impl<'a> Search<'a> {
             scene,
             no_fly: &scenario.no_fly,
             is_free,
+            allow_crossing: false,
             draws: Vec::new(),
         }
     }
@@ -348,7 +370,7 @@ impl<'a> Search<'a> {
 
     /// Returns the factor on the SIR of a hop between two relays for the no-fly areas on the way.
     fn preference(&self, node: usize, from: Spot, to: Spot) -> f64 {
-        let is_inner = node > 1 && node <= self.scene.relays.len();
+        let is_inner = node > 1 && node <= self.scene.relays.len() && !self.allow_crossing;
         let way = [from, to].map(|spot| [spot.at.x, spot.at.y, spot.at.h]);
         let mut areas = self.no_fly.iter();
         if is_inner && areas.any(|area| area.crossing_m(way) > 0.0) {
@@ -436,7 +458,15 @@ impl<'a> Search<'a> {
         let starts = starts.iter().map(|start| self.known(start));
         let all = first.into_iter().chain(starts);
         let refined = all.filter_map(|start| self.refined(&start));
-        let (_, chain) = refined.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (mut sir, mut chain) = refined.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        for _ in 0..RESTARTS {
+            match self.refined(&self.known(&chain)) {
+                Some((better, next)) if better > sir * (1.0 + 1e-6) => {
+                    (sir, chain) = (better, next)
+                }
+                _ => break,
+            }
+        }
         Some(chain)
     }
 
@@ -517,6 +547,7 @@ impl<'a> Search<'a> {
                 let counted = areas.most_harmless(&chain, quantile);
                 let search = Self {
                     draws: counted,
+                    allow_crossing: self.allow_crossing,
                     ..Self::new(self.scene, scenario, self.is_free)
                 };
                 let better = if round == 0 {

@@ -51,7 +51,7 @@ pub use altitude::solved;
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() {
-        return area::plan(scenario, ask, None);
+        return area::plan(scenario, ask, area::Criterion::default());
     }
     match &scenario.interference {
         Interference::Field(_) => source::plan_in_field(scenario, ask),
