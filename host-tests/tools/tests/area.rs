@@ -6,6 +6,7 @@
     clippy::indexing_slicing,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
+    clippy::too_many_lines,
     missing_docs
 )]
 
@@ -627,8 +628,8 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let base = ["--scenario", "flight.toml", "--uavs", "3"];
-    let write = |zone: &str, more: &str| {
-        let text = format!("{}{more}[[no_fly]]\n{zone}\n", FLAT);
+    let write = |zone: &str| {
+        let text = format!("{FLAT}[[no_fly]]\n{zone}\n");
         std::fs::write(folder.join("flight.toml"), text).unwrap();
     };
     std::fs::write(folder.join("flight.toml"), FLAT).unwrap();
@@ -640,7 +641,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         "area = { circle = [1000, 500, 300] }".to_owned(),
         format!("area = {{ circle = [{own}, 0, 50] }}\nlowest_m = 61"),
     ] {
-        write(&zone, "");
+        write(&zone);
         assert_eq!(json(folder, &base), (0, free.clone()), "{zone}");
     }
     // Relay 2 moves out along the line; the area is still between two neighbours.
@@ -649,7 +650,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         own - 60.0,
         own + 50.0
     );
-    write(&zone, "");
+    write(&zone);
     let (status, one_side) = json(folder, &base);
     // No way crosses the area if all relays are on one side of it.
     assert_eq!(status, 0, "{one_side}");
@@ -713,7 +714,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         (&zone, "lateral_max_m = 200"),
         (&low, "altitude_max_m = 150"),
     ] {
-        write(zone, "");
+        write(zone);
         let text = std::fs::read_to_string(folder.join("flight.toml")).unwrap();
         let text = text.replace(
             "altitude_m = 60\n",

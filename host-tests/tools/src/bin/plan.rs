@@ -54,24 +54,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         tolerance: options.tolerance,
     };
     let radio = radio(options, &scenario)?;
-    let planned = match (options.wanted.target_rate_bps, &radio) {
-        _ if options.altitude == Altitude::Terrain => {
-            above_terrain(&scenario, &ask, elevation.as_ref(), radio.as_ref())
-        }
-        (Some(target_bps), Some(radio)) => by_rate(&scenario, &ask, radio, target_bps),
-        (_, None) if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() => {
-            let criterion = Criterion {
-                quantile: options.area.quantile,
-                allow_crossing: options.area.allow_crossing,
-            };
-            area::plan(&scenario, &ask, criterion).map(|plan| Planned {
-                plan: Some(plan),
-                number,
-                rates: None,
-            })
-        }
-        (_, radio) => plain(&scenario, &ask, radio.as_ref()),
-    };
+    let planned = planned_by(options, &scenario, &ask, elevation.as_ref(), radio.as_ref());
     let listed = |mut rates: RateReport| {
         if !options.rates {
             rates.rates.clear();
@@ -147,6 +130,34 @@ fn run(options: &Options) -> Result<(), Failure> {
             options,
             &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
         ),
+    }
+}
+
+/// Finds the plan by the method that the options and the scenario need.
+fn planned_by(
+    options: &Options,
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    elevation: Option<&Elevation>,
+    radio: Option<&Radio>,
+) -> Result<Planned, NoPlan> {
+    match (options.wanted.target_rate_bps, radio) {
+        _ if options.altitude == Altitude::Terrain => {
+            above_terrain(scenario, ask, elevation, radio)
+        }
+        (Some(target_bps), Some(radio)) => by_rate(scenario, ask, radio, target_bps),
+        (_, None) if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() => {
+            let criterion = Criterion {
+                quantile: options.area.quantile,
+                allow_crossing: options.area.allow_crossing,
+            };
+            area::plan(scenario, ask, criterion).map(|plan| Planned {
+                plan: Some(plan),
+                number: ask.number,
+                rates: None,
+            })
+        }
+        (_, radio) => plain(scenario, ask, radio),
     }
 }
 

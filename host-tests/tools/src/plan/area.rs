@@ -462,7 +462,7 @@ impl<'a> Search<'a> {
         for _ in 0..RESTARTS {
             match self.refined(&self.known(&chain)) {
                 Some((better, next)) if better > sir * (1.0 + 1e-6) => {
-                    (sir, chain) = (better, next)
+                    (sir, chain) = (better, next);
                 }
                 _ => break,
             }
@@ -740,13 +740,12 @@ impl AreaReport {
             .iter()
             .map(|[x, y]| format!("x = {x:.1} m, y = {y:.1} m"))
             .collect();
-        let mut text = format!("area: {}\n", say(self.plan));
-        text += &format!("worst position of the interferer: {}\n", places.join("; "));
-        text += &match self.centre {
-            Some(centre) => format!("the plan for the middle of the area: {}\n", say(centre)),
-            None => "the plan for the middle of the area: none\n".to_owned(),
-        };
-        text
+        let centre = self.centre.map_or_else(|| "none".to_owned(), say);
+        format!(
+            "area: {}\nworst position of the interferer: {}\nthe plan for the middle of the area: {centre}\n",
+            say(self.plan),
+            places.join("; ")
+        )
     }
 }
 

@@ -35,48 +35,14 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
         sirs().fold(f64::INFINITY, f64::min),
         sirs().fold(f64::NEG_INFINITY, f64::max),
     );
-    let colour = |sir_db: f64| {
-        let share = ((sir_db - least) / (most - least)).clamp(0.0, 1.0);
-        let place = if share.is_nan() { 0.0 } else { share * 4.0 };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0 to 3"
-        )]
-        let at = (place as usize).min(COLOURS.len() - 2);
-        let part = place - at as f64;
-        let [low, high] = [at, at + 1].map(|at| COLOURS.get(at).copied().unwrap_or_default());
-        let mixed = low
-            .iter()
-            .zip(high)
-            .map(|(low, high)| low + part * (high - low));
-        let hex: String = mixed
-            .map(|value| format!("{:02x}", value.round() as u8))
-            .collect();
-        format!("#{hex}")
-    };
+    let colour = |sir_db: f64| colour((sir_db - least) / (most - least));
     let relays = plan
         .places
         .iter()
         .map(|(at, _)| [at.x_m, at.y_m].map(f64::from));
     let relays: Vec<[f64; 2]> = relays.collect();
     let ends = [[0.0, 0.0], [scenario.distance_m, 0.0]];
-    let corners = cells
-        .iter()
-        .flat_map(|cell| [-0.5, 0.5].map(|side| cell.at.map(|middle| middle + side * cell.side_m)));
-    let zones = scenario
-        .no_fly
-        .iter()
-        .flat_map(|area| area.corners.iter().copied());
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for at in corners
-        .chain(relays.iter().copied())
-        .chain(ends)
-        .chain(zones)
-    {
-        low = [low[0].min(at[0]), low[1].min(at[1])];
-        high = [high[0].max(at[0]), high[1].max(at[1])];
-    }
+    let [low, high] = frame(scenario, &relays, cells);
     let inner = WIDTH - 2.0 * MARGIN;
     let scale = (inner / (high[0] - low[0])).min(TALLEST * inner / (high[1] - low[1]).max(1e-9));
     let tall = (high[1] - low[1]) * scale;
@@ -146,6 +112,45 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
     }
     out.push_str("</svg>\n");
     out
+}
+
+/// Returns the colour of a share of the range of SIRs, 0 to 1.
+fn colour(share: f64) -> String {
+    let place = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let mut mixed = [0.0; 3];
+    for (at, colour) in COLOURS.iter().enumerate() {
+        let weight = (1.0 - (place - at as f64).abs()).max(0.0);
+        for (mixed, own) in mixed.iter_mut().zip(colour) {
+            *mixed += weight * own;
+        }
+    }
+    let [red, green, blue] = mixed.map(f64::round);
+    format!("rgb({red},{green},{blue})")
+}
+
+/// Returns the least and the greatest [x, y] of everything in the picture, m.
+fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2]; 2] {
+    let corners = cells
+        .iter()
+        .flat_map(|cell| [-0.5, 0.5].map(|side| cell.at.map(|middle| middle + side * cell.side_m)));
+    let zones = scenario
+        .no_fly
+        .iter()
+        .flat_map(|area| area.corners.iter().copied());
+    let ends = [[0.0, 0.0], [scenario.distance_m, 0.0]];
+    let all = corners
+        .chain(zones)
+        .chain(relays.iter().copied())
+        .chain(ends);
+    all.fold(
+        [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+        |[low, high], at| {
+            [
+                [low[0].min(at[0]), low[1].min(at[1])],
+                [high[0].max(at[0]), high[1].max(at[1])],
+            ]
+        },
+    )
 }
 
 /// Returns `cells` as the text of a GeoJSON file: one square for each, with the property `sir_db`.
