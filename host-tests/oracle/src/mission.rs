@@ -75,6 +75,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
             x_m: link.x_i,
             y_m: link.y_i,
         }],
+        areas: std::collections::BTreeMap::new(),
         mu_los: link.mu_los,
         mu_nlos: link.mu_nlos,
         eta: link.eta,

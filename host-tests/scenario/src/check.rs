@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use super::endpoint::Endpoint;
 use super::error::{Problem, ScenarioError, cut, quote};
 use super::keys::Rule::{LinkOrNumber, Number, Whole};
-use super::keys::{FILE, Key, Rule, SECTIONS, names};
+use super::keys::{FILE, Key, Range, Rule, SECTIONS, names};
 
 pub(super) fn mistake(
     file: &str,
@@ -115,6 +115,23 @@ impl Check<'_> {
         ))
     }
 
+    /// Checks a number in a list.
+    fn number(&self, path: &str, value: &Value, range: &Range) -> Result<(), ScenarioError> {
+        let problem = match as_number(value) {
+            Some(number) if range.holds(number) => return Ok(()),
+            Some(_) => Problem::OutOfRange,
+            None => Problem::WrongType,
+        };
+        let allowed = format!("a number, {range}");
+        Err(mistake(
+            self.file,
+            path,
+            Some(quote(value)),
+            problem,
+            allowed,
+        ))
+    }
+
     fn value(&self, path: &str, value: &Value, rule: &Rule) -> Result<(), ScenarioError> {
         let fail = |problem| {
             let allowed = match problem {
@@ -157,6 +174,40 @@ impl Check<'_> {
                 }
                 Ok(())
             }
+            (Rule::NumberOrTwo(range), Value::Array(list)) => match list.as_slice() {
+                [low, high] => {
+                    for (index, item) in [low, high].into_iter().enumerate() {
+                        self.number(&format!("{path}[{index}]"), item, range)?;
+                    }
+                    if as_number(low) > as_number(high) {
+                        return fail(Problem::Unsorted);
+                    }
+                    Ok(())
+                }
+                _ => fail(Problem::WrongType),
+            },
+            (Rule::NumberOrTwo(range), _)
+                if as_number(value).is_some_and(|own| range.holds(own)) =>
+            {
+                Ok(())
+            }
+            (Rule::NumberOrTwo(_), _) if as_number(value).is_some() => fail(Problem::OutOfRange),
+            (Rule::Numbers(ranges), Value::Array(list)) if list.len() == ranges.len() => {
+                for (index, (item, range)) in list.iter().zip(*ranges).enumerate() {
+                    self.number(&format!("{path}[{index}]"), item, range)?;
+                }
+                Ok(())
+            }
+            (Rule::Points(ranges, [least, most]), Value::Array(list))
+                if (*least..=*most).contains(&list.len()) =>
+            {
+                for (index, item) in list.iter().enumerate() {
+                    self.value(&format!("{path}[{index}]"), item, &Rule::Numbers(ranges))?;
+                }
+                Ok(())
+            }
+            (Rule::Points(..), Value::Array(list)) if list.is_empty() => fail(Problem::EmptyList),
+            (Rule::Numbers(_) | Rule::Points(..), Value::Array(_)) => fail(Problem::OutOfRange),
             (Whole(_), Value::Integer(_))
             | (Rule::Flag, Value::Boolean(_))
             | (Rule::Text | Rule::Choice(_), Value::String(_)) => Ok(()),

@@ -80,6 +80,12 @@ pub enum Problem {
     OtherDistance,
     /// The values of a list are not in increasing order.
     Unsorted,
+    /// The area of an interferer contains Tx or Rx.
+    ContainsSite,
+    /// A range of powers is given for an interferer without an area.
+    NeedsArea,
+    /// The boundary of an area crosses itself, or has no surface.
+    NoArea,
     /// The bandwidths in `[link]` and in `[noise]` differ.
     OtherBandwidth,
 }
@@ -111,6 +117,9 @@ impl fmt::Display for Problem {
             Self::NothingDiffers => "has no effect by itself",
             Self::OtherDistance => "contradicts [site]",
             Self::OtherBandwidth => "contradicts noise.bandwidth_hz",
+            Self::ContainsSite => "contains a site",
+            Self::NeedsArea => "needs an area",
+            Self::NoArea => "is not an area",
             Self::Unsorted => "is not in increasing order",
         })
     }

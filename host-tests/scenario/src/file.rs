@@ -8,9 +8,10 @@ use toml::Table;
 use uav_relay::flight::axis::{Axis, AxisError};
 use uav_relay::{Geodetic, Placement};
 
+use super::area::{Area, NoFly, SourceArea};
 use super::check::{internal_mismatch, mistake};
 use super::error::{Problem, ScenarioError};
-use super::keys::number;
+use super::keys::{MOST_CORNERS, number};
 use super::link::{Access, Link, RateModel, RateStep};
 use super::number::{factor, watts};
 use super::spec::{
@@ -30,6 +31,8 @@ pub(super) struct RawFile {
     channel: RawChannel,
     interferer: Option<Vec<RawSource>>,
     #[serde(default)]
+    no_fly: Vec<RawNoFly>,
+    #[serde(default)]
     relay: Vec<RawRelay>,
     #[serde(default)]
     noise: RawNoise,
@@ -48,6 +51,45 @@ struct RawTerrain {
     mast_m: Option<f64>,
     above_ground_m: Option<f64>,
     above_ground_max_m: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNoFly {
+    area: Option<RawArea>,
+    file: Option<String>,
+    lowest_m: Option<f64>,
+    highest_m: Option<f64>,
+}
+
+/// Area; exactly one of the fields is given. Those on earth have latitudes and longitudes.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawArea {
+    rectangle: Option<[[f64; 2]; 2]>,
+    polygon: Option<Vec<[f64; 2]>>,
+    circle: Option<[f64; 3]>,
+    rectangle_deg: Option<[[f64; 2]; 2]>,
+    polygon_deg: Option<Vec<[f64; 2]>>,
+    circle_deg: Option<[f64; 3]>,
+}
+
+/// Power of an interferer, or the least and the greatest one.
+#[derive(Deserialize, Clone, Copy)]
+#[serde(untagged)]
+enum RawPowers {
+    One(f64),
+    Range([f64; 2]),
+}
+
+impl RawPowers {
+    /// Returns the least power (`end` 0) or the greatest one (`end` 1).
+    fn end(self, end: usize) -> f64 {
+        match self {
+            Self::One(one) => one,
+            Self::Range(range) => range.get(end).copied().unwrap_or_default(),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -204,12 +246,15 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         altitudes_m: [altitude_min_m, altitude_max_m],
         lateral_m: [geometry.lateral_min_m, geometry.lateral_max_m],
     };
+    let areas = source_areas(file, raw.interferer.as_deref().unwrap_or_default(), &room)?;
+    let no_fly = no_fly(file, raw.no_fly, line.as_ref())?;
     let interference = interference(
         file,
         raw.interferer.as_deref(),
         raw.field,
         raw.listen.is_some(),
         &room,
+        &areas,
     )?;
     Ok(Scenario {
         line,
@@ -225,6 +270,8 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         uav_w: powers.uav_w,
         channel: channel(file, &raw.channel)?,
         interference,
+        areas,
+        no_fly,
         listen: raw.listen.map(|raw| ListenSpec {
             following: raw.following,
             every_s: raw.every_s,
@@ -402,6 +449,7 @@ fn interference(
     field: Option<RawField>,
     listens: bool,
     room: &RelayArea,
+    areas: &BTreeMap<usize, SourceArea>,
 ) -> Result<Interference, ScenarioError> {
     let one = || "either one [field] or one or more [[interferer]]".to_owned();
     match (raw, field) {
@@ -430,7 +478,7 @@ fn interference(
                 one(),
             ))
         }
-        (Some(raw), None) => Ok(Interference::Sources(sources(file, raw, room)?)),
+        (Some(raw), None) => Ok(Interference::Sources(sources(file, raw, room, areas)?)),
         (None, Some(raw)) => {
             let points = raw.beta.into_iter();
             let beta: Vec<_> = points
@@ -742,10 +790,11 @@ const MAX_HEIGHT_ERROR_DB: f64 = 1.0;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawSource {
-    power_w: Option<f64>,
-    power_dbm: Option<f64>,
+    power_w: Option<RawPowers>,
+    power_dbm: Option<RawPowers>,
     gain_dbi: Option<f64>,
-    eirp_dbm: Option<f64>,
+    eirp_dbm: Option<RawPowers>,
+    area: Option<RawArea>,
     x_m: Option<f64>,
     y_m: Option<f64>,
     lat_deg: Option<f64>,
@@ -760,25 +809,291 @@ pub(super) struct RelayArea<'a> {
     pub(super) lateral_m: [f64; 2],
 }
 
+impl RawSource {
+    /// Returns the least EIRP (`end` 0) or the greatest one (`end` 1), W.
+    fn eirp_w(&self, file: &str, table: &str, end: usize) -> Result<f64, ScenarioError> {
+        let of = |powers: Option<RawPowers>| powers.map(|powers| powers.end(end));
+        let said = GivenPower {
+            table,
+            in_w: ("power_w", of(self.power_w)),
+            in_dbm: ("power_dbm", of(self.power_dbm)),
+            eirp: ("eirp_dbm", of(self.eirp_dbm)),
+            gain: ("gain_dbi", self.gain_dbi),
+        };
+        Ok(said.source_eirp_w(file)?.unwrap_or_default())
+    }
+}
+
+/// Converts the areas of the `[[interferer]]` tables. Returns an error if one contains Tx or Rx.
+fn source_areas(
+    file: &str,
+    raw: &[RawSource],
+    room: &RelayArea,
+) -> Result<BTreeMap<usize, SourceArea>, ScenarioError> {
+    let mut areas = BTreeMap::new();
+    for (at, raw) in raw.iter().enumerate() {
+        let table = format!("interferer[{at}].");
+        let powers = [
+            ("power_w", raw.power_w),
+            ("power_dbm", raw.power_dbm),
+            ("eirp_dbm", raw.eirp_dbm),
+        ];
+        let Some(given) = &raw.area else {
+            for (key, power) in powers {
+                if let Some(RawPowers::Range([low, high])) = power {
+                    let value = format!("[{}, {}]", number(low), number(high));
+                    let allowed = "one number, or a range together with area".to_owned();
+                    let key = format!("{table}{key}");
+                    return Err(mistake(
+                        file,
+                        &key,
+                        Some(value),
+                        Problem::NeedsArea,
+                        allowed,
+                    ));
+                }
+            }
+            continue;
+        };
+        let key = format!("{table}area");
+        let area = given.area(file, &key, room.line)?;
+        for (site, x_m) in [("Tx", 0.0), ("Rx", room.distance_m)] {
+            if area.contains([x_m, 0.0]) {
+                let value = format!("with {site} (x = {} m, y = 0)", number(x_m));
+                let allowed = format!(
+                    "an area without Tx and Rx, because an interferer at {site} leaves no SIR there"
+                );
+                return Err(mistake(
+                    file,
+                    &key,
+                    Some(value),
+                    Problem::ContainsSite,
+                    allowed,
+                ));
+            }
+        }
+        let least_w = raw.eirp_w(file, &table, 0)?;
+        areas.insert(at, SourceArea { area, least_w });
+    }
+    Ok(areas)
+}
+
+impl RawArea {
+    fn area(&self, file: &str, key: &str, line: Option<&Line>) -> Result<Area, ScenarioError> {
+        let from_two = |[[a, b], [c, d]]: [[f64; 2]; 2]| vec![[a, b], [c, b], [c, d], [a, d]];
+        let to_circle = |centre, radius_m| Ok(Area::Circle { centre, radius_m });
+        let (kind, corners) = match self {
+            Self {
+                circle: Some([x, y, r]),
+                ..
+            } => return to_circle([*x, *y], *r),
+            Self {
+                circle_deg: Some([lat, lon, r]),
+                ..
+            } => {
+                let key = format!("{key}.circle_deg");
+                return to_circle(near_line(file, &key, line, [*lat, *lon])?, *r);
+            }
+            Self {
+                rectangle: Some(two),
+                ..
+            } => ("rectangle", from_two(*two)),
+            Self {
+                polygon: Some(corners),
+                ..
+            } => ("polygon", corners.clone()),
+            Self {
+                rectangle_deg: Some(two),
+                ..
+            } => ("rectangle_deg", from_two(*two)),
+            Self {
+                polygon_deg: Some(corners),
+                ..
+            } => ("polygon_deg", corners.clone()),
+            _ => ("polygon", Vec::new()),
+        };
+        let key = format!("{key}.{kind}");
+        let corners = if kind.ends_with("_deg") {
+            let each = corners.iter().enumerate();
+            each.map(|(at, point)| near_line(file, &format!("{key}[{at}]"), line, *point))
+                .collect::<Result<_, _>>()?
+        } else {
+            corners
+        };
+        polygon(file, &key, corners)
+    }
+}
+
+fn polygon(file: &str, key: &str, corners: Vec<[f64; 2]>) -> Result<Area, ScenarioError> {
+    Area::polygon(corners).map_err(|why| {
+        let allowed = "3 or more corners in order, whose edges neither cross nor touch".to_owned();
+        mistake(
+            file,
+            &format!("{key}: {why}:"),
+            None,
+            Problem::NoArea,
+            allowed,
+        )
+    })
+}
+
+/// Converts latitude and longitude, degrees, to x along the line and y to its right, m.
+fn near_line(
+    file: &str,
+    key: &str,
+    line: Option<&Line>,
+    point @ [lat, lon]: [f64; 2],
+) -> Result<[f64; 2], ScenarioError> {
+    let value = Some(format!("[{lat}, {lon}]"));
+    let Some(line) = line else {
+        let allowed = "rectangle, polygon or circle with x and y, or a [site] with the geographic positions of Tx and Rx".to_owned();
+        return Err(mistake(file, key, value, Problem::NoSite, allowed));
+    };
+    let place = |[lat, lon]: [f64; 2]| {
+        let at = line.axis.place(Geodetic::from_degrees(lat, lon, 0.0)?)?;
+        Some([f64::from(at.x_m), f64::from(at.y_m)])
+    };
+    place(point).ok_or_else(|| {
+        let swapped = match place([lon, lat]) {
+            Some(_) => "; latitude and longitude are swapped",
+            None => "",
+        };
+        let allowed = format!(
+            "a position up to {} m from the line between the two sites of [site] and from its ends{swapped}",
+            Axis::AROUND_M
+        );
+        mistake(file, key, value, Problem::OutOfRange, allowed)
+    })
+}
+
+/// Converts the `[[no_fly]]` tables of a file.
+fn no_fly(
+    file: &str,
+    raw: Vec<RawNoFly>,
+    line: Option<&Line>,
+) -> Result<Vec<NoFly>, ScenarioError> {
+    let mut all = Vec::new();
+    for (at, raw) in raw.into_iter().enumerate() {
+        let key = format!("no_fly[{at}]");
+        let (low, high) = (raw.lowest_m.unwrap_or(0.0), raw.highest_m.unwrap_or(1e4));
+        if low >= high {
+            let (name, value, allowed) = match raw.highest_m {
+                Some(high) => (
+                    "highest_m",
+                    high,
+                    format!("above lowest_m, {} m", number(low)),
+                ),
+                None => (
+                    "lowest_m",
+                    low,
+                    "below highest_m, by default 1e4 m".to_owned(),
+                ),
+            };
+            let key = format!("{key}.{name}");
+            return Err(mistake(
+                file,
+                &key,
+                Some(number(value)),
+                Problem::OutOfRange,
+                allowed,
+            ));
+        }
+        let area = |key: String, corners| NoFly {
+            key,
+            corners,
+            altitudes_m: low..=high,
+        };
+        match (&raw.area, &raw.file) {
+            (Some(raw), _) => {
+                let own = raw.area(file, &format!("{key}.area"), line)?;
+                all.push(area(key, own.corners()));
+            }
+            (None, name) => {
+                let path = format!("{key}.file");
+                let name = name.as_deref().unwrap_or_default();
+                for (number, corners) in geojson(file, &path, name)?.into_iter().enumerate() {
+                    let path = format!("{path} = {name:?}, polygon {number}");
+                    let each = corners.iter().enumerate().map(|(at, point)| {
+                        near_line(file, &format!("{path}, corner {at}"), line, *point)
+                    });
+                    let own = polygon(file, &path, each.collect::<Result<_, _>>()?)?;
+                    all.push(area(
+                        format!("{key}, polygon {number} of {name:?}"),
+                        own.corners(),
+                    ));
+                }
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Reads the outer boundaries of all polygons of a GeoJSON file, as latitude and longitude, degrees.
+///
+/// `name` is relative to the folder of the scenario. Holes are ignored, so that they are no-fly areas, too.
+fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, ScenarioError> {
+    let fail = |why: String| {
+        let allowed = format!(
+            "a GeoJSON file (RFC 7946) with Polygon or MultiPolygon geometries of 3 to {MOST_CORNERS} corners, each [longitude, latitude]"
+        );
+        let key = format!("{key} = {name:?}: {why}:");
+        mistake(file, &key, None, Problem::NoArea, allowed)
+    };
+    let path = Path::new(file).parent().unwrap_or(Path::new("")).join(name);
+    let text = super::check::text_of(&path).map_err(|error| fail(error.problem.to_string()))?;
+    let value: serde_json::Value =
+        serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
+    let mut rings = Vec::new();
+    let mut open = vec![&value];
+    while let Some(value) = open.pop() {
+        let coordinates = value.get("coordinates");
+        let list = |key: &str| value.get(key).and_then(|list| list.as_array());
+        match value.get("type").and_then(|kind| kind.as_str()) {
+            Some("FeatureCollection") => open.extend(list("features").into_iter().flatten().rev()),
+            Some("GeometryCollection") => {
+                open.extend(list("geometries").into_iter().flatten().rev());
+            }
+            Some("Feature") => open.extend(value.get("geometry")),
+            Some("Polygon") => rings.extend(coordinates.and_then(|all| all.get(0))),
+            Some("MultiPolygon") => {
+                let all = coordinates.and_then(|all| all.as_array());
+                rings.extend(all.into_iter().flatten().filter_map(|one| one.get(0)));
+            }
+            Some(kind) => return Err(fail(format!("has a {kind}"))),
+            None => return Err(fail("has an object without a type".to_owned())),
+        }
+    }
+    let point = |at: &serde_json::Value| {
+        let degrees = |axis: usize| at.get(axis).and_then(serde_json::Value::as_f64);
+        Some([degrees(1)?, degrees(0)?])
+    };
+    let ring = |ring: &serde_json::Value| {
+        let all = ring.as_array()?;
+        // The last corner repeats the first one.
+        let is_allowed = (3..=MOST_CORNERS + 1).contains(&all.len());
+        is_allowed.then(|| all.iter().map(point).collect::<Option<Vec<_>>>())?
+    };
+    if rings.is_empty() {
+        return Err(fail("has no polygon".to_owned()));
+    }
+    let rings: Option<Vec<_>> = rings.into_iter().map(ring).collect();
+    rings.ok_or_else(|| fail("has a polygon with wrong corners".to_owned()))
+}
+
 /// Converts the `[[interferer]]` tables of a file to EIRPs and positions. Their keys must have been checked.
 pub(super) fn sources(
     file: &str,
     raw: &[RawSource],
     room: &RelayArea,
+    areas: &BTreeMap<usize, SourceArea>,
 ) -> Result<Vec<Source>, ScenarioError> {
     let each = raw.iter().enumerate();
     each.map(|(at, raw)| {
         let table = format!("interferer[{at}].");
-        let said = GivenPower {
-            table: &table,
-            in_w: ("power_w", raw.power_w),
-            in_dbm: ("power_dbm", raw.power_dbm),
-            eirp: ("eirp_dbm", raw.eirp_dbm),
-            gain: ("gain_dbi", raw.gain_dbi),
-        };
-        let power_w = said.source_eirp_w(file)?.unwrap_or_default();
-        let (x_m, y_m) = match (raw.lat_deg, raw.lon_deg) {
-            (Some(lat), Some(lon)) => on_earth(file, &table, raw, [lat, lon], room)?,
+        let power_w = raw.eirp_w(file, &table, 1)?;
+        let (x_m, y_m) = match (raw.lat_deg, raw.lon_deg, areas.get(&at)) {
+            (.., Some(source)) => source.area.centre().into(),
+            (Some(lat), Some(lon), _) => on_earth(file, &table, raw, [lat, lon], room)?,
             _ => (raw.x_m.unwrap_or_default(), raw.y_m.unwrap_or_default()),
         };
         Ok(Source { power_w, x_m, y_m })

@@ -25,6 +25,12 @@ pub(super) enum Rule {
     /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
     LinkOrNumber(Range),
     Flag,
+    /// Number within this range, or a list of the least and the greatest one.
+    NumberOrTwo(Range),
+    /// List of exactly one number for each of these ranges.
+    Numbers(&'static [Range]),
+    /// List of such lists, with the least and greatest number of lists.
+    Points(&'static [Range], [usize; 2]),
     Choice(&'static [&'static str]),
     Text,
     /// Value of a key that must be a list of at least one text, none of them empty.
@@ -125,6 +131,7 @@ pub(super) const FILE: Keys = &[
     required("power", Rule::Table(POWERS)),
     optional("channel", Rule::Table(CHANNEL)),
     optional("interferer", Rule::Tables(INTERFERER, 1)),
+    optional("no_fly", Rule::Tables(NO_FLY, 1)),
     optional("relay", Rule::Tables(RELAY, 0)),
     optional("field", Rule::Table(FIELD)),
     optional("noise", Rule::Table(NOISE)),
@@ -238,16 +245,66 @@ const INTERFERER: Keys = &[
     unless(
         &["power_dbm", "eirp_dbm"],
         "power_w",
-        Number(range(1e-6, 1e9, "W")),
+        Rule::NumberOrTwo(range(1e-6, 1e9, "W")),
     ),
-    without(&["eirp_dbm"], "power_dbm", Number(SOURCE_DBM)),
+    without(&["eirp_dbm"], "power_dbm", Rule::NumberOrTwo(SOURCE_DBM)),
     without(&["eirp_dbm"], "gain_dbi", Number(GAIN)),
-    optional("eirp_dbm", Number(SOURCE_DBM)),
-    unless(&["lat_deg"], "x_m", Number(PLACE)),
-    unless(&["lon_deg"], "y_m", Number(PLACE)),
-    without(&["y_m"], "lat_deg", Number(LATITUDE)),
-    without(&["x_m"], "lon_deg", Number(LONGITUDE)),
-    without(&["x_m", "y_m"], "amsl_m", Number(AMSL)),
+    optional("eirp_dbm", Rule::NumberOrTwo(SOURCE_DBM)),
+    unless(&["lat_deg", "area"], "x_m", Number(PLACE)),
+    unless(&["lon_deg", "area"], "y_m", Number(PLACE)),
+    without(&["y_m", "area"], "lat_deg", Number(LATITUDE)),
+    without(&["x_m", "area"], "lon_deg", Number(LONGITUDE)),
+    without(&["x_m", "y_m", "area"], "amsl_m", Number(AMSL)),
+    optional("area", Rule::Table(AREA)),
+];
+
+/// Largest number of corners of a polygon.
+pub(super) const MOST_CORNERS: usize = 500;
+const XY: &[Range] = &[PLACE, PLACE];
+const ON_EARTH: &[Range] = &[LATITUDE, LONGITUDE];
+const RADIUS: Range = range(1.0, 1e6, "m");
+
+// Each kind of area excludes the kinds after it.
+const AREA: Keys = &[
+    unless(
+        &[
+            "polygon",
+            "circle",
+            "rectangle_deg",
+            "polygon_deg",
+            "circle_deg",
+        ],
+        "rectangle",
+        Rule::Points(XY, [2, 2]),
+    ),
+    without(
+        &["circle", "rectangle_deg", "polygon_deg", "circle_deg"],
+        "polygon",
+        Rule::Points(XY, [3, MOST_CORNERS]),
+    ),
+    without(
+        &["rectangle_deg", "polygon_deg", "circle_deg"],
+        "circle",
+        Rule::Numbers(&[PLACE, PLACE, RADIUS]),
+    ),
+    without(
+        &["polygon_deg", "circle_deg"],
+        "rectangle_deg",
+        Rule::Points(ON_EARTH, [2, 2]),
+    ),
+    without(
+        &["circle_deg"],
+        "polygon_deg",
+        Rule::Points(ON_EARTH, [3, MOST_CORNERS]),
+    ),
+    optional("circle_deg", Rule::Numbers(&[LATITUDE, LONGITUDE, RADIUS])),
+];
+
+const NO_FLY: Keys = &[
+    optional("area", Rule::Table(AREA)),
+    unless(&["area"], "file", Text),
+    optional("lowest_m", Number(range(0.0, 1e4, "m"))),
+    optional("highest_m", Number(range(0.0, 1e4, "m"))),
 ];
 
 const RELAY: Keys = &[
@@ -332,6 +389,19 @@ impl fmt::Display for Rule {
             Number(range) => write!(f, "a number, {range}"),
             Whole(range) => write!(f, "a whole number, {range}"),
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
+            Rule::NumberOrTwo(range) => write!(
+                f,
+                "a number, {range}, or with area a list of the least and the greatest one"
+            ),
+            Rule::Numbers(ranges) => write!(f, "a list of {}", listed(ranges)),
+            Rule::Points(ranges, [least, most]) => {
+                let count = if least == most {
+                    format!("{least}")
+                } else {
+                    format!("{least} to {most}")
+                };
+                write!(f, "{count} lists, each of {}", listed(ranges))
+            }
             Rule::Flag => f.write_str("true or false"),
             Text => f.write_str("a string that is not empty"),
             Rule::Texts => f.write_str("a list of 1 or more strings that are not empty"),
@@ -366,6 +436,11 @@ fn collect(table: &str, keys: Keys, names: &mut Vec<String>) {
             _ => names.push(name),
         }
     }
+}
+
+fn listed(ranges: &[Range]) -> String {
+    let each: Vec<String> = ranges.iter().map(ToString::to_string).collect();
+    format!("{} numbers: {}", each.len(), each.join(", "))
 }
 
 pub(super) fn names<'a>(keys: impl IntoIterator<Item = &'a Key>) -> String {

@@ -3,6 +3,7 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`Scenario`] | a scenario file, read and checked |
+//! | [`area`] | areas of interferers and no-fly areas |
 //! | [`mission`] | the mission that relays fly in a scenario |
 //! | [`scene`], [`hypothetical`] | several interferers whose powers add up, and the hypothetical one that replaces them |
 //! | [`deployment`] | settings of a chain's programs, in sections of the same file |
@@ -14,6 +15,7 @@
 //! to typed values; `file` checks conditions on several keys. Mistakes are reported as a [`ScenarioError`], one line that names
 //! the file, the key, the value and the allowed values.
 
+pub mod area;
 mod check;
 pub mod deployment;
 pub mod endpoint;

@@ -17,6 +17,8 @@ use crate::{Interference, Scenario, Source};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
+    /// The interferer with this index (from 0) has an area, with this middle, m.
+    Area(usize, [f64; 2]),
     /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
     /// The distance from Tx to Rx is too short for that number of relays at their minimum separation.
@@ -41,6 +43,10 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Area(at, [x_m, y_m]) => write!(
+                f,
+                "interferer[{at}].area: relays compute with one position of an interferer, only `cargo plan` with its area; allowed: x_m and y_m, for example those of its middle, {x_m:.1} and {y_m:.1}"
+            ),
             Self::NoHypothetical => {
                 f.write_str("no single interferer has the same effect as all [[interferer]] together, but relays can compute with a single one only: change the interferers' positions or powers, or leave some interferers out")
             }
@@ -78,6 +84,9 @@ pub fn mission(
     uavs: u16,
     tolerance: f64,
 ) -> Result<(Mission, Vec<(u16, Profile)>), Refusal> {
+    if let Some((at, source)) = scenario.areas.first_key_value() {
+        return Err(Refusal::Area(*at, source.area.centre()));
+    }
     let interference = match &scenario.interference {
         Interference::Sources(sources) if sources.is_empty() && scenario.listen.is_some() => {
             uav_relay::Interference::Unknown

@@ -1,8 +1,11 @@
 //! Scene: a chain of relays and several interferers whose powers add up.
 
+use std::collections::BTreeMap;
+
 use uav_relay::channel::AirGround;
 use uav_relay::{Channel, Placement};
 
+use crate::area::Area;
 use crate::{Interference, Scenario, Source};
 
 /// A relay of a chain in a [`Scene`]: its altitude and its transmit power.
@@ -58,6 +61,11 @@ pub struct Scene {
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
+    /// Areas of the sources that may be anywhere in them, by index in `sources`.
+    ///
+    /// Each receiver gets the interference from the nearest point of the area. An SIR is then that of the source's worst position
+    /// for this hop, and the SIR of the worst hop is that of the source's worst position.
+    pub areas: BTreeMap<usize, Area>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,
     /// Path-loss factor mu between two points on the ground, 1/m^2, > 0. The path loss at distance d is mu d^2.
@@ -126,6 +134,11 @@ impl Scene {
             rx_w: scenario.rx_w,
             reverse: scenario.reverse,
             sources: sources.clone(),
+            areas: scenario
+                .areas
+                .iter()
+                .map(|(at, source)| (*at, source.area.clone()))
+                .collect(),
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
             eta: channel.eta(),
@@ -143,11 +156,9 @@ impl Scene {
     /// Returns the interference power at a relay at the position `at`, W: the sum over all sources.
     pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
         let Place { x, y, h } = at.into();
-        let each = self.sources.iter().map(|source| {
-            let (dx, dy) = (x - source.x_m, y - source.y_m);
-            received_w(source.power_w, self.eta, dx, dy, h)
-        });
-        each.sum()
+        let each = self.offsets(x, y);
+        each.map(|(power_w, [dx, dy])| received_w(power_w, self.eta, dx, dy, h))
+            .sum()
     }
 
     /// Returns the interference power at Rx, W; infinite if an interferer is at the same point as Rx.
@@ -157,11 +168,22 @@ impl Scene {
 
     /// Returns the interference power on the ground at the distance `x_m` from Tx toward Rx, W.
     pub fn interference_on_ground_w(&self, x_m: f64) -> f64 {
-        let each = self.sources.iter().map(|source| {
-            let dx = x_m - source.x_m;
-            received_w(source.power_w, self.mu_nlos, dx, source.y_m, 0.0)
-        });
-        each.sum()
+        let each = self.offsets(x_m, 0.0);
+        each.map(|(power_w, [dx, dy])| received_w(power_w, self.mu_nlos, dx, dy, 0.0))
+            .sum()
+    }
+
+    /// Returns the power of each source, W, and the offset from it to (`x`, `y`), m.
+    ///
+    /// A source that may be anywhere in an area is at its nearest point.
+    pub fn offsets(&self, x: f64, y: f64) -> impl Iterator<Item = (f64, [f64; 2])> {
+        let each = self.sources.iter().enumerate();
+        each.map(move |(at, source)| {
+            let area = self.areas.get(&at);
+            let [from_x, from_y] =
+                area.map_or([source.x_m, source.y_m], |area| area.nearest([x, y]));
+            (source.power_w, [x - from_x, y - from_y])
+        })
     }
 
     /// Returns the linear SIRs of the N + 1 hops from Tx to Rx, with relay k at `places[k - 1]`.

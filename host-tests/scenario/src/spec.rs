@@ -7,6 +7,7 @@ use serde::Deserialize;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{Duration, Geodetic, Listen};
 
+use super::area::{NoFly, SourceArea};
 use super::link::{Access, Link};
 use super::number::{factor, narrow, watts};
 
@@ -42,6 +43,10 @@ pub struct Scenario {
     pub channel: ChannelSpec,
     /// Interference: a list of interfering transmitters, or a random field.
     pub interference: Interference,
+    /// Areas of interferers that may be anywhere in them, by the index (from 0) of the interferer.
+    pub areas: BTreeMap<usize, SourceArea>,
+    /// Areas in which relays may not fly, for the planner.
+    pub no_fly: Vec<NoFly>,
     /// Settings for relays that locate the interferer by measurements; `None` if they do not.
     ///
     /// [`Self::interference`] is then their initial knowledge, if any.
@@ -311,6 +316,8 @@ impl Default for Scenario {
                 x_m: 500.0,
                 y_m: 400.0,
             }]),
+            areas: BTreeMap::new(),
+            no_fly: Vec::new(),
             listen: None,
             noise: Noise::default(),
             link: None,

@@ -73,6 +73,8 @@ pub(crate) fn scenario(
         listen: None,
         link: None,
         reverse: 0.0,
+        areas: std::collections::BTreeMap::new(),
+        no_fly: Vec::new(),
         terrain: None,
         plan: None,
         distance_m: d,

@@ -74,6 +74,8 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
         listen: None,
         link: None,
         reverse: 0.0,
+        areas: std::collections::BTreeMap::new(),
+        no_fly: Vec::new(),
         terrain: None,
         plan: None,
         distance_m: link.distance_m,

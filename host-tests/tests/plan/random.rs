@@ -81,6 +81,8 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         listen: None,
         link: None,
         reverse: 0.0,
+        areas: std::collections::BTreeMap::new(),
+        no_fly: Vec::new(),
         terrain: None,
         plan: None,
         distance_m: d,

@@ -48,6 +48,8 @@ fn every_key_sets_its_value() {
         listen: None,
         link: None,
         reverse: 0.0,
+        areas: std::collections::BTreeMap::new(),
+        no_fly: Vec::new(),
         terrain: None,
         plan: None,
         distance_m: 1500.0,

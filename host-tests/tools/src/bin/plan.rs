@@ -13,6 +13,8 @@ use uav_relay_sim::{command, svg};
 use uav_relay_terrain::report::TerrainReport;
 use uav_relay_tools::figures::draw::draw;
 use uav_relay_tools::plan;
+use uav_relay_tools::plan::area::{self, AreaReport, Criterion};
+use uav_relay_tools::plan::area_map;
 use uav_relay_tools::plan::carried::Carried;
 use uav_relay_tools::plan::flown::{flown, planned, with_plan};
 use uav_relay_tools::plan::map::{Map, geojson, kml};
@@ -40,6 +42,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         return Err(Failure::input(line.to_owned()));
     }
     let number = options.number();
+    check_area(options, &scenario)?;
     check_target(options, &scenario)?;
     check_out(options, &scenario)?;
     check_map(options, &scenario)?;
@@ -51,13 +54,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         tolerance: options.tolerance,
     };
     let radio = radio(options, &scenario)?;
-    let planned = match (options.wanted.target_rate_bps, &radio) {
-        _ if options.altitude == Altitude::Terrain => {
-            above_terrain(&scenario, &ask, elevation.as_ref(), radio.as_ref())
-        }
-        (Some(target_bps), Some(radio)) => by_rate(&scenario, &ask, radio, target_bps),
-        (_, radio) => plain(&scenario, &ask, radio.as_ref()),
-    };
+    let planned = planned_by(options, &scenario, &ask, elevation.as_ref(), radio.as_ref());
     let listed = |mut rates: RateReport| {
         if !options.rates {
             rates.rates.clear();
@@ -79,6 +76,8 @@ fn run(options: &Options) -> Result<(), Failure> {
             }
             let (terrain, error) =
                 terrain(options, &scenario, elevation.as_ref(), (&plan, number))?;
+            let error = joined([error, no_fly(options, &scenario, &plan)]);
+            write_area_map(options, &scenario, &plan)?;
             write_map(options, &scenario, &plan, terrain.as_ref())?;
             let next = match error {
                 Some(_) => String::new(),
@@ -103,6 +102,7 @@ fn run(options: &Options) -> Result<(), Failure> {
                 options,
                 &PlanReport {
                     over_terrain,
+                    area: AreaReport::new(&scenario, &ask, &plan, options.area.quantile),
                     ..report
                 },
             )?;
@@ -130,6 +130,34 @@ fn run(options: &Options) -> Result<(), Failure> {
             options,
             &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
         ),
+    }
+}
+
+/// Finds the plan by the method that the options and the scenario need.
+fn planned_by(
+    options: &Options,
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    elevation: Option<&Elevation>,
+    radio: Option<&Radio>,
+) -> Result<Planned, NoPlan> {
+    match (options.wanted.target_rate_bps, radio) {
+        _ if options.altitude == Altitude::Terrain => {
+            above_terrain(scenario, ask, elevation, radio)
+        }
+        (Some(target_bps), Some(radio)) => by_rate(scenario, ask, radio, target_bps),
+        (_, None) if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() => {
+            let criterion = Criterion {
+                quantile: options.area.quantile,
+                allow_crossing: options.area.allow_crossing,
+            };
+            area::plan(scenario, ask, criterion).map(|plan| Planned {
+                plan: Some(plan),
+                number: ask.number,
+                rates: None,
+            })
+        }
+        (_, radio) => plain(scenario, ask, radio),
     }
 }
 
@@ -465,6 +493,8 @@ struct Options {
     kml: Option<PathBuf>,
     #[command(flatten)]
     terrain: TerrainOptions,
+    #[command(flatten)]
+    area: AreaOptions,
     /// Write the scenario with its plan, for cargo provision --scenario FILE --all
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -486,6 +516,24 @@ struct TerrainOptions {
     /// Draw ground, hops and their first Fresnel zones (SVG). Needs elevation files
     #[arg(long, value_name = "FILE")]
     profile: Option<PathBuf>,
+}
+
+/// Interferers that may be anywhere in an area, and no-fly areas.
+#[derive(Args, Debug)]
+struct AreaOptions {
+    /// Maximise the SIR that the worst hop has for this fraction of the interferer's positions and powers, 0.5 to 0.99, in place of its
+    /// worst position. Needs an interferer with an area
+    #[arg(long, value_name = "Q", value_parser = |text: &str| number(text, 0.5, 0.99))]
+    quantile: Option<f64>,
+    /// Draw the SIR of the worst hop for each position of the interferer (SVG). Needs an interferer with an area
+    #[arg(long, value_name = "FILE")]
+    area_svg: Option<PathBuf>,
+    /// Write the same as squares with geographic coordinates (GeoJSON). Needs a scenario with a site as well
+    #[arg(long, value_name = "FILE")]
+    area_geojson: Option<PathBuf>,
+    /// Accept a plan in which the way between two neighbours crosses a no-fly area
+    #[arg(long)]
+    allow_crossing: bool,
 }
 
 /// Request: exactly one of these.
@@ -550,6 +598,89 @@ impl Options {
             (None, None, None) => Number::Of(1),
         }
     }
+}
+
+/// Checks the options that concern interferers with an area.
+fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
+    let AreaOptions {
+        quantile,
+        area_svg,
+        area_geojson,
+        ..
+    } = &options.area;
+    let refuse = |line: String| Err(Failure::input(line));
+    let file = |path: &PathBuf| path.display().to_string();
+    let asked = [
+        ("--quantile", quantile.map(|quantile| quantile.to_string())),
+        ("--area-svg", area_svg.as_ref().map(file)),
+        ("--area-geojson", area_geojson.as_ref().map(file)),
+    ];
+    let Some(first) = scenario.areas.keys().next() else {
+        return match asked
+            .iter()
+            .find_map(|(name, value)| Some((name, value.as_ref()?)))
+        {
+            Some((name, value)) => refuse(format!(
+                "{name} {value}: needs an [[interferer]] with an area"
+            )),
+            None => Ok(()),
+        };
+    };
+    let named = |line: &str| {
+        refuse(format!(
+            "{}: interferer[{first}].area: {line}",
+            options.file()
+        ))
+    };
+    let asks_rate =
+        options.rates || options.bandwidth_hz.is_some() || options.wanted.target_rate_bps.is_some();
+    if scenario.link.is_some() || asks_rate {
+        return named(
+            "has no data rates: leave out [link], --rates, --bandwidth-hz and --target-rate-bps",
+        );
+    }
+    if options.out.is_some() {
+        return named(
+            "cannot be used with --out, because relays compute with one position of an interferer",
+        );
+    }
+    if quantile.is_some() && options.altitude == Altitude::Terrain {
+        return refuse("--quantile: cannot be used with --altitude terrain".to_owned());
+    }
+    Ok(())
+}
+
+/// Returns the reason why the plan cannot be flown for the no-fly areas; `None` if it can.
+fn no_fly(options: &Options, scenario: &Scenario, plan: &Plan) -> Option<String> {
+    let chain: Vec<_> = plan.places.iter().map(|(place, _)| *place).collect();
+    area::problem(&scenario.no_fly, &chain, options.area.allow_crossing)
+}
+
+fn joined(lines: [Option<String>; 2]) -> Option<String> {
+    let lines: Vec<String> = lines.into_iter().flatten().collect();
+    (!lines.is_empty()).then(|| lines.join("; "))
+}
+
+/// Writes the files of `--area-svg` and `--area-geojson`.
+fn write_area_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
+    let AreaOptions {
+        area_svg,
+        area_geojson,
+        ..
+    } = &options.area;
+    if area_svg.is_none() && area_geojson.is_none() {
+        return Ok(());
+    }
+    let cells = area::cells(scenario, plan);
+    if let Some(file) = area_svg {
+        save(file, "--area-svg", &area_map::svg(scenario, plan, &cells))?;
+    }
+    if let (Some(file), Some(line)) = (area_geojson, &scenario.line) {
+        let text = area_map::geojson(line, &cells)
+            .map_err(|line| Failure::input(format!("--area-geojson: {line}")))?;
+        save(file, "--area-geojson", &text)?;
+    }
+    Ok(())
 }
 
 /// Rejects a target SIR for relays that choose the positions of the largest data rate.
@@ -659,9 +790,11 @@ fn write_out(
             )));
         }
     }
-    if let Some(elevation) = elevation
-        && let Some(line) = over(options, elevation, scenario, &flown.plan)?.1
-    {
+    let blocked = match elevation {
+        Some(elevation) => over(options, elevation, scenario, &flown.plan)?.1,
+        None => None,
+    };
+    if let Some(line) = joined([blocked, no_fly(options, scenario, &flown.plan)]) {
         return Err(Failure::unmet(format!(
             "--out {}: not written: at the positions on which {relays} relays would agree, {line}",
             file.display()
@@ -729,10 +862,11 @@ fn save(file: &Path, option: &str, text: &str) -> Result<(), Failure> {
 }
 
 fn check_map(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
-    let option = match (&options.geojson, &options.kml) {
-        (Some(_), _) => "--geojson",
-        (None, Some(_)) => "--kml",
-        (None, None) => return Ok(()),
+    let option = match (&options.geojson, &options.kml, &options.area.area_geojson) {
+        (Some(_), ..) => "--geojson",
+        (None, Some(_), _) => "--kml",
+        (None, None, Some(_)) => "--area-geojson",
+        (None, None, None) => return Ok(()),
     };
     if scenario.line.is_some() {
         return Ok(());

@@ -10,6 +10,7 @@ use uav_relay_scenario::deployment::{Deployment, NETWORK, Network};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command;
 use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
+use uav_relay_tools::plan::area;
 use uav_relay_tools::plan::flown::{Flown, flown, is_current};
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secret};
@@ -229,7 +230,10 @@ impl<'a> Asked<'a> {
             );
         }
         if !self.scenario.knows_interference()
-            || is_plain && !self.options.folder.all && self.scenario.plan.is_none()
+            || is_plain
+                && !self.options.folder.all
+                && self.scenario.plan.is_none()
+                && self.scenario.no_fly.is_empty()
         {
             return Ok(None);
         }
@@ -250,6 +254,13 @@ impl<'a> Asked<'a> {
         };
         if let Some(plan) = &self.scenario.plan {
             is_current(plan, &flown).map_err(|why| format!("{}: {why}", self.name))?;
+        }
+        let chain: Vec<_> = flown.plan.places.iter().map(|(place, _)| *place).collect();
+        if let Some(line) = area::problem(&self.scenario.no_fly, &chain, true) {
+            return Err(format!("{}: {line}", self.name));
+        }
+        if let Some(line) = area::problem(&self.scenario.no_fly, &chain, false) {
+            command::print_line(&format!("{}: warning: {line}", self.name));
         }
         if flown.is_poor() {
             let line = format!("{}: {}", self.name, flown.describe());

@@ -417,6 +417,19 @@ impl<'a> Line<'a> {
                 width: source.y_m.hypot(altitude_m),
             })
             .collect();
+        // The interference of an area bends at its corners, and where its boundary crosses the line.
+        for area in scene.areas.values() {
+            let corners = area.corners();
+            for ([x, y], [to_x, to_y]) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+                let width = area.distance_m([*x, 0.0]).hypot(altitude_m);
+                centres.push(Centre { at: *x, width });
+                if (*y > 0.0) != (*to_y > 0.0) {
+                    let at = x + y / (y - to_y) * (to_x - x);
+                    let width = altitude_m;
+                    centres.push(Centre { at, width });
+                }
+            }
+        }
         centres.push(Centre {
             at: 0.0,
             width: altitude_m,
@@ -441,10 +454,9 @@ impl<'a> Line<'a> {
 
     fn quiet_and_slope(&self, x: f64) -> (f64, f64) {
         let (mut power, mut change) = (self.scene.noise_w, 0.0);
-        for source in &self.scene.sources {
-            let dx = x - source.x_m;
-            let squared = dx * dx + source.y_m * source.y_m + self.altitude_m * self.altitude_m;
-            let received = source.power_w / (self.scene.eta * squared);
+        for (power_w, [dx, dy]) in self.scene.offsets(x, 0.0) {
+            let squared = dx * dx + dy * dy + self.altitude_m * self.altitude_m;
+            let received = power_w / (self.scene.eta * squared);
             power += received;
             change -= received * 2.0 * dx / squared;
         }

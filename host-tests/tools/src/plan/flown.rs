@@ -83,7 +83,7 @@ pub fn flown(
         x_m: None,
         tolerance,
     };
-    let best = super::plan(scenario, &ask)?;
+    let best = super::plan(&super::area::anywhere(scenario), &ask)?;
     let best_sir = best.sir().max(plan.sir());
     let radio = fitted_radio(scenario, ask.free_altitude);
     let scene = Scene::new(scenario, relays);

@@ -8,6 +8,7 @@
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
 //! | a field, both directions | `source`: Algorithm 4 |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
+//! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer |
 //! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective |
 //! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
@@ -15,6 +16,8 @@
 //! optimal.
 
 mod altitude;
+pub mod area;
+pub mod area_map;
 pub mod bound;
 pub mod carried;
 pub mod flown;
@@ -47,6 +50,9 @@ pub use altitude::solved;
 /// [`NoPlan`]: an invalid request, or one that cannot be met, with the best SIR found.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
+    if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() {
+        return area::plan(scenario, ask, area::Criterion::default());
+    }
     match &scenario.interference {
         Interference::Field(_) => source::plan_in_field(scenario, ask),
         Interference::Sources(sources) if sources.len() > 1 => {

@@ -16,12 +16,13 @@ use std::fmt;
 use serde::Serialize;
 use uav_relay::Placement;
 use uav_relay_scenario::Scenario;
+use uav_relay_scenario::area::NoFly;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_terrain::diffraction::{LIGHT_M_S, Point, loss_db};
 use uav_relay_terrain::profile::{Ground, Node, bulge_m};
 
 use super::terrain::Elevation;
-use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, Why};
+use super::{NoPlan, Number, Plan, PlanRequest, Why, area};
 
 /// Largest number of relays for which positions over terrain are searched.
 pub const MOST_RELAYS: u16 = 50;
@@ -96,6 +97,7 @@ pub struct Search<'a> {
     /// True if the altitudes are limited by the scenario's band, too.
     is_banded: bool,
     losses: HashMap<[[u64; 2]; 2], f64>,
+    no_fly: Vec<NoFly>,
 }
 
 impl<'a> Search<'a> {
@@ -129,6 +131,7 @@ impl<'a> Search<'a> {
             position_error_m: elevation.position_error_m(),
             is_banded: most.is_none(),
             losses: HashMap::new(),
+            no_fly: scenario.no_fly.clone(),
             ground,
         })
     }
@@ -174,7 +177,12 @@ impl<'a> Search<'a> {
         let datum = self.datum_m(x_m)?;
         let levels = levels
             .into_iter()
-            .filter(|h_m| (band[0]..=band[1]).contains(h_m));
+            .filter(|h_m| (band[0]..=band[1]).contains(h_m))
+            .filter(|h_m| {
+                self.no_fly
+                    .iter()
+                    .all(|area| area.depth_m([x_m, 0.0], *h_m).is_none())
+            });
         Ok(levels
             .map(|h_m| Candidate {
                 x_m,
@@ -452,7 +460,7 @@ pub fn best(
     let scene = Scene::new(scenario, relays).ok_or_else(|| {
         NoPlan::Wrong("--altitude terrain: needs an [[interferer]], not a [field]".to_owned())
     })?;
-    let briefed = ProfiledMission::new(scenario, relays, tolerance)?;
+    let briefed = area::profiles(scenario, relays, tolerance)?;
     let mut search = Search::new(scenario, &scene, elevation).map_err(NoPlan::Wrong)?;
     let columns = u32::from(relays * 8).max(80);
     // The positions that ignore the terrain, as high as they have to be, are candidates: the search does no worse.

@@ -9,6 +9,7 @@ use uav_relay_scenario::{Noise, Scenario};
 use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, db, hops_table, relays};
 use uav_relay_terrain::report::TerrainReport;
 
+use super::area::AreaReport;
 use super::over_terrain::OverTerrain;
 use super::rate::{BestRate, Rate, RateOf};
 use super::{Number, Plan, Unit, Why};
@@ -368,6 +369,9 @@ pub struct PlanReport {
     /// Gain of positions that are chosen for the terrain; absent for other positions.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
+    /// SIRs over the areas of the interferers; absent if none has an area.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub area: Option<AreaReport>,
     /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
@@ -428,6 +432,7 @@ impl PlanReport {
             hypothetical,
             terrain: None,
             over_terrain: None,
+            area: None,
             room: !plan.mission.config().lateral.is_single(),
             unit,
         }
@@ -540,6 +545,9 @@ impl PlanReport {
                 text,
                 "target: SIR {target}; this number of relays reaches up to {most} (--uavs {uavs})"
             );
+        }
+        if let Some(area) = &self.area {
+            text.push_str(&area.describe());
         }
         let is_for_both = self.way_back.is_some_and(|back| back.reverse.is_some());
         let one_way = if is_for_both { "" } else { ONE_WAY };

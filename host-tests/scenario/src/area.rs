@@ -1,0 +1,266 @@
+//! Areas on the ground: where an interferer may be, and where relays may not fly.
+
+use std::f64::consts::PI;
+use std::ops::RangeInclusive;
+
+/// Area on the ground with a boundary that does not cross itself.
+///
+/// Points are [x, y], m: the distance from Tx along the line to Rx, and the offset to the right.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Area {
+    /// Circle around a point.
+    Circle {
+        /// Middle of the circle.
+        centre: [f64; 2],
+        /// Radius, m, > 0.
+        radius_m: f64,
+    },
+    /// Polygon, convex or not; its corners in order, without a repeated last corner.
+    Polygon(Vec<[f64; 2]>),
+}
+
+/// Area in which an interferer may be anywhere, and the least power of the interferer.
+///
+/// The entry in [`Interference`](crate::Interference) has the greatest power, and the middle of the area.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourceArea {
+    /// Possible positions of the interferer. Neither Tx nor Rx is inside.
+    pub area: Area,
+    /// Least EIRP of the interferer, W.
+    pub least_w: f64,
+}
+
+/// Area in which relays may not fly, between two altitudes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoFly {
+    /// Key of the area in the file, for messages, such as `no_fly[0]`.
+    pub key: String,
+    /// Boundary of the area; a circle of the file is a polygon around it.
+    pub corners: Vec<[f64; 2]>,
+    /// Lowest and highest altitude of the area, m, as `geometry.altitude_m`.
+    pub altitudes_m: RangeInclusive<f64>,
+}
+
+/// Least surface of a polygon, m2.
+const LEAST_M2: f64 = 1.0;
+
+/// Number of corners of the polygon around a circle.
+const CORNERS: u32 = 64;
+
+impl Area {
+    /// Returns the point of the area nearest to `at`; `at` itself if it is inside.
+    pub fn nearest(&self, at: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::Circle { centre, radius_m } => {
+                let [dx, dy] = [at[0] - centre[0], at[1] - centre[1]];
+                let share = radius_m / dx.hypot(dy);
+                if share < 1.0 {
+                    [centre[0] + share * dx, centre[1] + share * dy]
+                } else {
+                    at
+                }
+            }
+            Self::Polygon(corners) if is_inside(corners, at) => at,
+            Self::Polygon(corners) => edges(corners)
+                .map(|[from, to]| {
+                    let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+                    let along = (at[0] - from[0]) * dx + (at[1] - from[1]) * dy;
+                    let share = (along / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+                    [from[0] + share * dx, from[1] + share * dy]
+                })
+                .min_by(|a, b| distance_m(*a, at).total_cmp(&distance_m(*b, at)))
+                .unwrap_or(at),
+        }
+    }
+
+    /// Returns true if `at` is in the area or on its boundary.
+    pub fn contains(&self, at: [f64; 2]) -> bool {
+        !(self.distance_m(at) > 0.0)
+    }
+
+    /// Returns the distance of `at` from the area, m; 0 inside.
+    pub fn distance_m(&self, at: [f64; 2]) -> f64 {
+        distance_m(self.nearest(at), at)
+    }
+
+    /// Returns the centre of gravity, or the point of the area nearest to it.
+    pub fn centre(&self) -> [f64; 2] {
+        let corners = match self {
+            Self::Circle { centre, .. } => return *centre,
+            Self::Polygon(corners) => corners,
+        };
+        // Relative to a corner, so that large coordinates do not cancel.
+        let [x, y] = corners.first().copied().unwrap_or_default();
+        let (mut area, mut sum) = (0.0, [0.0; 2]);
+        for [a, b] in edges(corners) {
+            let [a, b] = [a, b].map(|[of_x, of_y]| [of_x - x, of_y - y]);
+            let cross = a[0] * b[1] - b[0] * a[1];
+            area += cross;
+            sum = [
+                sum[0] + cross * (a[0] + b[0]),
+                sum[1] + cross * (a[1] + b[1]),
+            ];
+        }
+        self.nearest([x + sum[0] / (3.0 * area), y + sum[1] / (3.0 * area)])
+    }
+
+    /// Returns the corners of the smallest rectangle along x and y around the area: the least and the greatest ones.
+    pub fn bounds(&self) -> [[f64; 2]; 2] {
+        match self {
+            Self::Circle {
+                centre: [x, y],
+                radius_m: r,
+            } => [[x - r, y - r], [x + r, y + r]],
+            Self::Polygon(corners) => {
+                let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+                corners.iter().fold(none, |[low, high], [x, y]| {
+                    [
+                        [low[0].min(*x), low[1].min(*y)],
+                        [high[0].max(*x), high[1].max(*y)],
+                    ]
+                })
+            }
+        }
+    }
+
+    /// Returns the corners of a polygon that contains the area; of a circle, 64 corners.
+    pub fn corners(&self) -> Vec<[f64; 2]> {
+        match self {
+            Self::Circle { centre, radius_m } => {
+                let outer = radius_m / (PI / f64::from(CORNERS)).cos();
+                let corner = |corner: u32| {
+                    let (sin, cos) = (2.0 * PI * f64::from(corner) / f64::from(CORNERS)).sin_cos();
+                    [centre[0] + outer * cos, centre[1] + outer * sin]
+                };
+                (0..CORNERS).map(corner).collect()
+            }
+            Self::Polygon(corners) => corners.clone(),
+        }
+    }
+
+    /// Creates the polygon with these corners, in order. The last corner may repeat the first one.
+    ///
+    /// # Errors
+    /// A text that says what is wrong: too few corners, no surface, or edges that cross or touch.
+    pub fn polygon(mut corners: Vec<[f64; 2]>) -> Result<Self, String> {
+        if corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        corners.dedup();
+        if corners.len() < 3 {
+            return Err(format!("has {} different corners", corners.len()));
+        }
+        let edges: Vec<_> = edges(&corners).collect();
+        let origin = corners.first().copied().unwrap_or_default();
+        let surface: f64 = edges.iter().map(|[a, b]| turn([origin, *a], *b)).sum();
+        if !(surface.abs() > 2.0 * LEAST_M2) {
+            return Err(format!("has a surface of less than {LEAST_M2} m2"));
+        }
+        for (first, one) in edges.iter().enumerate() {
+            for (second, other) in edges.iter().enumerate().skip(first + 1) {
+                let is_next = second == first + 1;
+                let is_wrong = match (is_next, first == 0 && second + 1 == edges.len()) {
+                    (true, _) => is_spike(*one, *other),
+                    (_, true) => is_spike(*other, *one),
+                    _ => cross(*one, *other),
+                };
+                if is_wrong {
+                    return Err(format!(
+                        "crosses or touches itself: edges {} and {}",
+                        first + 1,
+                        second + 1
+                    ));
+                }
+            }
+        }
+        Ok(Self::Polygon(corners))
+    }
+}
+
+impl NoFly {
+    /// Returns how deep the area contains a relay, m; `None` if the relay is outside.
+    ///
+    /// It is the distance to the boundary, to the lowest or to the highest altitude, whichever is least.
+    pub fn depth_m(&self, at: [f64; 2], altitude_m: f64) -> Option<f64> {
+        if !(self.altitudes_m.contains(&altitude_m) && is_inside(&self.corners, at)) {
+            return None;
+        }
+        let heights = [
+            altitude_m - self.altitudes_m.start(),
+            self.altitudes_m.end() - altitude_m,
+        ];
+        let beside = edges(&self.corners)
+            .map(|[from, to]| distance_m(Area::Polygon(vec![from, to]).nearest(at), at));
+        Some(beside.chain(heights).fold(f64::INFINITY, f64::min))
+    }
+
+    /// Returns the length of the straight way inside the area, seen from above, m. Each end is [x, y, altitude].
+    pub fn crossing_m(&self, [from, to]: [[f64; 3]; 2]) -> f64 {
+        let climb = to[2] - from[2];
+        let mut turns = vec![0.0, 1.0];
+        if climb.abs() > 0.0 {
+            let limits = [self.altitudes_m.start(), self.altitudes_m.end()];
+            turns.extend(limits.map(|limit| (limit - from[2]) / climb));
+        }
+        let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+        for [a, b] in edges(&self.corners) {
+            let [ex, ey] = [b[0] - a[0], b[1] - a[1]];
+            let turn = dx * ey - dy * ex;
+            turns.push(((a[0] - from[0]) * ey - (a[1] - from[1]) * ex) / turn);
+        }
+        turns.retain(|share| (0.0..=1.0).contains(share));
+        turns.sort_by(f64::total_cmp);
+        let parts = turns.iter().zip(turns.iter().skip(1));
+        let inside = parts.filter(|(start, end)| {
+            let share = start.midpoint(**end);
+            let altitude_m = from[2] + share * climb;
+            self.altitudes_m.contains(&altitude_m)
+                && is_inside(&self.corners, [from[0] + share * dx, from[1] + share * dy])
+        });
+        inside.map(|(start, end)| end - start).sum::<f64>() * dx.hypot(dy)
+    }
+}
+
+fn distance_m(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> {
+    let next = corners.iter().cycle().skip(1);
+    corners.iter().zip(next).map(|(from, to)| [*from, *to])
+}
+
+/// Returns true if a ray from `at` leaves the polygon an odd number of times.
+fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
+    let crossed = edges(corners).filter(|[a, b]| {
+        (a[1] > at[1]) != (b[1] > at[1])
+            && at[0] < a[0] + (at[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+    });
+    crossed.count() % 2 == 1
+}
+
+/// Returns twice the signed area of a triangle.
+fn turn([a, b]: [[f64; 2]; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// Returns true if two edges have a point in common.
+fn cross(one: [[f64; 2]; 2], other: [[f64; 2]; 2]) -> bool {
+    let sides = |edge, [a, b]: [[f64; 2]; 2]| turn(edge, a) * turn(edge, b) <= 0.0;
+    let overlap = |axis: usize| {
+        let range = |edge: [[f64; 2]; 2]| {
+            let [a, b] = edge.map(|at| at.get(axis).copied().unwrap_or_default());
+            (a.min(b), a.max(b))
+        };
+        let ((low, high), (least, most)) = (range(one), range(other));
+        low <= most && least <= high
+    };
+    sides(one, other) && sides(other, one) && overlap(0) && overlap(1)
+}
+
+/// Returns true if the second edge, which begins where the first one ends, goes back along it.
+fn is_spike(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> bool {
+    let [[a, b], [_, c]] = [first, second];
+    let back = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);
+    !(turn(first, c).abs() > 1e-12 * distance_m(a, b) * distance_m(b, c)) && back > 0.0
+}

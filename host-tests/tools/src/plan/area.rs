@@ -1,0 +1,822 @@
+//! Plans for interferers that may be anywhere in an area, and plans around no-fly areas.
+//!
+//! The SIR of a hop is least if each interferer is at the point of its area nearest to the hop's receiver. Only one hop is the worst
+//! one, and all interferers can be at the points nearest to its receiver. So the worst case of the chain's SIR over the areas
+//! is the least SIR of its hops with the interferers nearest to each receiver ([`Scene::areas`]): the search for
+//! positions is that for a known interference at each receiver.
+//!
+//! | positions | method |
+//! | --- | --- |
+//! | one altitude, one direction | the exact optimum for the sum of the interferers |
+//! | other | dynamic programming on a grid of positions, then in windows around the relays that become narrower |
+//! | quantile | the same against the most harmless draws of the interferers' positions and powers, which are chosen again until the quantile no longer rises |
+//!
+//! Chains whose ways between neighbours cross no no-fly area come first.
+
+use chacha20::ChaCha8Rng;
+use rand::{RngExt as _, SeedableRng as _};
+use serde::Serialize;
+use uav_relay::Placement;
+use uav_relay_scenario::area::{NoFly, SourceArea};
+use uav_relay_scenario::number::narrow;
+use uav_relay_scenario::scene::{Place, Scene};
+use uav_relay_scenario::{Interference, Scenario, Source};
+use uav_relay_sim::report::db;
+
+use super::{NoPlan, Number, Plan, PlanRequest, ProfiledMission, fewest_of, fitted_radio, source};
+use crate::multi_interferer::{best_common_altitude, optimum};
+
+/// Largest number of relays for which positions are searched on a grid.
+const MOST_SEARCHED: u16 = 50;
+
+/// Quantile that is reported if no other one is asked for.
+pub const QUANTILE: f64 = 0.95;
+
+/// Number of draws of the interferers' positions and powers with which a quantile is optimised, and reported.
+const DRAWS: [usize; 2] = [400, 4000];
+
+/// Seed of the draws, so that equal scenarios have equal plans.
+const SEED: u64 = 36;
+
+/// Largest number of rounds in which the draws that count are chosen again.
+const ROUNDS: u32 = 8;
+
+/// Factor on the SIR of a hop whose way crosses a no-fly area: other chains come first.
+const CROSSING: f64 = 1e-30;
+
+/// Depth in a no-fly area, and length of a way in it, that is rounding, m.
+const ROUNDING_M: f64 = 0.01;
+
+/// Number of x, y and altitudes of the first grid, where they are free.
+const GRID: [u32; 3] = [40, 7, 5];
+
+/// Largest number of windows around the relays, and the factor on the width of the next one if a window gains little.
+const WINDOWS: (u32, f64) = (120, 0.6);
+
+/// Largest number of times that the windows begin again with their full width.
+const RESTARTS: u32 = 5;
+
+/// Width of the narrowest window along x, relative to the line.
+const NARROWEST: f64 = 1e-7;
+
+/// Criterion by which positions are chosen.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Criterion {
+    /// Fraction of the interferers' positions and powers, 0.5 to 0.99; `None` for the worst case.
+    pub quantile: Option<f64>,
+    /// True if the ways between neighbours may cross no-fly areas.
+    pub allow_crossing: bool,
+}
+
+/// Finds the positions that `ask` requests, with the interferers anywhere in their areas and outside the no-fly areas.
+///
+/// With a quantile the positions maximise this quantile over the areas, else the worst case. The SIRs of the plan are those of the
+/// worst case.
+pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Result<Plan, NoPlan> {
+    let wrong = |line: &str| Err(NoPlan::Wrong(line.to_owned()));
+    if scenario.areas.is_empty() {
+        // Without areas the plan that ignores the no-fly areas is best, if it can be flown.
+        let blind = super::plan(&anywhere(scenario), ask)?;
+        let is_field = matches!(scenario.interference, Interference::Field(_));
+        if is_field || problem(&scenario.no_fly, &blind.chain(), criterion.allow_crossing).is_none()
+        {
+            return Ok(blind);
+        }
+    }
+    if ask.x_m.is_some() {
+        return wrong("--x-m: cannot be used with interferer.area or [[no_fly]]");
+    }
+    if fitted_radio(scenario, ask.free_altitude).is_some() {
+        return wrong(
+            "link.access = \"fitted\": cannot be used with interferer.area or [[no_fly]] and --altitude free",
+        );
+    }
+    match (ask.number, criterion.quantile) {
+        (Number::Of(relays), _) => best(scenario, ask, relays, criterion),
+        (Number::Meeting(_), Some(_)) => {
+            wrong("--quantile: needs --uavs N: it has no search for the number of relays")
+        }
+        (Number::Meeting(target), None) => {
+            let plan = |relays| best(scenario, ask, relays, criterion);
+            let plan = fewest_of(target, plan, Plan::sir)?;
+            let most = Some(plan.sir());
+            Ok(Plan {
+                most,
+                proven: false,
+                ..plan
+            })
+        }
+    }
+}
+
+/// Returns the scenario without its no-fly areas.
+pub(super) fn anywhere(scenario: &Scenario) -> Scenario {
+    Scenario {
+        no_fly: Vec::new(),
+        ..scenario.clone()
+    }
+}
+
+/// Returns the scenario with the interferers in the middle of their areas, at their greatest power.
+pub fn at_centre(scenario: &Scenario) -> Scenario {
+    Scenario {
+        areas: std::collections::BTreeMap::new(),
+        ..scenario.clone()
+    }
+}
+
+/// Returns a mission for the profiles of the relays. Its interferer is one of several, and is not used.
+pub(super) fn profiles(
+    scenario: &Scenario,
+    relays: u16,
+    tolerance: f64,
+) -> Result<ProfiledMission, NoPlan> {
+    let mut one = at_centre(scenario);
+    if let (Interference::Sources(sources), false) =
+        (&mut one.interference, scenario.areas.is_empty())
+    {
+        sources.truncate(1);
+    }
+    ProfiledMission::new(&one, relays, tolerance)
+}
+
+fn best(
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    relays: u16,
+    criterion: Criterion,
+) -> Result<Plan, NoPlan> {
+    let Criterion {
+        quantile,
+        allow_crossing,
+    } = criterion;
+    let scene = Scene::new(scenario, relays)
+        .ok_or_else(|| NoPlan::Wrong("there is no interferer".to_owned()))?;
+    let briefed = profiles(scenario, relays, ask.tolerance)?;
+    let exact = if ask.free_altitude || scene.reverse > 0.0 || !scenario.no_fly.is_empty() {
+        None
+    } else {
+        optimum(&scene)
+    };
+    let search = Search {
+        allow_crossing,
+        ..Search::new(&scene, scenario, ask.free_altitude)
+    };
+    let (places, proven) = match &exact {
+        Some(chain) => {
+            let places = chain.places.iter().map(|at| Place::from(*at)).collect();
+            (places, !chain.separation_binds())
+        }
+        None if relays > MOST_SEARCHED => {
+            return Err(NoPlan::Wrong(format!(
+                "--uavs {relays}: with interferer.area or [[no_fly]] the search is for 1 to {MOST_SEARCHED} relays, except for relays at one altitude, one direction and no no-fly areas"
+            )));
+        }
+        None => {
+            let mut starts: Vec<Vec<Place>> = Vec::new();
+            if ask.free_altitude && !(scene.reverse > 0.0) {
+                let common = best_common_altitude(&scene).map(|chain| chain.places);
+                starts.extend(common.map(|places| places.into_iter().map(Place::from).collect()));
+            }
+            starts.extend(centre(scenario, ask, relays).map(|plan| places_of(&plan)));
+            (search.best(&starts).ok_or_else(nowhere)?, false)
+        }
+    };
+    let (places, how) = match quantile {
+        Some(quantile) => {
+            let starts = centre(scenario, ask, relays).map(|plan| places_of(&plan));
+            let starts: Vec<_> = starts.into_iter().chain([places]).collect();
+            (
+                search.by_quantile(scenario, quantile, &starts),
+                "the quantile over the positions of the interferer",
+            )
+        }
+        None if scenario.areas.is_empty() => (places, "a search around the no-fly areas"),
+        None => (places, "the worst position of the interferer"),
+    };
+    let places: Vec<Placement> = places
+        .iter()
+        .map(|at| Placement {
+            x_m: narrow(at.x),
+            y_m: narrow(at.y),
+            altitude_m: narrow(at.h),
+        })
+        .collect();
+    let plan = briefed
+        .plan(&places, how, proven && quantile.is_none())
+        .against(&scene);
+    if plan.sir() > 0.0 {
+        Ok(plan)
+    } else {
+        Err(source::nothing())
+    }
+}
+
+fn nowhere() -> NoPlan {
+    let why = "no positions outside the no-fly areas are far enough apart: check [[no_fly]], geometry.min_separation_m and the permitted altitudes";
+    NoPlan::Unmet(super::Why::Plain(why.to_owned()), None)
+}
+
+/// Returns the plan for the interferers in the middle of their areas.
+fn centre(scenario: &Scenario, ask: &PlanRequest, relays: u16) -> Option<Plan> {
+    let ask = PlanRequest {
+        number: Number::Of(relays),
+        ..*ask
+    };
+    super::plan(&anywhere(&at_centre(scenario)), &ask).ok()
+}
+
+fn places_of(plan: &Plan) -> Vec<Place> {
+    plan.chain().into_iter().map(Place::from).collect()
+}
+
+/// Returns the reason why relays cannot be at these positions; `None` if they can.
+///
+/// Ways between neighbours that cross a no-fly area are no reason if `allow_crossing`.
+pub fn problem(no_fly: &[NoFly], chain: &[Placement], allow_crossing: bool) -> Option<String> {
+    let mut lines = Vec::new();
+    let points: Vec<[f64; 3]> = chain
+        .iter()
+        .map(|at| [at.x_m, at.y_m, at.altitude_m].map(f64::from))
+        .collect();
+    for area in no_fly {
+        let range = format!(
+            "{} ({} to {} m)",
+            area.key,
+            area.altitudes_m.start(),
+            area.altitudes_m.end()
+        );
+        for (index, [x, y, h]) in (1..).zip(&points) {
+            if let Some(depth_m) = area
+                .depth_m([*x, *y], *h)
+                .filter(|depth| *depth > ROUNDING_M)
+            {
+                lines.push(format!("relay {index} is {depth_m:.1} m inside {range}"));
+            }
+        }
+        for (index, (from, to)) in (1..).zip(points.iter().zip(points.iter().skip(1))) {
+            let crossing_m = area.crossing_m([*from, *to]);
+            if crossing_m > ROUNDING_M && !allow_crossing {
+                lines.push(format!(
+                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m, and relays that close a gap fly there; `cargo plan --allow-crossing` accepts it",
+                    index + 1
+                ));
+            }
+        }
+    }
+    (!lines.is_empty()).then(|| lines.join("; "))
+}
+
+/// Possible position of a node, with the interference plus noise there, W.
+#[derive(Clone, Copy)]
+struct Spot {
+    at: Place,
+    disturbance_w: f64,
+}
+
+/// Search for the positions of relays in a scene.
+struct Search<'a> {
+    scene: &'a Scene,
+    no_fly: &'a [NoFly],
+    is_free: bool,
+    allow_crossing: bool,
+    /// Draws of the interferers that count; empty for the worst case.
+    draws: Vec<Vec<Source>>,
+}
+
+impl<'a> Search<'a> {
+    fn new(scene: &'a Scene, scenario: &'a Scenario, is_free: bool) -> Self {
+        Self {
+            scene,
+            no_fly: &scenario.no_fly,
+            is_free,
+            allow_crossing: false,
+            draws: Vec::new(),
+        }
+    }
+
+    fn spot(&self, at: Place, factor: f64) -> Spot {
+        let scene = self.scene;
+        let of_draw = |draw: &Vec<Source>| {
+            let each = draw.iter().map(|source| {
+                let (dx, dy) = (at.x - source.x_m, at.y - source.y_m);
+                source.power_w / (factor * (dx * dx + dy * dy + at.h * at.h))
+            });
+            each.sum::<f64>()
+        };
+        let interference_w = if !self.draws.is_empty() {
+            self.draws.iter().map(of_draw).fold(0.0, f64::max)
+        } else if at.h > 0.0 {
+            scene.interference_w(at)
+        } else {
+            scene.interference_on_ground_w(at.x)
+        };
+        Spot {
+            at,
+            disturbance_w: interference_w + scene.noise_w,
+        }
+    }
+
+    /// Returns Tx (`end` 0) or Rx (`end` 1).
+    fn site(&self, end: usize) -> Spot {
+        let x = if end == 0 { 0.0 } else { self.scene.distance_m };
+        self.spot(Place { x, y: 0.0, h: 0.0 }, self.scene.mu_nlos)
+    }
+
+    /// Returns the possible positions of relay `relay` (from 0) among `x`, `y` and altitudes `h`.
+    fn spots(&self, relay: usize, [x, y, h]: &[Vec<f64>; 3]) -> Vec<Spot> {
+        let held = self.scene.relays.get(relay);
+        let held = held.filter(|relay| relay.holds || !self.is_free);
+        let own = held.map(|relay| vec![relay.altitude_m]);
+        let h = own.as_ref().unwrap_or(h);
+        let each = x.iter().flat_map(|x| y.iter().map(move |y| (*x, *y)));
+        let each = each.flat_map(|(x, y)| h.iter().map(move |h| Place { x, y, h: *h }));
+        let is_allowed = |at: &Place| {
+            let mut areas = self.no_fly.iter();
+            areas.all(|area| area.depth_m([at.x, at.y], at.h).is_none())
+        };
+        each.filter(is_allowed)
+            .map(|at| self.spot(at, self.scene.eta))
+            .collect()
+    }
+
+    /// Returns the SIR of the hop to node `node`, linear; 0 if its relays are too close. Node 0 is Tx.
+    fn hop(&self, node: usize, from: Spot, to: Spot) -> f64 {
+        let scene = self.scene;
+        let relays = &scene.relays;
+        let behind = node.checked_sub(2).and_then(|at| relays.get(at));
+        let ahead = node.checked_sub(1).and_then(|at| relays.get(at));
+        let [dx, dy, dh] = [
+            to.at.x - from.at.x,
+            to.at.y - from.at.y,
+            to.at.h - from.at.h,
+        ];
+        let squared = dx * dx + dy * dy + dh * dh;
+        let is_inner = behind.is_some() && ahead.is_some();
+        let apart = scene.min_separation_m * (1.0 - 1e-9);
+        if is_inner && (dx < 0.0 || squared < apart * apart) {
+            return 0.0;
+        }
+        let factor = if is_inner { scene.mu_los } else { scene.eta };
+        let tx_w = behind.map_or(scene.tx_w, |relay| relay.power_w);
+        // Relays at one position are no bottleneck.
+        let there = (tx_w / (factor * squared) / to.disturbance_w).min(f64::MAX);
+        if !(scene.reverse > 0.0) {
+            return there;
+        }
+        let rx_w = ahead.map_or(scene.rx_w, |relay| relay.power_w);
+        there.min(rx_w / (factor * squared) / from.disturbance_w / scene.reverse)
+    }
+
+    /// Returns the factor on the SIR of a hop between two relays for the no-fly areas on the way.
+    fn preference(&self, node: usize, from: Spot, to: Spot) -> f64 {
+        let is_inner = node > 1 && node <= self.scene.relays.len() && !self.allow_crossing;
+        let way = [from, to].map(|spot| [spot.at.x, spot.at.y, spot.at.h]);
+        let mut areas = self.no_fly.iter();
+        if is_inner && areas.any(|area| area.crossing_m(way) > 0.0) {
+            CROSSING
+        } else {
+            1.0
+        }
+    }
+
+    /// Returns the chain with the best worst hop, if relay k is at a spot of `grids[k - 1]`, and that SIR.
+    fn best_on(&self, grids: &[Vec<Spot>]) -> Option<(Vec<Spot>, f64)> {
+        // For each spot of a relay: the worst hop up to it, and the spot of the relay before it. The best ones are first.
+        let mut layers: Vec<Vec<(f64, Spot, usize)>> = Vec::new();
+        let mut before = vec![(f64::INFINITY, self.site(0), 0)];
+        let last = [self.site(1)];
+        for (node, own) in (1..).zip(grids.iter().map(Vec::as_slice).chain([last.as_slice()])) {
+            let reached = |to: &Spot| {
+                let mut best = (0.0, *to, 0);
+                for (at, (value, from, _)) in before.iter().enumerate() {
+                    if *value <= best.0 {
+                        break;
+                    }
+                    let mut sir = value.min(self.hop(node, *from, *to));
+                    if sir > best.0 && !self.no_fly.is_empty() {
+                        sir *= self.preference(node, *from, *to);
+                    }
+                    if sir > best.0 {
+                        best = (sir, *to, at);
+                    }
+                }
+                best
+            };
+            let mut layer: Vec<_> = own
+                .iter()
+                .map(reached)
+                .filter(|(sir, ..)| *sir > 0.0)
+                .collect();
+            layer.sort_by(|a, b| b.0.total_cmp(&a.0));
+            layers.push(std::mem::replace(&mut before, layer));
+        }
+        let (sir, _, mut at) = *before.first()?;
+        let mut chain = Vec::new();
+        for layer in layers.iter().skip(1).rev() {
+            let (_, spot, previous) = layer.get(at)?;
+            chain.push(*spot);
+            at = *previous;
+        }
+        chain.reverse();
+        Some((chain, sir))
+    }
+
+    /// Returns the least and the greatest x, y and altitude of relays, m.
+    fn room(&self) -> [[f64; 2]; 3] {
+        let band = self.scene.band;
+        if self.is_free {
+            let lateral = [band.left_m, band.right_m];
+            [
+                [0.0, self.scene.distance_m],
+                lateral,
+                [band.least_m, band.most_m],
+            ]
+        } else {
+            [[0.0, self.scene.distance_m], [0.0; 2], [1.0; 2]]
+        }
+    }
+
+    /// Returns the best chain found from a grid and from `starts`.
+    fn best(&self, starts: &[Vec<Place>]) -> Option<Vec<Place>> {
+        let room = self.room();
+        let is_single = room.iter().skip(1).all(|[low, high]| low >= high);
+        let relays = u32::try_from(self.scene.relays.len()).unwrap_or(u32::MAX);
+        let [along, ..] = GRID;
+        let along = along.max(3 * relays) * if is_single { 8 } else { 1 };
+        let [_, across, up] = GRID;
+        let mut axes: [Vec<f64>; 3] = Default::default();
+        for ((axis, [low, high]), count) in axes.iter_mut().zip(room).zip([along, across, up]) {
+            let steps = if low < high { count } else { 0 };
+            let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(steps.max(1));
+            *axis = (0..=steps).map(at).collect();
+        }
+        let grids: Vec<Vec<Spot>> = (0..self.scene.relays.len())
+            .map(|relay| self.spots(relay, &axes))
+            .collect();
+        let first = self.best_on(&grids).map(|(chain, _)| chain);
+        let starts = starts.iter().map(|start| self.known(start));
+        let all = first.into_iter().chain(starts);
+        let refined = all.filter_map(|start| self.refined(&start));
+        let (mut sir, mut chain) = refined.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        for _ in 0..RESTARTS {
+            match self.refined(&self.known(&chain)) {
+                Some((better, next)) if better > sir * (1.0 + 1e-6) => {
+                    (sir, chain) = (better, next);
+                }
+                _ => break,
+            }
+        }
+        Some(chain)
+    }
+
+    fn known(&self, places: &[Place]) -> Vec<Spot> {
+        let each = places.iter();
+        each.map(|at| self.spot(*at, self.scene.eta)).collect()
+    }
+
+    /// Returns the chain after moves within windows around all relays, and its SIR. `None` if no allowed position is near.
+    fn refined(&self, start: &[Spot]) -> Option<(f64, Vec<Place>)> {
+        let room = self.room();
+        let mut width = room.map(|[low, high]| high - low);
+        for (width, parts) in width.iter_mut().zip(GRID) {
+            *width /= f64::from(parts);
+        }
+        let mut found: Option<(f64, Vec<Spot>)> = None;
+        let mut chain = start.to_vec();
+        for _ in 0..WINDOWS.0 {
+            let around = |(relay, spot): (usize, &Spot)| {
+                let mut axes: [Vec<f64>; 3] = Default::default();
+                let own = [spot.at.x, spot.at.y, spot.at.h];
+                for (((axis, own), [low, high]), width) in
+                    axes.iter_mut().zip(own).zip(room).zip(width)
+                {
+                    // The steps are not symmetric, so that a relay is not bound to a lattice.
+                    let steps = [0.0, -1.0, -0.5, -0.2, 0.23, 0.55, 1.0];
+                    let steps = steps.iter().take(if width > 0.0 { 7 } else { 1 });
+                    *axis = steps
+                        .map(|step| (own + step * width).clamp(low, high))
+                        .collect();
+                }
+                // Seven altitudes at each of seven lateral positions would take too long.
+                if axes.iter().all(|axis| axis.len() > 1) {
+                    for axis in axes.iter_mut().skip(1) {
+                        *axis = axis
+                            .iter()
+                            .copied()
+                            .take(1)
+                            .chain(axis.iter().copied().skip(2).step_by(2))
+                            .collect();
+                    }
+                }
+                self.spots(relay, &axes)
+            };
+            let grids: Vec<Vec<Spot>> = chain.iter().enumerate().map(around).collect();
+            let before = found.as_ref().map_or(0.0, |(sir, _)| *sir);
+            if let Some((better, sir)) = self.best_on(&grids)
+                && sir > before
+            {
+                chain.clone_from(&better);
+                found = Some((sir, better));
+            }
+            let now = found.as_ref().map_or(0.0, |(sir, _)| *sir);
+            if !(now > before * 1.001) {
+                width = width.map(|width| width * WINDOWS.1);
+            }
+            if width[0] < NARROWEST * self.scene.distance_m {
+                break;
+            }
+        }
+        found.map(|(sir, chain)| (sir, chain.iter().map(|spot| spot.at).collect()))
+    }
+
+    /// Returns the chain with the best quantile that is found from `starts`.
+    fn by_quantile(
+        &self,
+        scenario: &'a Scenario,
+        quantile: f64,
+        starts: &[Vec<Place>],
+    ) -> Vec<Place> {
+        let areas = Draws::new(scenario, self.scene, DRAWS[0]);
+        let judge = Draws::new(scenario, self.scene, DRAWS[1]);
+        let mut best: Option<(f64, Vec<Place>)> = None;
+        for start in starts {
+            let mut chain = start.clone();
+            let mut reached = areas.quantile(&chain, quantile);
+            for round in 0..ROUNDS {
+                let counted = areas.most_harmless(&chain, quantile);
+                let search = Self {
+                    draws: counted,
+                    allow_crossing: self.allow_crossing,
+                    ..Self::new(self.scene, scenario, self.is_free)
+                };
+                let better = if round == 0 {
+                    search.best(std::slice::from_ref(&chain))
+                } else {
+                    search
+                        .refined(&search.known(&chain))
+                        .map(|(_, better)| better)
+                };
+                let Some(better) = better else { break };
+                let now = areas.quantile(&better, quantile);
+                if !(now > reached * (1.0 + 1e-6)) {
+                    break;
+                }
+                (chain, reached) = (better, now);
+            }
+            for chain in [chain, start.clone()] {
+                let value = judge.quantile(&chain, quantile);
+                if best.as_ref().is_none_or(|(other, _)| value > *other) {
+                    best = Some((value, chain));
+                }
+            }
+        }
+        best.map_or_else(Vec::new, |(_, chain)| chain)
+    }
+}
+
+/// Draws of the positions and powers of all interferers.
+///
+/// A position has the same probability everywhere in its area, a power at each level in decibels.
+#[derive(Debug)]
+pub struct Draws {
+    scene: Scene,
+    draws: Vec<Vec<Source>>,
+}
+
+impl Draws {
+    /// Draws `number` times.
+    pub fn new(scenario: &Scenario, scene: &Scene, number: usize) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+        let draws = (0..number).map(|_| {
+            let each = scene.sources.iter().enumerate();
+            each.map(|(at, source)| {
+                let area = scenario.areas.get(&at);
+                area.map_or_else(|| source.clone(), |area| drawn(&mut rng, source, area))
+            })
+            .collect()
+        });
+        Self {
+            draws: draws.collect(),
+            scene: Scene {
+                areas: std::collections::BTreeMap::new(),
+                ..scene.clone()
+            },
+        }
+    }
+
+    /// Returns the SIR of the chain's worst hop for each draw, with the number of the draw; the largest SIR is first.
+    fn sirs(&self, chain: &[Place]) -> Vec<(f64, usize)> {
+        let mut scene = self.scene.clone();
+        let each = self.draws.iter().enumerate().map(|(at, draw)| {
+            scene.sources.clone_from(draw);
+            (scene.chain_sir(chain), at)
+        });
+        let mut sirs: Vec<_> = each.collect();
+        sirs.sort_by(|a, b| b.0.total_cmp(&a.0));
+        sirs
+    }
+
+    fn counted(&self, quantile: f64) -> usize {
+        let count = (quantile * self.draws.len() as f64).ceil();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a number of draws"
+        )]
+        let count = count as usize;
+        count.clamp(1, self.draws.len())
+    }
+
+    /// Returns the SIR that the chain's worst hop has in the fraction `quantile` of all draws, linear.
+    pub fn quantile(&self, chain: &[impl Copy + Into<Place>], quantile: f64) -> f64 {
+        let chain: Vec<Place> = chain.iter().map(|at| (*at).into()).collect();
+        let sirs = self.sirs(&chain);
+        sirs.get(self.counted(quantile) - 1)
+            .map_or(0.0, |(sir, _)| *sir)
+    }
+
+    /// Returns the fraction `quantile` of the draws for which the chain has the largest SIRs.
+    fn most_harmless(&self, chain: &[Place], quantile: f64) -> Vec<Vec<Source>> {
+        let sirs = self.sirs(chain).into_iter().take(self.counted(quantile));
+        sirs.filter_map(|(_, at)| self.draws.get(at).cloned())
+            .collect()
+    }
+}
+
+/// Largest number of points drawn until one is in the area.
+const TRIES: u32 = 100_000;
+
+fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
+    let [low, high] = own.area.bounds();
+    let inside = (0..TRIES).find_map(|_| {
+        let at = [
+            rng.random_range(low[0]..=high[0]),
+            rng.random_range(low[1]..=high[1]),
+        ];
+        own.area.contains(at).then_some(at)
+    });
+    let [x_m, y_m] = inside.unwrap_or_else(|| own.area.centre());
+    let share = rng.random_range(0.0..=1.0);
+    let power_w = own.least_w * (source.power_w / own.least_w).powf(share);
+    Source { power_w, x_m, y_m }
+}
+
+/// SIRs of positions over the areas of the interferers.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct OverArea {
+    /// SIR of the worst hop with the interferers at their worst positions and greatest powers, dB.
+    pub worst_sir_db: f64,
+    /// SIR that the worst hop reaches in the fraction `quantile` of positions and powers, dB.
+    pub quantile_sir_db: f64,
+}
+
+/// Report of a plan over the areas of the interferers, in comparison with the plan for their middles.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct AreaReport {
+    /// Criterion of the plan: `worst` or `quantile`.
+    pub criterion: &'static str,
+    /// Fraction of the positions and powers of the interferers, 0 to 1.
+    pub quantile: f64,
+    /// SIRs of the plan.
+    #[serde(flatten)]
+    pub plan: OverArea,
+    /// SIRs at the best positions for interferers in the middle of their areas; absent if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub centre: Option<OverArea>,
+    /// Position [x, y] of each interferer with an area at which the worst hop of the plan is worst, m.
+    pub worst_places: Vec<[f64; 2]>,
+}
+
+impl AreaReport {
+    /// Creates the report of `plan`; `None` if no interferer has an area.
+    pub fn new(
+        scenario: &Scenario,
+        ask: &PlanRequest,
+        plan: &Plan,
+        quantile: Option<f64>,
+    ) -> Option<Self> {
+        if scenario.areas.is_empty() {
+            return None;
+        }
+        let relays = u16::try_from(plan.places.len()).ok()?;
+        let scene = Scene::new(scenario, relays)?;
+        let draws = Draws::new(scenario, &scene, DRAWS[1]);
+        let of = quantile.unwrap_or(QUANTILE);
+        let over = |chain: &[Placement]| OverArea {
+            worst_sir_db: db(scene.chain_sir(chain)),
+            quantile_sir_db: db(draws.quantile(chain, of)),
+        };
+        let chain = plan.chain();
+        let receiver = receiver(&scene, &chain);
+        Some(Self {
+            criterion: if quantile.is_some() {
+                "quantile"
+            } else {
+                "worst"
+            },
+            quantile: of,
+            plan: over(&chain),
+            centre: centre(scenario, ask, relays).map(|plan| over(&plan.chain())),
+            worst_places: scene
+                .areas
+                .values()
+                .map(|area| area.nearest(receiver))
+                .collect(),
+        })
+    }
+
+    /// Returns the report as lines for the terminal.
+    pub fn describe(&self) -> String {
+        let share = 100.0 * self.quantile;
+        let say = |over: OverArea| {
+            format!(
+                "worst hop {:.3} dB at the interferer's worst position, at least {:.3} dB for {share} % of its positions and powers",
+                over.worst_sir_db, over.quantile_sir_db
+            )
+        };
+        let places: Vec<String> = self
+            .worst_places
+            .iter()
+            .map(|[x, y]| format!("x = {x:.1} m, y = {y:.1} m"))
+            .collect();
+        let centre = self.centre.map_or_else(|| "none".to_owned(), say);
+        format!(
+            "area: {}\nworst position of the interferer: {}\nthe plan for the middle of the area: {centre}\n",
+            say(self.plan),
+            places.join("; ")
+        )
+    }
+}
+
+/// Returns the position [x, y] of the receiver of the worst hop, m.
+fn receiver(scene: &Scene, chain: &[Placement]) -> [f64; 2] {
+    let mut nodes = vec![[0.0; 2]];
+    nodes.extend(chain.iter().map(|at| [at.x_m, at.y_m].map(f64::from)));
+    nodes.push([scene.distance_m, 0.0]);
+    let there = scene.hop_sirs(chain).into_iter().zip(nodes.iter().skip(1));
+    let back = scene.hop_sirs_back(chain).into_iter();
+    let back = back.filter(|_| scene.reverse > 0.0);
+    let back = back.map(|sir| sir / scene.reverse).zip(&nodes);
+    let worst = there.chain(back).min_by(|a, b| a.0.total_cmp(&b.0));
+    worst.map_or([0.0; 2], |(_, at)| *at)
+}
+
+/// Cell of the map of SIRs: a square in which the interferer is, and the SIR of the chain's worst hop.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Cell {
+    /// Index of the interferer, from 0.
+    pub source: usize,
+    /// Middle of the cell, [x, y], m.
+    pub at: [f64; 2],
+    /// Length of the sides of the cell, m.
+    pub side_m: f64,
+    /// SIR of the worst hop, dB, with the interferer in the middle of the cell at its greatest power.
+    pub sir_db: f64,
+}
+
+/// Number of cells of the map along the longer side of an area.
+const CELLS: f64 = 60.0;
+
+/// Returns the SIR of the worst hop of `plan` for each position of each interferer that has an area.
+///
+/// Other interferers with an area are at their worst positions.
+pub fn cells(scenario: &Scenario, plan: &Plan) -> Vec<Cell> {
+    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    let Some(scene) = Scene::new(scenario, relays) else {
+        return Vec::new();
+    };
+    let chain = plan.chain();
+    let mut cells = Vec::new();
+    for (source, area) in &scene.areas {
+        let mut scene = scene.clone();
+        scene.areas.remove(source);
+        let [low, high] = area.bounds();
+        let side_m = (high[0] - low[0]).max(high[1] - low[1]) / CELLS;
+        let middles = |axis: usize| {
+            let ends = [low, high].map(|end| end.get(axis).copied().unwrap_or_default());
+            let middle = move |step: u32| ends[0] + side_m * (f64::from(step) + 0.5);
+            (0..60_u32)
+                .map(middle)
+                .take_while(move |at| *at < ends[1] + 0.5 * side_m)
+        };
+        for y_m in middles(1) {
+            for x_m in middles(0) {
+                if !area.contains([x_m, y_m]) {
+                    continue;
+                }
+                if let Some(own) = scene.sources.get_mut(*source) {
+                    (own.x_m, own.y_m) = (x_m, y_m);
+                }
+                let sir_db = db(scene.chain_sir(&chain));
+                cells.push(Cell {
+                    source: *source,
+                    at: [x_m, y_m],
+                    side_m,
+                    sir_db,
+                });
+            }
+        }
+    }
+    cells
+}

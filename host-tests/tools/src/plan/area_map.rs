@@ -1,0 +1,205 @@
+//! Maps of the SIR for each position of an interferer: a picture, and cells with geographic coordinates.
+
+use std::fmt::Write as _;
+
+use geojson::{Feature, FeatureCollection, Geometry, GeometryValue, JsonObject};
+use uav_relay::{Geodetic, Placement};
+use uav_relay_scenario::{Line, Scenario};
+
+use super::Plan;
+use super::area::Cell;
+
+/// Width of the picture, and of its margin, in picture units.
+const WIDTH: f64 = 900.0;
+const MARGIN: f64 = 40.0;
+
+/// Greatest height of the picture without margins, relative to its width.
+const TALLEST: f64 = 1.2;
+
+/// Colours from the lowest to the highest SIR, red, green and blue. They differ in brightness, too.
+const COLOURS: [[f64; 3]; 5] = [
+    [68.0, 1.0, 84.0],
+    [59.0, 82.0, 139.0],
+    [33.0, 145.0, 140.0],
+    [94.0, 201.0, 98.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// Number of steps of the legend.
+const STEPS: u32 = 5;
+
+/// Returns the picture of `cells`, seen from above: x to the right, and y, the right side of the line, downward.
+pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
+    let sirs = || cells.iter().map(|cell| cell.sir_db);
+    let (least, most) = (
+        sirs().fold(f64::INFINITY, f64::min),
+        sirs().fold(f64::NEG_INFINITY, f64::max),
+    );
+    let colour = |sir_db: f64| colour((sir_db - least) / (most - least));
+    let relays = plan
+        .places
+        .iter()
+        .map(|(at, _)| [at.x_m, at.y_m].map(f64::from));
+    let relays: Vec<[f64; 2]> = relays.collect();
+    let ends = [[0.0, 0.0], [scenario.distance_m, 0.0]];
+    let [low, high] = frame(scenario, &relays, cells);
+    let inner = WIDTH - 2.0 * MARGIN;
+    let scale = (inner / (high[0] - low[0])).min(TALLEST * inner / (high[1] - low[1]).max(1e-9));
+    let tall = (high[1] - low[1]) * scale;
+    let at = |[x, y]: [f64; 2]| [MARGIN + (x - low[0]) * scale, MARGIN + (y - low[1]) * scale];
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {0:.1}\" width=\"{WIDTH}\" height=\"{0:.1}\" role=\"img\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"11\">\n<title>SIR of the worst hop for each position of the interferer</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN}\" y=\"20\" font-size=\"13\">SIR of the worst hop with the interferer at each position, {least:.2} to {most:.2} dB</text>\n",
+        tall + 3.0 * MARGIN
+    );
+    for cell in cells {
+        let [x, y] = at(cell.at.map(|middle| middle - 0.5 * cell.side_m));
+        let side = cell.side_m * scale;
+        _ = writeln!(
+            out,
+            "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{side:.2}\" height=\"{side:.2}\" fill=\"{}\"><title>x = {:.1} m, y = {:.1} m: {:.2} dB</title></rect>",
+            colour(cell.sir_db),
+            cell.at[0],
+            cell.at[1],
+            cell.sir_db
+        );
+    }
+    for area in &scenario.no_fly {
+        let corners: Vec<String> = area
+            .corners
+            .iter()
+            .map(|corner| {
+                let [x, y] = at(*corner);
+                format!("{x:.1},{y:.1}")
+            })
+            .collect();
+        _ = writeln!(
+            out,
+            "<polygon points=\"{}\" fill=\"#d55e00\" fill-opacity=\"0.2\" stroke=\"#d55e00\"><title>no-fly area</title></polygon>",
+            corners.join(" ")
+        );
+    }
+    let [[x1, y1], [x2, y2]] = ends.map(at);
+    _ = writeln!(
+        out,
+        "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#888\" stroke-dasharray=\"4 3\"/>"
+    );
+    let named = relays
+        .iter()
+        .zip(1..)
+        .map(|(at, index)| (*at, format!("{index}")));
+    let sites = ends
+        .iter()
+        .zip(["Tx", "Rx"])
+        .map(|(at, name)| (*at, name.to_owned()));
+    for (node, name) in named.chain(sites) {
+        let [x, y] = at(node);
+        _ = writeln!(
+            out,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"#fff\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" stroke=\"#fff\" stroke-width=\"2.5\" paint-order=\"stroke\">{name}</text>",
+            y - 7.0
+        );
+    }
+    for step in 0..STEPS {
+        let sir_db = least + (most - least) * f64::from(step) / f64::from(STEPS - 1);
+        let (x, y) = (MARGIN + 110.0 * f64::from(step), tall + 2.4 * MARGIN);
+        _ = writeln!(
+            out,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{:.1}\" y=\"{:.1}\">{sir_db:.2} dB</text>",
+            colour(sir_db),
+            x + 19.0,
+            y + 11.0
+        );
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+/// Returns the colour of a share of the range of SIRs, 0 to 1.
+fn colour(share: f64) -> String {
+    let place = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let mut mixed = [0.0; 3];
+    for (at, colour) in COLOURS.iter().enumerate() {
+        let weight = (1.0 - (place - at as f64).abs()).max(0.0);
+        for (mixed, own) in mixed.iter_mut().zip(colour) {
+            *mixed += weight * own;
+        }
+    }
+    let [red, green, blue] = mixed.map(f64::round);
+    format!("rgb({red},{green},{blue})")
+}
+
+/// Returns the least and the greatest [x, y] of everything in the picture, m.
+fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2]; 2] {
+    let corners = cells
+        .iter()
+        .flat_map(|cell| [-0.5, 0.5].map(|side| cell.at.map(|middle| middle + side * cell.side_m)));
+    let zones = scenario
+        .no_fly
+        .iter()
+        .flat_map(|area| area.corners.iter().copied());
+    let ends = [[0.0, 0.0], [scenario.distance_m, 0.0]];
+    let all = corners
+        .chain(zones)
+        .chain(relays.iter().copied())
+        .chain(ends);
+    all.fold(
+        [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+        |[low, high], at| {
+            [
+                [low[0].min(at[0]), low[1].min(at[1])],
+                [high[0].max(at[0]), high[1].max(at[1])],
+            ]
+        },
+    )
+}
+
+/// Returns `cells` as the text of a GeoJSON file: one square for each, with the property `sir_db`.
+///
+/// # Errors
+/// A line that names a cell that is too far from the line.
+pub fn geojson(line: &Line, cells: &[Cell]) -> Result<String, String> {
+    let corner = |[x, y]: [f64; 2]| {
+        #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
+        let place = Placement {
+            x_m: x as f32,
+            y_m: y as f32,
+            altitude_m: 0.0,
+        };
+        let Geodetic { lat_e7, lon_e7, .. } = line.axis.point(place).ok_or_else(|| {
+            format!(
+                "x = {x:.1} m, y = {y:.1} m is too far from the line for geographic coordinates"
+            )
+        })?;
+        Ok(vec![f64::from(lon_e7) / 1e7, f64::from(lat_e7) / 1e7])
+    };
+    let feature = |cell: &Cell| {
+        let [x, y] = cell.at;
+        let half = 0.5 * cell.side_m;
+        // Counter-clockwise seen from above, as the RFC asks for: y is to the right of x.
+        let ring = [
+            [-1.0, -1.0],
+            [-1.0, 1.0],
+            [1.0, 1.0],
+            [1.0, -1.0],
+            [-1.0, -1.0],
+        ];
+        let ring = ring.map(|[along, across]| corner([x + along * half, y + across * half]));
+        let ring = ring.into_iter().collect::<Result<Vec<_>, String>>()?;
+        let mut properties = JsonObject::new();
+        properties.insert("interferer".to_owned(), (cell.source + 1).into());
+        properties.insert("x_m".to_owned(), x.into());
+        properties.insert("y_m".to_owned(), y.into());
+        let sir_db = (cell.sir_db * 1e3).round() / 1e3;
+        properties.insert("sir_db".to_owned(), sir_db.into());
+        Ok(Feature {
+            geometry: Some(Geometry::new(GeometryValue::new_polygon(vec![ring]))),
+            properties: Some(properties),
+            ..Feature::default()
+        })
+    };
+    let features = cells
+        .iter()
+        .map(feature)
+        .collect::<Result<Vec<_>, String>>()?;
+    Ok(format!("{}\n", FeatureCollection::new(features)))
+}

@@ -1,0 +1,878 @@
+//! `cargo plan` for interferers that may be anywhere in an area, and around no-fly areas.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::too_many_lines,
+    missing_docs
+)]
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use chacha20::ChaCha8Rng;
+use rand::{RngExt as _, SeedableRng as _};
+use serde_json::Value;
+use uav_relay::Placement;
+use uav_relay_scenario::Scenario;
+use uav_relay_scenario::scene::Scene;
+use uav_relay_tools::plan::area;
+use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
+
+fn variable(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().unwrap())
+}
+
+/// Random scene. `places` are positions of each interferer: a fine grid of its area, or one point.
+struct Drawn {
+    scenario: Scenario,
+    relays: u16,
+    is_free: bool,
+    /// Outline of each interferer's area, empty without an area.
+    outlines: Vec<Vec<[f64; 2]>>,
+    places: Vec<Vec<[f64; 2]>>,
+    powers_w: Vec<f64>,
+}
+
+/// Returns true if the polygon winds around `at`. Not the method of the planner.
+fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
+    let angle = |i: usize| {
+        let [x, y] = outline[i % outline.len()];
+        (y - at[1]).atan2(x - at[0])
+    };
+    let total: f64 = (0..outline.len())
+        .map(|i| {
+            let turn = angle(i + 1) - angle(i);
+            turn - TAU * (turn / TAU).round()
+        })
+        .sum();
+    total.abs() > 3.0
+}
+
+/// Returns points on the outline and in it.
+fn fine_grid(outline: &[[f64; 2]], number: usize) -> Vec<[f64; 2]> {
+    let length = |i: usize| {
+        let ([a, b], [c, d]) = (outline[i], outline[(i + 1) % outline.len()]);
+        (a - c).hypot(b - d)
+    };
+    let whole: f64 = (0..outline.len()).map(length).sum();
+    let mut points = Vec::new();
+    for i in 0..outline.len() {
+        let steps = (number as f64 * length(i) / whole).ceil() as usize;
+        let ([a, b], [c, d]) = (outline[i], outline[(i + 1) % outline.len()]);
+        points.extend((0..steps).map(|step| {
+            let share = step as f64 / steps as f64;
+            [a + share * (c - a), b + share * (d - b)]
+        }));
+    }
+    let [x, y] = [0, 1].map(|axis| {
+        let all = outline.iter().map(|at| at[axis]);
+        [
+            all.clone().fold(f64::INFINITY, f64::min),
+            all.fold(f64::NEG_INFINITY, f64::max),
+        ]
+    });
+    let side = if number < 100 { 5 } else { 20 };
+    for i in 0..side {
+        for j in 0..side {
+            let at = [x, y].map(|[low, high]| (low, high - low));
+            let at = [
+                at[0].0 + at[0].1 * (f64::from(i) + 0.5) / f64::from(side),
+                at[1].0 + at[1].1 * (f64::from(j) + 0.5) / f64::from(side),
+            ];
+            if winds(outline, at) {
+                points.push(at);
+            }
+        }
+    }
+    points
+}
+
+/// Draws an area as TOML, with its outline.
+fn area_of(rng: &mut ChaCha8Rng, d: f64, most_m: f64) -> (String, Vec<[f64; 2]>) {
+    let (x, y) = (
+        rng.random_range(-0.3 * d..1.3 * d),
+        rng.random_range(-0.6 * d..0.6 * d),
+    );
+    let size = rng.random_range(0.03..0.35_f64) * most_m;
+    let round = |corners: u32, radius: &mut dyn FnMut() -> f64| -> Vec<[f64; 2]> {
+        let corner = |i: u32| {
+            let (sin, cos) = (TAU * f64::from(i) / f64::from(corners)).sin_cos();
+            let radius = radius();
+            [x + radius * cos, y + radius * sin]
+        };
+        (0..corners).map(corner).collect()
+    };
+    match rng.random_range(0..3) {
+        0 => (
+            format!("circle = [{x:?}, {y:?}, {size:?}]"),
+            round(720, &mut || size),
+        ),
+        1 => {
+            let wide = size * rng.random_range(0.1..1.0);
+            let [a, b, c, e] = [x - size, y - wide, x + size, y + wide];
+            let text = format!("rectangle = [[{a:?}, {b:?}], [{c:?}, {e:?}]]");
+            (text, vec![[a, b], [c, b], [c, e], [a, e]])
+        }
+        _ => {
+            // Seldom convex.
+            let corners = rng.random_range(3..9);
+            let outline = round(corners, &mut || size * rng.random_range(0.2..1.0));
+            (format!("polygon = {outline:?}"), outline)
+        }
+    }
+}
+
+fn draw(seed: u64) -> Drawn {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    loop {
+        let rng = &mut rng;
+        let d: f64 = rng.random_range(300.0..5000.0);
+        let altitude = rng.random_range(20.0..120.0_f64);
+        let is_free = rng.random_range(0..3) == 0;
+        let relays = rng.random_range(1..=if is_free { 2 } else { 4 });
+        let mut text = format!(
+            "[geometry]\ndistance_m = {d:?}\naltitude_m = {altitude:?}\nmin_separation_m = 4\n"
+        );
+        if is_free {
+            let most = altitude * rng.random_range(1.0..3.0);
+            let side = d * rng.random_range(0.0..0.3);
+            _ = writeln!(
+                text,
+                "altitude_max_m = {most:?}\nlateral_min_m = {:?}\nlateral_max_m = {side:?}",
+                -side
+            );
+        }
+        _ = writeln!(
+            text,
+            "[power]\ntx_w = {:?}\nuav_w = 1",
+            rng.random_range(0.5..50.0)
+        );
+        if rng.random() {
+            text += "[noise]\nbandwidth_hz = 1e7\n";
+        }
+        // The joint method of both directions is one for known interferers.
+        if rng.random_range(0..3) == 0 {
+            _ = writeln!(text, "[link]\nreverse = {:?}", rng.random_range(0.2..1.0));
+        }
+        if !is_free && rng.random_range(0..4) == 0 {
+            _ = writeln!(
+                text,
+                "[[relay]]\nindex = 1\naltitude_m = {:?}",
+                altitude * 1.5
+            );
+        }
+        let sources = rng.random_range(1..=2);
+        let second_is_point = sources == 2 && rng.random();
+        let most_m = if sources == 2 && !second_is_point {
+            300.0
+        } else {
+            d.min(2000.0)
+        };
+        let (mut outlines, mut places, mut powers_w) = (Vec::new(), Vec::new(), Vec::new());
+        for source in 0..sources {
+            let power = rng.random_range(0.1..50.0_f64);
+            powers_w.push(power);
+            if source == 1 && second_is_point {
+                let at = [rng.random_range(0.0..d), rng.random_range(0.2..0.6) * d];
+                _ = writeln!(
+                    text,
+                    "[[interferer]]\npower_w = {power:?}\nx_m = {:?}\ny_m = {:?}",
+                    at[0], at[1]
+                );
+                outlines.push(Vec::new());
+                places.push(vec![at]);
+                continue;
+            }
+            let (area, outline) = area_of(rng, d, most_m);
+            _ = writeln!(
+                text,
+                "[[interferer]]\npower_w = [{:?}, {power:?}]\narea = {{ {area} }}",
+                power / 4.0
+            );
+            places.push(fine_grid(
+                &outline,
+                if sources == 2 && !second_is_point {
+                    60
+                } else {
+                    800
+                },
+            ));
+            outlines.push(outline);
+        }
+        match Scenario::parse("drawn.toml", &text) {
+            Ok(scenario) => {
+                return Drawn {
+                    scenario,
+                    relays,
+                    is_free,
+                    outlines,
+                    places,
+                    powers_w,
+                };
+            }
+            Err(error) => assert!(
+                error.to_string().contains("contains a site"),
+                "{error}\n{text}"
+            ),
+        }
+    }
+}
+
+/// Judge: the SIR of the worst hop for every position of the interferers on the grid, one after the other.
+struct Judge<'a> {
+    drawn: &'a Drawn,
+    scene: Scene,
+}
+
+impl Judge<'_> {
+    /// Returns the least SIR over all positions of the interferers; each relay is [x, y, h].
+    fn worst(&self, chain: &[[f64; 3]]) -> f64 {
+        let s = &self.scene;
+        let mut nodes = vec![[0.0; 3]];
+        nodes.extend(chain);
+        nodes.push([s.distance_m, 0.0, 0.0]);
+        let last = nodes.len() - 1;
+        let is_ground = |node: usize| node == 0 || node == last;
+        let squared =
+            |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().max(1e-9);
+        let power = |node: usize| match node {
+            0 => s.tx_w,
+            _ if node == last => s.rx_w,
+            _ => s.relays[node - 1].power_w,
+        };
+        let mut signals = Vec::new();
+        for hop in 0..last {
+            let loss = if is_ground(hop) || is_ground(hop + 1) {
+                s.eta
+            } else {
+                s.mu_los
+            };
+            let gain = 1.0 / (loss * squared(nodes[hop], nodes[hop + 1]));
+            signals.push((hop + 1, power(hop) * gain));
+            if s.reverse > 0.0 {
+                signals.push((hop, power(hop + 1) * gain / s.reverse));
+            }
+        }
+        // The positions right below the receivers are on the grid, too.
+        let grids: Vec<Vec<[f64; 2]>> = self
+            .drawn
+            .places
+            .iter()
+            .zip(&self.drawn.outlines)
+            .map(|(places, outline)| {
+                let below = nodes.iter().map(|at| [at[0], at[1]]);
+                let below = below.filter(|at| !outline.is_empty() && winds(outline, *at));
+                places.iter().copied().chain(below).collect()
+            })
+            .collect();
+        let received = |source: usize, at: [f64; 2]| -> Vec<f64> {
+            signals
+                .iter()
+                .map(|(node, _)| {
+                    let loss = if is_ground(*node) { s.mu_nlos } else { s.eta };
+                    self.drawn.powers_w[source]
+                        / (loss * squared(nodes[*node], [at[0], at[1], 0.0]))
+                })
+                .collect()
+        };
+        let tables: Vec<Vec<Vec<f64>>> = grids
+            .iter()
+            .enumerate()
+            .map(|(source, grid)| grid.iter().map(|at| received(source, *at)).collect())
+            .collect();
+        let none = vec![vec![0.0; signals.len()]];
+        let second = tables.get(1).unwrap_or(&none);
+        let mut worst = f64::INFINITY;
+        for one in &tables[0] {
+            for other in second {
+                for (hop, (_, signal)) in signals.iter().enumerate() {
+                    worst = worst.min(signal / (one[hop] + other[hop] + s.noise_w));
+                }
+            }
+        }
+        worst
+    }
+
+    /// Returns the best worst case that differential evolution finds.
+    fn best(&self, seed: u64) -> f64 {
+        const CROWD: usize = 24;
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let s = &self.scene;
+        let n = s.relays.len();
+        let mut bounds = vec![[0.0, s.distance_m]; n];
+        if self.drawn.is_free {
+            bounds.extend(vec![[s.band.left_m, s.band.right_m]; n]);
+            bounds.extend(vec![[s.band.least_m, s.band.most_m]; n]);
+        }
+        let value = |genes: &[f64]| {
+            let mut x = genes[..n].to_vec();
+            x.sort_by(f64::total_cmp);
+            let chain: Vec<[f64; 3]> = (0..n)
+                .map(|i| {
+                    let free = self.drawn.is_free && !s.relays[i].holds;
+                    if free {
+                        [x[i], genes[n + i], genes[2 * n + i]]
+                    } else {
+                        [x[i], 0.0, s.relays[i].altitude_m]
+                    }
+                })
+                .collect();
+            let apart = chain.windows(2).all(|pair| {
+                (0..3)
+                    .map(|i| (pair[0][i] - pair[1][i]).powi(2))
+                    .sum::<f64>()
+                    .sqrt()
+                    >= s.min_separation_m
+            });
+            if apart { self.worst(&chain) } else { 0.0 }
+        };
+        let mut crowd: Vec<(f64, Vec<f64>)> = (0..CROWD)
+            .map(|_| {
+                let genes: Vec<f64> = bounds
+                    .iter()
+                    .map(|[low, high]| low + (high - low) * rng.random_range(0.0..=1.0))
+                    .collect();
+                (value(&genes), genes)
+            })
+            .collect();
+        for _ in 0..40 + 25 * bounds.len() {
+            for at in 0..CROWD {
+                let [a, b, c] = [(); 3].map(|()| rng.random_range(0..CROWD));
+                let kept = rng.random_range(0..bounds.len());
+                let best = (0..CROWD)
+                    .max_by(|a, b| crowd[*a].0.total_cmp(&crowd[*b].0))
+                    .unwrap();
+                let base = if rng.random_range(0..3) == 0 { best } else { a };
+                let genes: Vec<f64> = (0..bounds.len())
+                    .map(|gene| {
+                        let moved =
+                            crowd[base].1[gene] + 0.6 * (crowd[b].1[gene] - crowd[c].1[gene]);
+                        let is_new = gene == kept || rng.random_range(0..10) < 9;
+                        if is_new {
+                            moved.clamp(bounds[gene][0], bounds[gene][1])
+                        } else {
+                            crowd[at].1[gene]
+                        }
+                    })
+                    .collect();
+                let new = value(&genes);
+                if new >= crowd[at].0 {
+                    crowd[at] = (new, genes);
+                }
+            }
+        }
+        crowd.iter().map(|(value, _)| *value).fold(0.0, f64::max)
+    }
+}
+
+fn ask(relays: u16, free_altitude: bool) -> PlanRequest {
+    PlanRequest {
+        number: Number::Of(relays),
+        free_altitude,
+        x_m: None,
+        tolerance: 1e-4,
+    }
+}
+
+fn points(plan: &Plan) -> Vec<[f64; 3]> {
+    let each = plan.places.iter();
+    each.map(|(at, _)| [at.x_m, at.y_m, at.altitude_m].map(f64::from))
+        .collect()
+}
+
+#[test]
+fn the_worst_case_is_that_of_brute_force() {
+    let (first, count) = (variable("SEED", 1), variable("COUNT", 12));
+    let (mut ratios, mut gains) = (Vec::new(), Vec::new());
+    for seed in first..first + count {
+        let drawn = draw(seed);
+        let Drawn {
+            scenario,
+            relays,
+            is_free,
+            ..
+        } = &drawn;
+        let judge = Judge {
+            drawn: &drawn,
+            scene: Scene::new(scenario, *relays).unwrap(),
+        };
+        let planned = plan(scenario, &ask(*relays, *is_free)).unwrap();
+        let judged = judge.worst(&points(&planned));
+        // The closed form of the worst case is that of the grid; between its points an interferer may be a little worse.
+        let form = planned.sir() / judged;
+        assert!((0.99..=1.0 + 1e-5).contains(&form), "seed {seed}: {form}");
+        let brute = judge.best(seed);
+        let ratio = judged / brute;
+        if !(ratio > 0.999) {
+            println!(
+                "seed {seed}: {ratio} of brute force, {relays} relays, free {is_free}, reverse {}",
+                scenario.reverse
+            );
+        }
+        assert!(
+            ratio > 0.99,
+            "seed {seed}: {ratio} of brute force\n{scenario:?}"
+        );
+        ratios.push(ratio);
+        if let Ok(centre) = plan(&area::at_centre(scenario), &ask(*relays, *is_free)) {
+            gains.push(10.0 * (judged / judge.worst(&points(&centre))).log10());
+        }
+    }
+    for (name, values) in [
+        ("plan / brute force", &mut ratios),
+        ("gain over the middle, dB", &mut gains),
+    ] {
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
+        println!(
+            "{name}: worst {:.5}, 10 % {:.5}, median {:.5}, 90 % {:.5}, most {:.5}",
+            at(0.0),
+            at(0.1),
+            at(0.5),
+            at(0.9),
+            at(1.0)
+        );
+    }
+}
+
+/// Returns the quantile of the worst hop's SIR over positions and powers that the test draws itself.
+fn quantile(drawn: &Drawn, plan: &Plan, share: f64) -> f64 {
+    let rng = &mut ChaCha8Rng::seed_from_u64(99);
+    let mut scene = Scene::new(&drawn.scenario, drawn.relays).unwrap();
+    let outline = &drawn.outlines[0];
+    let chain: Vec<_> = plan.places.iter().map(|(at, _)| *at).collect();
+    scene.areas.clear();
+    let spread = outline
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |most, at| most.max(at.abs()));
+    let mut sirs = Vec::new();
+    while sirs.len() < 3000 {
+        let at = [
+            rng.random_range(-spread..spread),
+            rng.random_range(-spread..spread),
+        ];
+        if winds(outline, at) {
+            (scene.sources[0].x_m, scene.sources[0].y_m) = (at[0], at[1]);
+            scene.sources[0].power_w =
+                drawn.powers_w[0] * 0.25_f64.powf(rng.random_range(0.0..1.0));
+            sirs.push(scene.chain_sir(&chain));
+        }
+    }
+    sirs.sort_by(f64::total_cmp);
+    sirs[((1.0 - share) * sirs.len() as f64) as usize]
+}
+
+#[test]
+fn the_plan_by_a_quantile_has_a_better_quantile() {
+    let (first, count) = (variable("SEED", 1), variable("COUNT", 8));
+    let (mut better, mut over_centre) = (Vec::new(), Vec::new());
+    for seed in first..first + count {
+        let drawn = draw(seed);
+        if drawn.outlines.len() > 1 {
+            continue;
+        }
+        let request = ask(drawn.relays, drawn.is_free);
+        let by = area::Criterion {
+            quantile: Some(0.8),
+            allow_crossing: false,
+        };
+        let worst = plan(&drawn.scenario, &request).unwrap();
+        let by_quantile = area::plan(&drawn.scenario, &request, by).unwrap();
+        // The worst-case search is within 1 % of the optimum.
+        assert!(by_quantile.sir() <= worst.sir() * 1.01, "seed {seed}");
+        let own = quantile(&drawn, &by_quantile, 0.8);
+        let report =
+            area::AreaReport::new(&drawn.scenario, &request, &by_quantile, Some(0.8)).unwrap();
+        // 4000 and 3000 draws.
+        let error_db = report.plan.quantile_sir_db - 10.0 * own.log10();
+        assert!(error_db.abs() < 0.5, "seed {seed}: {error_db}");
+        better.push(10.0 * (own / quantile(&drawn, &worst, 0.8)).log10());
+        let centre = plan(&area::at_centre(&drawn.scenario), &request).unwrap();
+        over_centre.push(10.0 * (own / quantile(&drawn, &centre, 0.8)).log10());
+    }
+    println!("gain over the worst-case plan {better:.2?} dB, over the middle {over_centre:.2?} dB");
+    // The draws of the test are others.
+    assert!(better.iter().chain(&over_centre).all(|gain| *gain > -0.2));
+    assert!(
+        count < 8 || better.iter().any(|gain| *gain > 0.1),
+        "{better:?}"
+    );
+}
+
+fn cargo_plan(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_plan"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+/// Runs `cargo plan --json`; returns its exit status and its report.
+fn json(folder: &Path, args: &[&str]) -> (i32, Value) {
+    let out = cargo_plan(folder, &[args, &["--json"]].concat());
+    let text = String::from_utf8_lossy(&out.stdout);
+    let report = serde_json::from_str(&text)
+        .unwrap_or_else(|error| panic!("{error}: {text}{}", String::from_utf8_lossy(&out.stderr)));
+    (out.status.code().unwrap(), report)
+}
+
+const AREA: &str = "[geometry]\naltitude_m = 60\naltitude_max_m = 100\nmin_separation_m = 4\n\
+    [site]\ntx = { lat_deg = 47.20, lon_deg = 8.51, amsl_m = 482 }\nrx = { lat_deg = 47.20, lon_deg = 8.536, amsl_m = 482 }\n\
+    [power]\ntx_w = 5\nuav_w = 1\n[[interferer]]\npower_dbm = [20, 30]\narea = { circle = [1300, 700, 300] }\n";
+
+const FLAT: &str = "[geometry]\ndistance_m = 2000\naltitude_m = 60\n[power]\ntx_w = 5\nuav_w = 1\n\
+    [[interferer]]\npower_w = 1\nx_m = 1300\ny_m = 700\n";
+
+#[test]
+fn the_command_reports_the_area_and_draws_its_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("area.toml"), AREA).unwrap();
+    let base = ["--scenario", "area.toml", "--uavs", "3"];
+    let files = [
+        "--area-svg",
+        "map.svg",
+        "--area-geojson",
+        "map.geojson",
+        "--geojson",
+        "plan.geojson",
+    ];
+    let (status, report) = json(folder, &[base.as_slice(), &files].concat());
+    assert_eq!(status, 0, "{report}");
+    let [area, sir_db] = ["area", "sir_db"].map(|key| report[key].clone());
+    assert_eq!(area["criterion"], "worst");
+    assert!(report["proven"].as_bool().unwrap());
+    let number = |value: &Value| value.as_f64().unwrap();
+    assert!((number(&area["worst_sir_db"]) - number(&sir_db)).abs() < 1e-6);
+    assert!(number(&area["worst_sir_db"]) <= number(&area["quantile_sir_db"]));
+    assert!(number(&area["centre"]["worst_sir_db"]) < number(&area["worst_sir_db"]) - 0.1);
+    // The cells of the map reach the worst case, apart from the size of a cell.
+    let cells: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("map.geojson")).unwrap())
+            .unwrap();
+    let cells = cells["features"].as_array().unwrap();
+    assert!(cells.len() > 2000, "{}", cells.len());
+    let sirs = || {
+        cells
+            .iter()
+            .map(|cell| number(&cell["properties"]["sir_db"]))
+    };
+    let least = sirs().fold(f64::INFINITY, f64::min);
+    assert!((least - number(&sir_db)).abs() < 0.15, "{least} {sir_db}");
+    assert!(sirs().fold(0.0, f64::max) > least + 1.0);
+    // The circle is south of a line to the east: y is to the right.
+    assert!(
+        cells
+            .iter()
+            .all(|cell| number(&cell["geometry"]["coordinates"][0][0][1]) < 47.2)
+    );
+    let svg = std::fs::read_to_string(folder.join("map.svg")).unwrap();
+    let svg = roxmltree::Document::parse(&svg).unwrap();
+    assert!(
+        svg.descendants()
+            .filter(|node| node.has_tag_name("rect"))
+            .count()
+            > cells.len()
+    );
+    // A quantile is its own criterion, and no worst case.
+    let (_, by_quantile) = json(folder, &[base.as_slice(), &["--quantile", "0.8"]].concat());
+    assert_eq!(by_quantile["area"]["criterion"], "quantile");
+    assert!(number(&by_quantile["area"]["worst_sir_db"]) <= number(&area["worst_sir_db"]) + 1e-6);
+    // A target is met at the worst position.
+    let (status, fewest) = json(folder, &["--scenario", "area.toml", "--target-sir-db", "9"]);
+    assert_eq!(status, 0);
+    assert!(number(&fewest["area"]["worst_sir_db"]) >= 9.0, "{fewest}");
+    for (args, part) in [
+        (["--out", "plan.toml"], "cannot be used with --out"),
+        (["--bandwidth-hz", "1e6"], "has no data rates"),
+        (["--quantile", "0.3"], "0.5 to 0.99"),
+        (["--x-m", "3"], "--x-m"),
+    ] {
+        let out = cargo_plan(folder, &[base.as_slice(), &args].concat());
+        let line = String::from_utf8_lossy(&out.stderr);
+        assert!(
+            out.status.code() == Some(2) && line.contains(part),
+            "{line}"
+        );
+    }
+    // Relays know one position: other tools refuse the file by name.
+    let out = Command::new(env!("CARGO_BIN_EXE_provision"))
+        .current_dir(folder)
+        .args([
+            "--scenario",
+            "area.toml",
+            "--uavs",
+            "3",
+            "--all",
+            "--out-dir",
+            "blocks",
+        ])
+        .output()
+        .unwrap();
+    let line = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        !out.status.success() && line.contains("interferer[0].area") && line.contains("1300.0"),
+        "{line}"
+    );
+}
+
+#[test]
+fn no_relay_is_planned_in_a_no_fly_area() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let base = ["--scenario", "flight.toml", "--uavs", "3"];
+    let write = |zone: &str| {
+        let text = format!("{FLAT}[[no_fly]]\n{zone}\n");
+        std::fs::write(folder.join("flight.toml"), text).unwrap();
+    };
+    std::fs::write(folder.join("flight.toml"), FLAT).unwrap();
+    let (_, free) = json(folder, &base);
+    let x = |report: &Value, relay: usize| report["relays"][relay]["x_m"].as_f64().unwrap();
+    let (own, best) = (x(&free, 1), free["sir"].as_f64().unwrap());
+    // An area elsewhere, or above the relays, changes nothing.
+    for zone in [
+        "area = { circle = [1000, 500, 300] }".to_owned(),
+        format!("area = {{ circle = [{own}, 0, 50] }}\nlowest_m = 61"),
+    ] {
+        write(&zone);
+        assert_eq!(json(folder, &base), (0, free.clone()), "{zone}");
+    }
+    // Relay 2 moves out along the line; the area is still between two neighbours.
+    let zone = format!(
+        "area = {{ rectangle = [[{}, -30], [{}, 40]] }}",
+        own - 60.0,
+        own + 50.0
+    );
+    write(&zone);
+    let (status, one_side) = json(folder, &base);
+    // No way crosses the area if all relays are on one side of it.
+    assert_eq!(status, 0, "{one_side}");
+    assert!(
+        x(&one_side, 2) <= own - 59.98 || x(&one_side, 0) >= own + 49.98,
+        "{one_side}"
+    );
+    let (status, moved) = json(folder, &[base.as_slice(), &["--allow-crossing"]].concat());
+    assert_eq!(status, 0, "{moved}");
+    for relay in 0..3 {
+        let x = x(&moved, relay);
+        assert!(x <= own - 59.98 || x >= own + 49.98, "{moved}");
+    }
+    let sir = moved["sir"].as_f64().unwrap();
+    assert!(sir < best * 0.9999 && sir > 0.6 * best, "{sir} {best}");
+    assert!(one_side["sir"].as_f64().unwrap() < sir);
+    let zones = Scenario::load(&folder.join("flight.toml")).unwrap().no_fly;
+    let chain = [own - 70.0, own + 60.0].map(|x_m| Placement::on_line(x_m as f32, 60.0));
+    let line = area::problem(&zones, &chain, false).unwrap();
+    for part in [
+        "the way between relay 1 and relay 2 crosses no_fly[0] (0 to 10000 m) for 110.0 m",
+        "--allow-crossing",
+    ] {
+        assert!(line.contains(part), "{line}");
+    }
+    assert_eq!(area::problem(&zones, &chain, true), None);
+    // Relays that compute their own positions would be inside.
+    let out = cargo_plan(
+        folder,
+        &[base.as_slice(), &["--allow-crossing", "--out", "out.toml"]].concat(),
+    );
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.code() == Some(1)
+            && text.contains("relay 2 is")
+            && text.contains("inside no_fly[0]"),
+        "{text}"
+    );
+    assert!(!folder.join("out.toml").exists());
+    let out = Command::new(env!("CARGO_BIN_EXE_provision"))
+        .current_dir(folder)
+        .args([
+            "--scenario",
+            "flight.toml",
+            "--uavs",
+            "3",
+            "--all",
+            "--out-dir",
+            "blocks",
+        ])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        !out.status.success() && text.contains("relay 2 is") && text.contains("inside no_fly[0]"),
+        "{text}"
+    );
+    // With room beside the line or above the area no way crosses it.
+    let low = format!("{zone}\nhighest_m = 80");
+    for (zone, geometry) in [
+        (&zone, "lateral_max_m = 200"),
+        (&low, "altitude_max_m = 150"),
+    ] {
+        write(zone);
+        let text = std::fs::read_to_string(folder.join("flight.toml")).unwrap();
+        let text = text.replace(
+            "altitude_m = 60\n",
+            &format!("altitude_m = 60\n{geometry}\n"),
+        );
+        std::fs::write(folder.join("flight.toml"), text).unwrap();
+        let (status, around) = json(folder, &[base.as_slice(), &["--altitude", "free"]].concat());
+        assert_eq!(status, 0, "{around}");
+        assert!(around["sir"].as_f64().unwrap() > 0.5 * best, "{around}");
+    }
+}
+
+#[test]
+fn wrong_areas_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("zones.geojson"), r#"{ "type": "FeatureCollection", "features": [ { "type": "Feature", "properties": {},
+        "geometry": { "type": "Polygon", "coordinates": [[[8.52, 47.199], [8.523, 47.199], [8.523, 47.201], [8.52, 47.199]]] } } ] }"#).unwrap();
+    std::fs::write(folder.join("swapped.geojson"), r#"{ "type": "Polygon", "coordinates": [[[47.199, 8.52], [47.199, 8.523], [47.201, 8.523], [47.199, 8.52]]] }"#).unwrap();
+    std::fs::write(
+        folder.join("line.geojson"),
+        r#"{ "type": "LineString", "coordinates": [[8.5, 47.2]] }"#,
+    )
+    .unwrap();
+    let parse = |text: &str| {
+        let file = folder.join("area.toml");
+        std::fs::write(&file, text).unwrap();
+        Scenario::load(&file)
+    };
+    let area = |area: &str| AREA.replace("area = { circle = [1300, 700, 300] }", area);
+    let zone = |zone: &str| format!("{AREA}[[no_fly]]\n{zone}\n");
+    let zones = parse(&zone("file = \"zones.geojson\"\nlowest_m = 10"))
+        .unwrap()
+        .no_fly;
+    assert!(
+        zones.len() == 1 && zones[0].depth_m([900.0, 20.0], 60.0).is_some(),
+        "{zones:?}"
+    );
+    assert!(zones[0].depth_m([900.0, 20.0], 5.0).is_none());
+    parse(&area(
+        "area = { polygon_deg = [[47.19, 8.52], [47.19, 8.525], [47.195, 8.52]] }",
+    ))
+    .unwrap();
+    parse(&area(
+        "area = { rectangle_deg = [[47.19, 8.52], [47.195, 8.525]] }",
+    ))
+    .unwrap();
+    parse(&area("area = { circle_deg = [47.19, 8.52, 200] }")).unwrap();
+    for (text, parts) in [
+        (
+            area("area = { circle = [100, 100, 200] }"),
+            ["interferer[0].area = with Tx", "contains a site"],
+        ),
+        (
+            area("area = { polygon = [[0, 9], [50, 40], [9, 40], [50, 9]] }"),
+            [
+                "interferer[0].area.polygon: crosses or touches itself: edges 1 and 3",
+                "3 or more corners",
+            ],
+        ),
+        (
+            area("area = { rectangle = [[5, 9], [5, 40]] }"),
+            [
+                "interferer[0].area.rectangle: has 2 different corners",
+                "3 or more",
+            ],
+        ),
+        (
+            area("area = { polygon = [[5, 9], [5, 40]] }"),
+            [
+                "interferer[0].area.polygon = ",
+                "3 to 500 lists, each of 2 numbers: -1e7 to 1e7 m",
+            ],
+        ),
+        (
+            area("area = { polygon = [] }"),
+            ["interferer[0].area.polygon = []", "has no entry"],
+        ),
+        (
+            area("area = { circle = [5, 900, 0.5] }"),
+            ["interferer[0].area.circle[2] = 0.5", "1 to 1e6 m"],
+        ),
+        (
+            area("area = { circle = [5, 900] }"),
+            [
+                "interferer[0].area.circle = [5, 900]",
+                "a list of 3 numbers",
+            ],
+        ),
+        (
+            area("area = { polygon_deg = [[8.52, 47.19], [8.525, 47.19], [8.52, 47.195]] }"),
+            [
+                "interferer[0].area.polygon_deg[0] = [8.52, 47.19]",
+                "latitude and longitude are swapped",
+            ],
+        ),
+        (
+            area("area = { circle = [5, 900, 5], polygon = [] }"),
+            ["interferer[0].area.polygon", "polygon or circle, not both"],
+        ),
+        (
+            area("area = {}"),
+            [
+                "interferer[0].area.rectangle is missing",
+                "or the key circle instead",
+            ],
+        ),
+        (
+            area("area = { square = [1, 2] }"),
+            ["interferer[0].area.square", "the keys rectangle"],
+        ),
+        (
+            area("x_m = 5\narea = { circle = [5, 900, 5] }"),
+            ["interferer[0].x_m = 5", "x_m or area, not both"],
+        ),
+        (
+            area("x_m = 5\ny_m = 900"),
+            [
+                "interferer[0].power_dbm = [20, 30] needs an area",
+                "one number",
+            ],
+        ),
+        (
+            AREA.replace("[20, 30]", "[30, 20]"),
+            [
+                "interferer[0].power_dbm = [30, 20] is not in increasing order",
+                "-30 to 120 dBm",
+            ],
+        ),
+        (
+            AREA.replace("[20, 30]", "[20, 130]"),
+            [
+                "interferer[0].power_dbm[1] = 130 is out of range",
+                "-30 to 120 dBm",
+            ],
+        ),
+        (zone("lowest_m = 5"), ["no_fly[0].file is missing", "area"]),
+        (
+            zone("area = { circle = [5, 900, 5] }\nlowest_m = 50\nhighest_m = 50"),
+            ["no_fly[0].highest_m = 50", "above lowest_m, 50 m"],
+        ),
+        (
+            zone("file = \"none.geojson\""),
+            ["no_fly[0].file = \"none.geojson\": no such file", "GeoJSON"],
+        ),
+        (
+            zone("file = \"line.geojson\""),
+            ["has a LineString", "Polygon or MultiPolygon"],
+        ),
+        (
+            zone("file = \"swapped.geojson\""),
+            ["polygon 0, corner 0 = [8.52, 47.199]", "swapped"],
+        ),
+    ] {
+        let error = parse(&text).expect_err(&text).to_string();
+        assert!(
+            parts.iter().all(|part| error.contains(part)),
+            "{parts:?}\n{error}"
+        );
+    }
+}
