@@ -39,6 +39,19 @@ struct Drawn {
     powers_w: Vec<f64>,
 }
 
+/// Returns the position of the polygon's edges that is nearest to `at`; `None` without edges.
+fn nearest_on(outline: &[[f64; 2]], at: [f64; 2]) -> Option<[f64; 2]> {
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    let on_edge = edges.map(|([ax, ay], [bx, by])| {
+        let (along, up) = (bx - ax, by - ay);
+        let part = ((at[0] - ax) * along + (at[1] - ay) * up) / (along * along + up * up);
+        let part = part.clamp(0.0, 1.0);
+        [ax + part * along, ay + part * up]
+    });
+    let far = |on: &[f64; 2]| (on[0] - at[0]).hypot(on[1] - at[1]);
+    on_edge.min_by(|a, b| far(a).total_cmp(&far(b)))
+}
+
 /// Returns true if the polygon winds around `at`. Not the method of the planner.
 fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
     let angle = |i: usize| {
@@ -259,16 +272,19 @@ impl Judge<'_> {
                 signals.push((hop, power(hop + 1) * gain / s.reverse));
             }
         }
-        // The positions right below the receivers are on the grid, too.
+        // The positions right below the receivers and those of the outline nearest to them are on the grid, too.
         let grids: Vec<Vec<[f64; 2]>> = self
             .drawn
             .places
             .iter()
             .zip(&self.drawn.outlines)
             .map(|(places, outline)| {
-                let below = nodes.iter().map(|at| [at[0], at[1]]);
-                let below = below.filter(|at| !outline.is_empty() && winds(outline, *at));
-                places.iter().copied().chain(below).collect()
+                let nodes = nodes.iter().map(|at| [at[0], at[1]]);
+                let below = nodes
+                    .clone()
+                    .filter(|at| !outline.is_empty() && winds(outline, *at));
+                let beside = nodes.filter_map(|at| nearest_on(outline, at));
+                places.iter().copied().chain(below).chain(beside).collect()
             })
             .collect();
         let received = |source: usize, at: [f64; 2]| -> Vec<f64> {

@@ -442,9 +442,15 @@ impl<'a> Search<'a> {
         let room = self.room();
         let is_single = room.iter().skip(1).all(|[low, high]| low >= high);
         let relays = u32::try_from(self.scene.relays.len()).unwrap_or(u32::MAX);
-        let [along, ..] = GRID;
-        let along = along.max(3 * relays) * if is_single { 8 } else { 1 };
-        let [_, across, up] = GRID;
+        // A grid of few relays has room for more positions: its work is that of the positions squared for each hop.
+        let finer = match relays {
+            _ if is_single => [8, 1, 1],
+            1 => [8, 6, 4],
+            2 => [2, 2, 2],
+            _ => [1; 3],
+        };
+        let [along, across, up]: [u32; 3] = std::array::from_fn(|at| GRID[at] * finer[at]);
+        let along = along.max(3 * relays * finer[0]);
         let mut axes: [Vec<f64>; 3] = Default::default();
         for ((axis, [low, high]), count) in axes.iter_mut().zip(room).zip([along, across, up]) {
             let steps = if low < high { count } else { 0 };
