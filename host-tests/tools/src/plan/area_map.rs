@@ -48,7 +48,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
     let tall = (high[1] - low[1]) * scale;
     let at = |[x, y]: [f64; 2]| [MARGIN + (x - low[0]) * scale, MARGIN + (y - low[1]) * scale];
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {0:.1}\" width=\"{WIDTH}\" height=\"{0:.1}\" role=\"img\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"11\">\n<title>SIR of the worst hop for each position of the interferer</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN}\" y=\"20\" font-size=\"13\">SIR of the worst hop with the interferer at each position, {least:.2} to {most:.2} dB</text>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {0:.1}\" shape-rendering=\"crispEdges\" width=\"{WIDTH}\" height=\"{0:.1}\" role=\"img\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"11\">\n<title>SIR of the worst hop for each position of the interferer</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN}\" y=\"20\" font-size=\"13\">SIR of the worst hop with the interferer at each position, {least:.2} to {most:.2} dB</text>\n",
         tall + 3.0 * MARGIN
     );
     for cell in cells {
@@ -95,7 +95,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
         let [x, y] = at(node);
         _ = writeln!(
             out,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"#fff\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" stroke=\"#fff\" stroke-width=\"2.5\" paint-order=\"stroke\">{name}</text>",
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" shape-rendering=\"auto\" fill=\"#fff\" stroke=\"#222\"/><text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" stroke=\"#fff\" stroke-width=\"2.5\" paint-order=\"stroke\">{name}</text>",
             y - 7.0
         );
     }
