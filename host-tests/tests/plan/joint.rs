@@ -74,7 +74,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
         listen: None,
         link: None,
         reverse: 0.0,
-        areas: std::collections::BTreeMap::new(),
+        areas: BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
         plan: None,

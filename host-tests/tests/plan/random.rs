@@ -81,7 +81,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         listen: None,
         link: None,
         reverse: 0.0,
-        areas: std::collections::BTreeMap::new(),
+        areas: BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
         plan: None,

@@ -48,7 +48,7 @@ fn every_key_sets_its_value() {
         listen: None,
         link: None,
         reverse: 0.0,
-        areas: std::collections::BTreeMap::new(),
+        areas: BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
         plan: None,
