@@ -449,8 +449,9 @@ impl<'a> Search<'a> {
             2 => [2, 2, 2],
             _ => [1; 3],
         };
-        let [along, across, up]: [u32; 3] = std::array::from_fn(|at| GRID[at] * finer[at]);
-        let along = along.max(3 * relays * finer[0]);
+        let ([along, across, up], [longer, wider, higher]) = (GRID, finer);
+        let along = along.max(3 * relays) * longer;
+        let (across, up) = (across * wider, up * higher);
         let mut axes: [Vec<f64>; 3] = Default::default();
         for ((axis, [low, high]), count) in axes.iter_mut().zip(room).zip([along, across, up]) {
             let steps = if low < high { count } else { 0 };
