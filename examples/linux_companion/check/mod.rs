@@ -20,7 +20,6 @@ use std::time::{Duration, Instant as Clock, SystemTime, UNIX_EPOCH};
 
 use rustix::fs::statvfs;
 use uav_relay::{Instant, Port, Relay};
-use uav_relay_linux::stored::next_epoch;
 use uav_relay_linux::tty::Tty;
 
 use crate::options::Plan;

@@ -136,12 +136,12 @@ impl Bundle<'_> {
         for port in &ports {
             default(section, port, &format!("/dev/{LINK}{port}"));
         }
-        for (key, file) in [
+        for (key, name) in [
             ("epoch_file", "epoch"),
             ("upload_file", "mission"),
             ("view_file", "views"),
         ] {
-            default(section, key, &format!("/var/lib/uav-relay/{file}"));
+            state_file(section, key, name);
         }
         if own.positions.is_none() {
             default(section, "autopilot", "/dev/ttyAMA0");
@@ -193,7 +193,7 @@ impl Bundle<'_> {
         let section = section(&mut file, "ground")?;
         default(section, "tty", &format!("/dev/{LINK}shared"));
         default(section, "end", "tx");
-        default(section, "epoch_file", "/var/lib/uav-relay/epoch");
+        state_file(section, "epoch_file", "epoch");
         if !section.contains_key("shared") {
             section.insert("shared", value(is_shared));
         }
@@ -385,6 +385,13 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
     if !section.contains_key(key) {
         section.insert(key, value(text));
     }
+}
+
+/// Places a file that the program writes into the folder that its unit may write, unless its path is absolute.
+fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
+    let given = section.get(key).and_then(Item::as_str).unwrap_or(name);
+    let path = Path::new("/var/lib/uav-relay").join(given);
+    section.insert(key, value(path.display().to_string()));
 }
 
 /// Returns the udev rules for the ports `ports`; those with another name need none.

@@ -1,0 +1,524 @@
+//! Bundles of `cargo provision --bundle`: their checks before flight, planted faults, and a flight from their folders.
+
+use std::io::Write as _;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+use std::time::Duration;
+
+use uav_relay_scenario::Scenario;
+
+use crate::binary::provision;
+use crate::chain::simulated;
+use crate::files::Files;
+use crate::medium::{Medium, QUIET};
+use crate::peer::{Peer, RX, ReceivedMessage, distance_to_m};
+use crate::process::Relay;
+
+/// Text in the udev rules of a new bundle.
+const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
+
+/// Planned places of three relays, m along the line.
+const PLACES: [f64; 3] = [343.5, 380.9, 417.4];
+
+/// Scenario of `examples/drone.toml` without ports and files, with short times.
+fn scenario() -> String {
+    let example = include_str!("../../../examples/drone.toml");
+    let text = example.split("[companion]").next().unwrap();
+    text.replace("key_file = \"network7.key\"", "")
+        .replace("probe_after_ms = 30000", "probe_after_ms = 1000")
+        .replace("dead_after_ms = 90000", "dead_after_ms = 3000")
+}
+
+/// Runs `cargo provision` with the scenario `text`, a bundle in `out` and `more` options.
+fn bundle(files: &Files, text: &str, more: &str) -> Output {
+    let scenario = files.write("scenario.toml", text);
+    let mut command = Command::new(provision());
+    command.args(["--scenario", &scenario, "--bundle", &files.text("out")]);
+    command.args(more.split_whitespace()).output().unwrap()
+}
+
+/// Computers of three relays and a ground station on one channel, with the folders of a bundle.
+struct Bench {
+    files: Files,
+    channel: Medium,
+    drones: Vec<Peer>,
+}
+
+impl Bench {
+    /// Makes the bundle, and does what its pages ask for: serial numbers and the parameters of the autopilots.
+    fn new() -> Self {
+        let files = Files::new();
+        let made = bundle(&files, &scenario(), "");
+        assert!(made.status.success(), "{made:?}");
+        let channel = Medium::new(6, QUIET);
+        let mut bench = Self {
+            files,
+            channel,
+            drones: Vec::new(),
+        };
+        for index in 1..=3 {
+            let port = bench.channel.tty(index - 1).to_owned();
+            bench.installs(&format!("relay{index}/drone.toml"), &port);
+            let kind = ["px4", "arducopter"][(index + 1) % 2];
+            let link = bench.files.text(&format!("autopilot{index}"));
+            let mut drone = Peer::autopilot(kind, &link, PLACES[index - 1] - 20.0, None);
+            let file = if kind == "px4" {
+                "px4.params"
+            } else {
+                "ardupilot.parm"
+            };
+            drone.order(&format!(
+                "params {}",
+                bench.path(&format!("relay{index}/{file}")).display()
+            ));
+            bench.drones.push(drone);
+        }
+        let port = bench.channel.tty(3).to_owned();
+        bench.installs("ground/ground.toml", &port);
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.files.path("out").join(name)
+    }
+
+    /// Changes the paths of a computer to those of this bench, and fills in the serial number.
+    fn installs(&self, config: &str, port: &str) {
+        let (path, folder) = (self.path(config), self.path(config));
+        let folder = folder.parent().unwrap();
+        let own = folder.file_name().unwrap().to_str().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("/dev/uav-relay-shared") && text.contains("/var/lib/uav-relay/"));
+        let text = text
+            .replace("/dev/uav-relay-shared", port)
+            .replace(
+                "/dev/ttyAMA0",
+                &self.files.text(&own.replace("relay", "autopilot")),
+            )
+            .replace("/var/lib/uav-relay", folder.to_str().unwrap());
+        std::fs::write(&path, text).unwrap();
+        self.rules(own, FILL_IN, "A50285BI");
+    }
+
+    fn rules(&self, folder: &str, before: &str, after: &str) {
+        let path = self.path(&format!("{folder}/70-uav-relay.rules"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(&format!(
+            "ATTRS{{serial}}==\"{before}\", SYMLINK+=\"uav-relay-shared\""
+        )));
+        let text = text.replace(&format!("\"{before}\""), &format!("\"{after}\""));
+        std::fs::write(path, text).unwrap();
+    }
+
+    /// Starts the companion of relay `index` with the file of its folder and `more` options.
+    fn companion(&self, index: usize, more: &str) -> Relay {
+        let config = self.path(&format!("relay{index}/drone.toml"));
+        Relay::start(&format!("--config {} {more}", config.display()))
+    }
+
+    /// Starts relays 1 and 3, which run while relay 2 is checked.
+    fn neighbours(&self) -> [Relay; 2] {
+        let mut relays = [1, 3].map(|index| self.companion(index, ""));
+        relays.each_mut().map(|relay| relay.line("started: "));
+        relays
+    }
+
+    /// Checks relay 2 and returns its red lines. Fails if the status does not agree with them.
+    fn reds(&self, more: &str, seconds: u64) -> Vec<String> {
+        let ended = self
+            .companion(2, &format!("--check={seconds} {more}"))
+            .end();
+        let mut lines = ended.stdout;
+        lines.retain(|line| line.starts_with("red "));
+        assert!(
+            ended.stderr.is_empty() || lines.is_empty(),
+            "{:?}",
+            ended.stderr
+        );
+        assert_eq!(
+            ended.status,
+            Some(i32::from(!lines.is_empty())),
+            "{:?} {lines:?}",
+            ended.stderr
+        );
+        lines
+    }
+
+    /// Checks that exactly the red lines with `parts` appear.
+    fn finds(&self, more: &str, parts: &[&str]) {
+        let reds = self.reds(more, 5);
+        println!("{more}: {reds:#?}");
+        assert_eq!(reds.len(), parts.len(), "{more}: {reds:#?}");
+        for (red, part) in reds.iter().zip(parts) {
+            assert!(red.contains(part), "{more}: {part} not in {red}");
+        }
+    }
+}
+
+#[test]
+fn a_bundle_is_green_and_its_relays_agree() {
+    let mut bench = Bench::new();
+    let checks = [1, 2, 3].map(|index| bench.companion(index, "--check=30"));
+    for check in checks {
+        let lines = check.succeeds();
+        println!("{}", lines.join("\n"));
+        assert!(lines.last().unwrap().ends_with("lines are green"));
+        assert!(
+            lines.iter().any(|line| line.contains("as in ")),
+            "{lines:#?}"
+        );
+    }
+    for drone in &mut bench.drones {
+        let asked = drone.so_far();
+        assert!(asked.iter().any(|it| it.is("PARAM_REQUEST_READ")));
+        let moves = [
+            "SET_POSITION_TARGET_GLOBAL_INT",
+            "SET_POSITION_TARGET_LOCAL_NED",
+            "SET_MODE",
+        ];
+        assert!(!asked.iter().any(|it| moves.iter().any(|name| it.is(name))));
+        assert!(
+            asked
+                .iter()
+                .all(|it| !it.is("COMMAND_LONG") || it.requested_interval().is_some())
+        );
+    }
+    for index in 1..=3 {
+        assert!(
+            !bench.path(&format!("relay{index}/views")).exists(),
+            "it has not voted"
+        );
+    }
+
+    let mut relays = [1, 2, 3].map(|index| bench.companion(index, ""));
+    let scenario = Scenario {
+        distance_m: distance_to_m(RX),
+        ..Scenario::default()
+    };
+    let settled = relays.each_mut().map(Relay::settled);
+    assert_eq!(settled[..], simulated(&scenario, 3));
+    for (at, planned) in settled.iter().zip(PLACES) {
+        assert!(
+            (f64::from(f32::from_bits(at[0])) - planned).abs() < 0.1,
+            "as on the page"
+        );
+    }
+
+    let ground = bench.path("ground/ground.toml");
+    let check = |limit| Relay::ground(&format!("--config {} --check={limit}", ground.display()));
+    let rows = check(60).succeeds();
+    println!("{}", rows.join("\n"));
+    for (row, neighbours) in rows
+        .iter()
+        .skip(rows.len() - 3)
+        .zip(["-, 2", "1, 3", "2, -"])
+    {
+        assert!(
+            row.contains("green") && row.contains("Grounded") && row.contains(neighbours),
+            "{row}"
+        );
+    }
+    bench.drones[1].order("lose");
+    bench.drones[2].order("mute");
+    let (rows, line) = check(15).fails(1);
+    println!("{}", rows.join("\n"));
+    assert_eq!(line, "2 of 3 relays are red: do not fly");
+    for (row, fault) in
+        rows.iter()
+            .skip(rows.len() - 3)
+            .zip(["green", "no position", "autopilot silent"])
+    {
+        assert!(row.contains(fault), "{row}");
+    }
+
+    // A relay that is gone does not report.
+    drop(relays);
+    let (rows, _) = check(5).fails(1);
+    assert_eq!(
+        rows.iter().filter(|row| row.contains("no report")).count(),
+        3,
+        "{rows:#?}"
+    );
+}
+
+#[test]
+fn a_check_names_planted_faults_of_the_computer() {
+    let bench = Bench::new();
+    let statics = |more: &str, parts: &[&str]| {
+        let mut reds = bench.reds(more, 1);
+        reds.retain(|line| {
+            !["neighbour ", "autopilot", "position"]
+                .iter()
+                .any(|it| line.contains(&format!("red    {it}")))
+                && !line.contains("parameters")
+        });
+        println!("{more}: {reds:#?}");
+        assert_eq!(reds.len(), parts.len(), "{more}: {reds:#?}");
+        for (red, part) in reds.iter().zip(parts) {
+            assert!(red.contains(part), "{more}: {part} not in {red}");
+        }
+    };
+    statics(
+        "--shared /dev/nowhere",
+        &[
+            "port        --shared /dev/nowhere: there is no such device",
+            "neighbours  not checked: a port",
+        ],
+    );
+    let missing = bench.files.text("missing/epoch");
+    statics(
+        &format!("--epoch-file {missing}"),
+        &[
+            "disk        --epoch-file",
+            "epoch       --epoch-file",
+            "neighbours  not checked: without an epoch",
+        ],
+    );
+    statics(
+        "--log-file /dev/full",
+        &["disk        --log-file /dev/full: cannot be written: No space left"],
+    );
+    statics(
+        "--capture /proc/frames",
+        &["disk        --capture /proc/frames: cannot be written"],
+    );
+    let views = bench.files.text("views-of-another-mission");
+    let mut other = bench.companion(
+        2,
+        &format!("--altitude 21 --view-file {views} --upload-file {views}-m"),
+    );
+    other.line("started: ");
+    other.stopped();
+    statics(
+        &format!("--view-file {views}"),
+        &["votes       --view-file"],
+    );
+    let upload = bench.files.write("upload", "damaged");
+    statics(
+        &format!("--upload-file {upload}"),
+        &["is damaged, or not an uploaded mission"],
+    );
+    bench.rules("relay2", "A50285BI", FILL_IN);
+    statics(
+        "",
+        &["70-uav-relay.rules:3: FILL-IN-SERIAL-NUMBER is not replaced"],
+    );
+    bench.rules("relay2", FILL_IN, "A50285BI");
+    statics("", &[]);
+    let other_port = Relay::start(&format!(
+        "--index 1 --of 1 --upstream {}",
+        bench.channel.tty(4)
+    ));
+    std::thread::sleep(Duration::from_millis(300));
+    statics(
+        &format!("--shared {}", bench.channel.tty(4)),
+        &["is already in use", "neighbours  not checked"],
+    );
+    drop(other_port);
+    let key = bench.path("relay2/network.key");
+    std::fs::set_permissions(key, std::fs::Permissions::from_mode(0o644)).unwrap();
+    let line = bench.companion(2, "--check=1").refused(2);
+    assert!(line.contains("has the mode 0644"), "{line}");
+}
+
+#[test]
+fn a_check_names_planted_faults_of_the_autopilot() {
+    let mut bench = Bench::new();
+    let _relays = bench.neighbours();
+    bench.finds("", &[]);
+    let mut with = |order: &str, parts: &[&str], back: &str| {
+        bench.drones[1].order(order);
+        bench.finds("", parts);
+        bench.drones[1].order(back);
+    };
+    with("mute", &["autopilot   --autopilot"], "speak");
+    with(
+        "stranger",
+        &["no frame is from a PX4 or an ArduCopter"],
+        "vehicle",
+    );
+    with(
+        "mode companion",
+        &["mode        OFFBOARD or GUIDED"],
+        "mode pilot",
+    );
+    with(
+        "mode rtl",
+        &["mode        mode 6 returns or lands"],
+        "mode pilot",
+    );
+    with("lose", &["position    none from the autopilot"], "find");
+    with(
+        "param FENCE_ACTION 1",
+        &["FENCE_ACTION is 1 instead of 4; see "],
+        "param FENCE_ACTION 4",
+    );
+    with(
+        "param FENCE_ACTION",
+        &["FENCE_ACTION is unanswered; see "],
+        "param FENCE_ACTION 4",
+    );
+    with(
+        "param SYSID_THISMAV 9",
+        &["SYSID_THISMAV is 9 instead of 2"],
+        "param SYSID_THISMAV 2",
+    );
+    bench.finds(
+        "--start-within 10",
+        &["20 m from its planned place, more than 10 m"],
+    );
+    bench.drones[1].order("arm");
+    let reds = bench.reds("", 3);
+    assert!(
+        reds.iter().any(|it| it.contains("armed or in the air")),
+        "{reds:#?}"
+    );
+}
+
+#[test]
+fn a_check_names_planted_faults_of_the_radio() {
+    let bench = Bench::new();
+    let mut relays = bench.neighbours();
+    bench.finds("", &[]);
+    let other = bench.files.text("other");
+    bench.finds(
+        &format!("--key-file {other}"),
+        &[
+            "relay 1 signs with another key",
+            "relay 3 signs with another key",
+        ],
+    );
+    bench.finds(
+        "--network 8",
+        &[
+            "relay 1 is in network 7, this relay in 8",
+            "relay 3 is in network 7, this",
+        ],
+    );
+    bench.finds(
+        "--altitude 21",
+        &[
+            "relay 1 has another mission, 0x",
+            "relay 3 has another mission, 0x",
+        ],
+    );
+    bench.channel.cut(0b001);
+    bench.finds("", &["relay 1: nothing heard"]);
+    bench.channel.cut(0);
+    std::thread::sleep(Duration::from_secs(3));
+    bench.channel.cut(0b010);
+    bench.finds(
+        "",
+        &[
+            "relay 1 is heard, but has not heard this relay",
+            "relay 3 is heard, but",
+        ],
+    );
+    bench.channel.cut(0b101);
+    let mut noise = std::fs::File::options()
+        .write(true)
+        .open(bench.channel.tty(4))
+        .unwrap();
+    let sender = std::thread::spawn(move || {
+        for _ in 0..40 {
+            noise.write_all(&[0x55, 0xAA, 0x13, 0x37, 0]).unwrap();
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    });
+    bench.finds("", &["relay 1: nothing but ", "relay 3: nothing but "]);
+    sender.join().unwrap();
+    bench.channel.cut(0);
+    let twin = bench.companion(
+        2,
+        &format!(
+            "--shared {} --epoch-file {}",
+            bench.channel.tty(5),
+            bench.files.text("twin")
+        ),
+    );
+    std::thread::sleep(Duration::from_secs(2));
+    let reds = bench.reds("", 5);
+    assert!(
+        reds.iter()
+            .any(|it| it.contains("another relay 2 is on the channel")),
+        "{reds:#?}"
+    );
+    drop(twin);
+    // The relays that were not checked have formed no view with the checked one.
+    for relay in &mut relays {
+        assert!(!relay.has_printed(
+            "the chain has 3 relays, this one at place 3 from the transmitter (view 2)"
+        ));
+    }
+}
+
+#[test]
+fn a_bundle_is_written_whole_or_not_at_all() {
+    let files = Files::new();
+    let made = bundle(&files, &scenario(), "--index 2");
+    let said = format!("{made:?}");
+    let key = std::fs::read_to_string(files.path("out/relay2/network.key")).unwrap();
+    assert!(
+        made.status.success() && key.len() == 64 && !said.contains(&key),
+        "{said}"
+    );
+    for (file, mode) in [
+        ("network.key", 0o600),
+        ("install.sh", 0o755),
+        ("drone.toml", 0o644),
+    ] {
+        let about = files.path("out/relay2").join(file).metadata().unwrap();
+        assert_eq!(about.permissions().mode() & 0o777, mode, "{file}");
+    }
+    assert!(!files.path("out/relay1").exists() && files.path("out/ground/page.txt").exists());
+    let refused = |text: &str, more: &str, part: &str| {
+        let output = bundle(&files, text, more);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            !output.status.success() && said.contains(part),
+            "{part} not in {said}"
+        );
+        assert!(output.stdout.is_empty(), "{:?}", output.stdout);
+    };
+    refused(
+        &scenario(),
+        "",
+        "exists already, and a bundle is never overwritten",
+    );
+    assert_eq!(
+        std::fs::read_to_string(files.path("out/relay2/network.key")).unwrap(),
+        key
+    );
+    std::fs::remove_dir_all(files.path("out")).unwrap();
+    refused(
+        &scenario(),
+        "--key-file nowhere.key",
+        "--key-file nowhere.key: cannot be read",
+    );
+    let nowhere = files.text("nowhere/out");
+    let output = Command::new(provision())
+        .args([
+            "--scenario",
+            &files.text("scenario.toml"),
+            "--bundle",
+            &nowhere,
+        ])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("nowhere: No such file"), "{said}");
+    let unsited = scenario().replace("[site]", "[geometry.site]");
+    refused(&unsited, "", "site");
+    let left: Vec<_> = std::fs::read_dir(files.path(""))
+        .unwrap()
+        .flatten()
+        .map(|it| it.file_name())
+        .collect();
+    assert!(
+        !left
+            .iter()
+            .any(|name| name.to_string_lossy().contains("bundle")),
+        "{left:?}"
+    );
+}
