@@ -29,7 +29,9 @@ const DAMAGED: u32 = 5;
 /// Neighbour, by the frames that bear its number.
 #[derive(Clone, Copy, Debug, Default)]
 struct Heard {
-    /// True after a frame with the right key.
+    /// True after a frame with its number in this network, to any relay.
+    is_received: bool,
+    /// True after a frame to this relay with the right key.
     is_heard: bool,
     /// True if the neighbour's last message says that it receives this relay.
     hears: bool,
@@ -58,7 +60,7 @@ pub(super) struct Radio {
     network: u16,
     digest: u16,
     baud: u32,
-    signs: bool,
+    epoch: Option<u32>,
     heard: BTreeMap<u16, Heard>,
     sent: VecDeque<Vec<u8>>,
     /// Number of frames of another node with this relay's number.
@@ -99,7 +101,7 @@ impl Radio {
             network: plan.identity.network,
             digest: plan.mission.digest(),
             baud: plan.options.baud,
-            signs: auth.is_some(),
+            epoch: auth.map(|auth| auth.epoch),
             heard: BTreeMap::new(),
             sent: VecDeque::new(),
             twins: 0,
@@ -130,9 +132,7 @@ impl Radio {
                 break;
             };
             let bytes = frame.get(..transmit.len).unwrap_or_default();
-            if !may_send
-                || !decoded(bytes).is_some_and(|(_, message)| is_harmless(message.as_ref()))
-            {
+            if !may_send || !decoded(bytes).is_some_and(|(_, content)| content.is_harmless()) {
                 continue;
             }
             self.sent.push_back(bytes.to_vec());
@@ -175,7 +175,7 @@ impl Radio {
     }
 
     fn take(&mut self, now: Instant, port: Port, frame: &[u8]) {
-        let Some((header, message)) = decoded(frame) else {
+        let Some((header, content)) = decoded(frame) else {
             self.damaged += u32::from(frame.len() > 1);
             return;
         };
@@ -191,7 +191,8 @@ impl Radio {
             self.twins += 1;
             return;
         }
-        if !is_harmless(message.as_ref()) {
+        heard.is_received = true;
+        if !content.is_harmless() {
             return;
         }
         let before = *self.relay.stats();
@@ -205,17 +206,18 @@ impl Radio {
             return;
         }
         heard.is_heard = true;
-        match message {
-            Some(Message::Hello(hello)) => {
+        match content {
+            Content::Handshake(epoch) => heard.hears |= self.epoch == Some(epoch),
+            Content::Message(Message::Hello(hello)) => {
                 let distance = header.sender.abs_diff(self.index);
                 heard.mission = Some(hello.mission);
                 heard.hears = (1..=4).contains(&distance) && hello.hears >> (distance - 1) & 1 == 1;
             }
-            Some(Message::Heartbeat { mission, reply, .. }) => {
+            Content::Message(Message::Heartbeat { mission, reply, .. }) => {
                 heard.mission = Some(mission);
                 heard.hears |= reply != 0;
             }
-            _ => {}
+            Content::Message(_) => {}
         }
     }
 
@@ -246,15 +248,18 @@ impl Radio {
                 "relay {node} has another mission, 0x{other:04x} instead of 0x{digest:04x}"
             ));
         }
-        if heard.is_heard && heard.hears {
-            return Ok(format!(
-                "relay {node}: heard both ways, mission 0x{digest:04x}"
-            ));
-        }
         if heard.is_heard {
-            return Err(format!(
-                "relay {node} is heard, but has not heard this relay: one way only"
-            ));
+            return match (heard.hears, heard.mission) {
+                (true, Some(_)) => Ok(format!(
+                    "relay {node}: heard both ways, mission 0x{digest:04x}"
+                )),
+                (true, None) => Err(format!(
+                    "relay {node} hears this relay, but answers no hello: it has another mission than 0x{digest:04x}"
+                )),
+                (false, _) => Err(format!(
+                    "relay {node} is heard, but has not heard this relay: one way only"
+                )),
+            };
         }
         Err(match heard {
             Heard {
@@ -266,12 +271,17 @@ impl Radio {
             ),
             Heard { forged: 1.., .. } => format!("relay {node} signs with another key"),
             Heard { replayed: 1.., .. } => format!("relay {node} signs with an old epoch"),
-            Heard { unsigned: 1.., .. } if self.signs => {
+            Heard { unsigned: 1.., .. } if self.epoch.is_some() => {
                 format!("relay {node} does not sign, or has another version")
             }
             Heard { unsigned: 1.., .. } => {
                 format!("relay {node} signs, and this relay has no --key-file")
             }
+            Heard {
+                is_received: true, ..
+            } => format!(
+                "relay {node} is received, but sends nothing to this relay: it does not hear it, or has another key"
+            ),
             _ if self.damaged >= DAMAGED => format!(
                 "relay {node}: nothing but {} damaged frames: is {} bit/s the data rate at both ends?",
                 self.damaged, self.baud
@@ -281,26 +291,38 @@ impl Radio {
     }
 }
 
-/// Returns header and message of an intact frame; the message is `None` for a handshake. `None` for a damaged frame.
-fn decoded(frame: &[u8]) -> Option<(Header, Option<Message>)> {
+/// Content of an intact frame.
+enum Content {
+    /// Handshake, with the epoch of its receiver as far as the sender knows it.
+    Handshake(u32),
+    Message(Message),
+}
+
+impl Content {
+    /// Returns true for messages from which nothing is agreed on.
+    const fn is_harmless(&self) -> bool {
+        use Message::{Claim, Heartbeat, Hello};
+        matches!(
+            self,
+            Self::Handshake(_) | Self::Message(Hello(_) | Claim(_) | Heartbeat { .. })
+        )
+    }
+}
+
+/// Returns header and content of an intact frame; `None` for a damaged one.
+fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
     let mut deframer = Deframer::new();
     let (last, start) = frame.split_last()?;
     for byte in start {
         _ = deframer.push(*byte);
     }
     let opened = open(deframer.push(*last)?.ok()?).ok()?;
-    let message = if opened.handshake {
-        None
+    let content = if opened.handshake {
+        // After the sender's nonce; the upper half of the receiver's is its epoch.
+        let epoch = opened.body.get(12..16).and_then(<[u8]>::first_chunk);
+        Content::Handshake(u32::from_le_bytes(*epoch?))
     } else {
-        Some(Message::decode(opened.body).ok()?)
+        Content::Message(Message::decode(opened.body).ok()?)
     };
-    Some((opened.header, message))
-}
-
-/// Returns true for messages from which nothing is agreed on; `None` is a handshake.
-const fn is_harmless(message: Option<&Message>) -> bool {
-    matches!(
-        message,
-        None | Some(Message::Hello(_) | Message::Claim(_) | Message::Heartbeat { .. })
-    )
+    Some((opened.header, content))
 }
