@@ -1,6 +1,5 @@
 //! Bundles of `cargo provision --bundle`: their checks before flight, planted faults, and a flight from their folders.
 
-use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -11,7 +10,7 @@ use uav_relay_scenario::Scenario;
 use crate::binary::provision;
 use crate::chain::{Chain, QUICK, simulated};
 use crate::files::Files;
-use crate::medium::{Medium, QUIET};
+use crate::medium::{Medium, Noise, QUIET};
 use crate::peer::{Peer, RX, ReceivedMessage, distance_to_m};
 use crate::process::{Relay, bits};
 
@@ -387,33 +386,20 @@ fn a_check_names_planted_faults_of_the_radio() {
     bench.finds(
         "--altitude 21",
         &[
-            "relay 1 hears this relay, but answers no hello: it has another mission",
-            "relay 3 hears",
+            "relay 1 has another mission, 0x",
+            "relay 3 has another mission, 0x",
         ],
     );
     let other = format!("--key-file {}", bench.files.text("other"));
-    let deaf =
-        "is received, but sends nothing to this relay: it does not hear it, or has another key";
-    bench.finds(&other, &[deaf; 2]);
-    // If the neighbour is checked, too, it says more.
+    // Its neighbours may send nothing to it, so that the key is one of two causes.
+    bench.finds(&other, &["another key"; 2]);
     drop(relays);
-    let checked = [
-        bench.companion(1, "--check=6"),
-        bench.companion(3, "--check=6 --altitude 21"),
-    ];
-    bench.finds(
-        &other,
-        &[
-            "relay 1 signs with another key",
-            "relay 3 signs with another key",
-        ],
-    );
-    drop(checked);
-    let checked = [
-        bench.companion(1, "--check=6"),
-        bench.companion(3, "--check=6 --altitude 21"),
-    ];
+    // A neighbour that is checked, too.
+    let third = || bench.companion(3, "--check=6 --altitude 21");
+    let checked = [bench.companion(1, "--check=6"), third()];
     bench.finds("", &["relay 3 has another mission, 0x"]);
+    drop(checked);
+    let checked = [bench.companion(1, "--check=6"), third()];
     bench.channel.cut(0b010);
     bench.finds(
         "",
@@ -428,20 +414,6 @@ fn a_check_names_planted_faults_of_the_radio() {
     bench.finds("", &[]);
     bench.channel.cut(0b001);
     bench.finds("", &["relay 1: nothing heard"]);
-    bench.channel.cut(0);
-    bench.channel.cut(0b101);
-    let mut noise = std::fs::File::options()
-        .write(true)
-        .open(bench.channel.tty(4))
-        .unwrap();
-    let sender = std::thread::spawn(move || {
-        for _ in 0..40 {
-            noise.write_all(&[0x55, 0xAA, 0x13, 0x37, 0]).unwrap();
-            std::thread::sleep(Duration::from_millis(100));
-        }
-    });
-    bench.finds("", &["relay 1: nothing but ", "relay 3: nothing but "]);
-    sender.join().unwrap();
     bench.channel.cut(0);
     for relay in &mut relays {
         assert!(
@@ -464,7 +436,21 @@ fn a_check_names_planted_faults_of_the_radio() {
             .any(|it| it.contains("another relay 2 is on the channel")),
         "{reds:#?}"
     );
-    drop(twin);
+    drop((twin, relays));
+    // At another data rate no frame is whole.
+    let (loss, corrupt, seed) = (0.0, 0.3, 1);
+    let noisy = Medium::new(
+        3,
+        Noise {
+            loss,
+            corrupt,
+            seed,
+        },
+    );
+    let port = |index: usize| format!("--shared {}", noisy.tty(index - 1));
+    let _relays = [1, 3].map(|index| bench.companion(index, &port(index)));
+    let damaged = "damaged frames: is 57600 bit/s the data rate at both ends?";
+    bench.finds(&port(2), &[damaged; 2]);
 }
 
 /// Checks that a relay on two wires is green beside running relays, which form no view with it.
