@@ -254,7 +254,7 @@ impl Radio {
                     "relay {node}: heard both ways, mission 0x{digest:04x}"
                 )),
                 (true, None) => Err(format!(
-                    "relay {node} hears this relay, but answers no hello: it has another mission than 0x{digest:04x}"
+                    "relay {node} hears this relay, but has not told its mission: is it 0x{digest:04x}, too?"
                 )),
                 (false, _) => Err(format!(
                     "relay {node} is heard, but has not heard this relay: one way only"

@@ -15,6 +15,11 @@ pub(crate) fn ground() -> &'static Path {
     PATH.get_or_init(|| build("uav-relay-linux", "linux_ground"))
 }
 
+pub(crate) fn plan() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| build("uav-relay-tools", "plan"))
+}
+
 pub(crate) fn provision() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| build("uav-relay-tools", "provision"))

@@ -126,8 +126,13 @@ impl Bundle<'_> {
         if own.upstream.is_some() || own.downstream.is_some() {
             ports = vec!["upstream", "downstream"];
         }
-        // The ends of the chain have one neighbour.
-        for (port, is_missing) in [("upstream", index == 1), ("downstream", index == self.uavs)] {
+        // At an end of the chain the second wire leads to the ground station, or nowhere.
+        let at_rx = self.deployment.ground.end.as_deref() == Some("rx");
+        let ends = [
+            ("upstream", index == 1 && at_rx),
+            ("downstream", index == self.uavs && !at_rx),
+        ];
+        for (port, is_missing) in ends {
             if is_missing && ports.contains(&port) {
                 ports.retain(|other| *other != port);
                 _ = section.remove(port);
