@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Parser, ValueEnum as _};
 use serde_json::json;
-use uav_relay::{Channel, Instant, Interference, Profile};
-use uav_relay_scenario::Scenario;
+use uav_relay::{Channel, Instant, Interference, Placement, Profile};
 use uav_relay_scenario::deployment::Deployment;
 use uav_relay_scenario::endpoint::FORM;
 use uav_relay_scenario::mission;
+use uav_relay_scenario::{PlannedPlace, Scenario};
 
 use crate::log::Log;
 use crate::mission::Method;
@@ -30,6 +30,8 @@ pub struct FileOnlySettings {
     pub profiles: Vec<(u16, Profile)>,
     /// Indices of the relays whose altitude the file fixes. The method chooses only the altitudes of the other relays.
     pub held: Vec<u16>,
+    /// Positions of the relays in the file's plan; empty without one.
+    pub places: Vec<Placement>,
     /// Options of the command line that override the file.
     pub overrides: Vec<Override>,
 }
@@ -384,8 +386,25 @@ fn mission_options(
         field,
         profiles,
         held,
+        places: scenario
+            .plan
+            .iter()
+            .flat_map(|plan| &plan.places)
+            .map(place)
+            .collect(),
         overrides: Vec::new(),
     })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "metres of a mission")]
+fn place(planned: &PlannedPlace) -> Placement {
+    let [x_m, y_m, altitude_m] =
+        [planned.x_m, planned.y_m, planned.altitude_m].map(|metres| metres as f32);
+    Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    }
 }
 
 /// Returns the scenario without a minimum separation, so that any number of relays fits.

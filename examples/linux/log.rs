@@ -27,7 +27,7 @@ pub struct LogOptions {
     json: bool,
     /// Append lines to this file, created if missing, instead of standard output
     #[arg(long, value_name = "FILE")]
-    log_file: Option<PathBuf>,
+    pub log_file: Option<PathBuf>,
 }
 
 /// Identity of the program that writes the log. Logs of several programs are read side by side, so every line names

@@ -68,10 +68,30 @@ pub(crate) struct AutopilotPlan {
     pub(crate) key: Option<SigningKey>,
 }
 
+/// Open port of an autopilot.
 #[derive(Debug)]
-enum Port {
+pub(crate) enum Port {
     Tty(Replug),
     Udp(Datagrams),
+}
+
+impl Port {
+    /// Reads bytes from the autopilot's port; returns their number, or `None` if there are none.
+    pub(crate) fn read(&mut self, into: &mut [u8]) -> Option<usize> {
+        let count = match self {
+            Self::Tty(tty) => tty.read(into).ok(),
+            Self::Udp(datagrams) => Some(datagrams.read(into)),
+        };
+        count.filter(|count| *count > 0)
+    }
+
+    /// Sends a frame; what a full tty does not take is lost.
+    pub(crate) fn write(&mut self, frame: &[u8]) {
+        match self {
+            Self::Tty(tty) => drop(tty.write(frame)),
+            Self::Udp(datagrams) => datagrams.send(frame),
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -168,7 +188,7 @@ impl Companion {
             tty.tend(now, log);
         }
         let mut bytes = [0; 1_024];
-        while let Some(count) = self.read(&mut bytes) {
+        while let Some(count) = self.port.read(&mut bytes) {
             let bytes = bytes.get(..count).unwrap_or_default();
             self.link.handle_bytes(now, bytes);
         }
@@ -307,15 +327,6 @@ impl Companion {
         if let Port::Tty(tty) = &mut self.port {
             tty.noticed(events);
         }
-    }
-
-    /// Reads bytes from the autopilot's port; returns their number, or `None` if there are none.
-    fn read(&mut self, into: &mut [u8]) -> Option<usize> {
-        let count = match &mut self.port {
-            Port::Tty(tty) => tty.read(into).ok(),
-            Port::Udp(datagrams) => Some(datagrams.read(into)),
-        };
-        count.filter(|count| *count > 0)
     }
 
     fn send(&mut self, frame: &[u8]) {
@@ -473,13 +484,14 @@ const fn mistrusted(why: Mistrust) -> &'static str {
 
 /// Returns this machine's time as a MAVLink timestamp for signatures. If this clock is behind the autopilot's, the
 /// link continues from the timestamps that it receives.
-fn stamp() -> Stamp {
+pub(crate) fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());
     Stamp::of_unix_micros(u64::try_from(micros).unwrap_or(u64::MAX))
 }
 
-fn port(place: &AutopilotPort) -> Result<Port, String> {
+/// Opens the autopilot's port.
+pub(crate) fn port(place: &AutopilotPort) -> Result<Port, String> {
     match place {
         AutopilotPort::Tty(path, baud) => Replug::open("--autopilot", path, *baud).map(Port::Tty),
         AutopilotPort::Udp(endpoint) => Datagrams::open(endpoint)

@@ -26,6 +26,7 @@
 //! | file | content |
 //! | --- | --- |
 //! | `options.rs` | command line, checked |
+//! | `check/` | check before flight, `--check` |
 //! | `ports.rs` | ttys of either wiring |
 //! | `autopilot.rs` | link to the autopilot |
 //! | `datagrams.rs` | UDP port of the autopilot |
@@ -46,6 +47,8 @@
 
 #[cfg(unix)]
 mod autopilot;
+#[cfg(unix)]
+mod check;
 #[cfg(unix)]
 mod datagrams;
 #[cfg(unix)]
@@ -83,6 +86,10 @@ fn main() -> std::process::ExitCode {
         Ok(plan) => plan,
         Err(code) => return code,
     };
+    if let Some(seconds) = plan.options.check {
+        let is_green = check::run(&plan, std::time::Duration::from_secs(seconds));
+        return ExitCode::from(u8::from(!is_green));
+    }
     match relay::fly(&plan) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Refusal { line, is_final }) => {

@@ -7,7 +7,7 @@ use clap::{Args, Parser, ValueEnum};
 use uav_relay::flight::autopilot::carrot::Pace;
 use uav_relay::{
     ChannelLoad, Duration, Field, FieldPoint, GuardConfig, Identity, Interference, Listen, Mission,
-    Settings, Side, Wiring,
+    Placement, Settings, Side, Wiring,
 };
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
 use uav_relay_scenario::endpoint::{Endpoint, FORM};
@@ -30,7 +30,14 @@ const LATENCY: Duration = Duration::from_millis(40);
 pub(crate) struct Options {
     /// TOML file with the scenario, and the sections `network` and `companion`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    pub(crate) config: Option<PathBuf>,
+    /// Check before flight, for at most S seconds, 1 to 3600; 30 by default. Prints a line for each finding, green or red, and exits with
+    /// status 0 if all are green. It joins no chain and sends no targets
+    #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "30", require_equals = true, value_parser = whole::<u64>(1, 3_600), help_heading = "Check")]
+    pub(crate) check: Option<u64>,
+    /// Largest distance of the drone from its planned place, m, 1 to 1e6
+    #[arg(long, value_name = "M", default_value_t = 500.0, requires = "check", allow_negative_numbers = true, value_parser = number([1.0, 1e6]), help_heading = "Check")]
+    pub(crate) start_within: f32,
     /// Number of this relay; 1 is next to the transmitter
     #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     index: u16,
@@ -191,6 +198,8 @@ pub(crate) struct Plan {
     pub(crate) key: Option<SigningKey>,
     pub(crate) autopilot: Option<AutopilotPlan>,
     pub(crate) overrides: Vec<Override>,
+    /// Planned position of this relay; `None` without a plan in the file.
+    pub(crate) planned: Option<Placement>,
 }
 
 /// Reads and checks the command line. The error is the exit status after help or a mistake was printed.
@@ -277,6 +286,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         settings,
         key: key.transpose()?.map(SigningKey),
         autopilot: autopilot(&options)?,
+        planned: file_only.places.get(usize::from(index) - 1).copied(),
         overrides: file_only.overrides,
         options,
     })

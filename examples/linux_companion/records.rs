@@ -70,7 +70,11 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
     })
 }
 
-fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
+/// Reads a mission that was uploaded before this start; `None` without one.
+///
+/// # Errors
+/// A line that names the file and the fault.
+pub(crate) fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Upload>, String> {
     let named = |error: &str| format!("{UPLOADS} {}: {error}", file.display());
     let Some(bytes) = load(UPLOADS, file)? else {
         return Ok(None);

@@ -265,7 +265,8 @@ impl Flight {
     }
 }
 
-fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
+/// Returns the key with the epoch of this start, which is used up; `None` without a key.
+pub(crate) fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     let (Some(SigningKey(key)), Some(file)) = (plan.key, &plan.options.epoch_file) else {
         return Ok(None);
     };

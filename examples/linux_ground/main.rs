@@ -24,6 +24,7 @@
 //! | file | content |
 //! | --- | --- |
 //! | `options.rs` | command line, checked |
+//! | `check.rs` | check of the chain before flight, `--check` |
 //! | `new.rs` | options of the new mission |
 //! | `uploading.rs` | stages of an upload |
 //! | `change.rs` | log lines for an upload's changes |
@@ -40,6 +41,8 @@
 
 #[cfg(unix)]
 mod change;
+#[cfg(unix)]
+mod check;
 #[cfg(unix)]
 mod desk;
 #[cfg(unix)]

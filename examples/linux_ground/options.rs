@@ -54,7 +54,7 @@ pub(crate) struct Options {
     pub(crate) epoch_file: PathBuf,
     /// Version of the new mission, 1 to 65535: larger than that of every earlier upload. As the last word, without V, it prints
     /// the program's version
-    #[arg(long, value_name = "V", required_unless_present = "stand", allow_negative_numbers = true, value_parser = whole::<u16>(1, 65_535))]
+    #[arg(long, value_name = "V", required_unless_present_any = ["stand", "check"], allow_negative_numbers = true, value_parser = whole::<u16>(1, 65_535))]
     pub(crate) version: Option<u16>,
     /// Print the version of the program
     #[arg(short = 'V', action = ArgAction::Version)]
@@ -102,6 +102,10 @@ pub(crate) struct Options {
     /// that mission first
     #[arg(long, help_heading = "Standing")]
     pub(crate) stand: bool,
+    /// Check the chain before flight, for at most S seconds, 1 to 3600; 60 by default. Prints a table of the relays, and exits with status
+    /// 0 if all are green. The relays' programs must be running
+    #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "60", require_equals = true, conflicts_with_all = ["stand", "version"], value_parser = whole::<u64>(1, 3_600))]
+    pub(crate) check: Option<u64>,
     /// Show the chain in a browser, with alarms, a log and a form for uploads. Use 127.0.0.1:8080 for this computer alone; port 0 takes
     /// any free port. Another address needs --web-password
     #[arg(long, value_name = "ADDRESS:PORT", requires = "stand", value_parser = address, help_heading = "Standing")]

@@ -6,7 +6,7 @@ use rustix::event::PollFlags;
 use serde_json::{Value, json};
 use uav_relay::MAX_FRAME;
 use uav_relay::serial::SerialPort as _;
-use uav_relay::{Auth, Ground, Instant, Key, Progress, Upload};
+use uav_relay::{Auth, Duration, Ground, Instant, Key, Progress, Upload};
 use uav_relay_linux::counters::{RejectionReasons, counted};
 use uav_relay_linux::log::{Log, Source};
 use uav_relay_linux::replug::Replug;
@@ -14,6 +14,7 @@ use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::next_epoch;
 use uav_relay_linux::{config, tap};
 
+use crate::check::Check;
 use crate::desk::{Desk, Parts};
 use crate::heard::NearbyRelays;
 use crate::measurements::{Measurements, name};
@@ -23,6 +24,9 @@ use crate::screen::Web;
 use crate::uploading::{Fault, Outcome, Uploading, digest_of};
 
 const READS: usize = 64;
+
+/// Time between two looks at the relays' reports in a check.
+const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 struct Station<'a> {
     plan: &'a Plan,
@@ -35,6 +39,7 @@ struct Station<'a> {
     hearing: NearbyRelays,
     rejections: RejectionReasons,
     uploading: Option<Uploading>,
+    check: Option<Check>,
     web: Option<Web>,
     desk: Desk,
     /// True if the operator has answered a request for confirmation: standard input is readable.
@@ -86,6 +91,9 @@ impl<'a> Station<'a> {
         let uploading = options
             .version
             .map(|it| Uploading::begin(service.now(), plan, Some(it), None, &mut ground));
+        let check = options
+            .check
+            .map(|seconds| Check::begin(service.now(), seconds, &mut ground));
         let web = options
             .web
             .map(|address| Web::start(address, service.now(), &service.log, plan, &mut ground))
@@ -101,6 +109,7 @@ impl<'a> Station<'a> {
             hearing: NearbyRelays::default(),
             rejections: RejectionReasons::default(),
             uploading,
+            check,
             web,
             desk: Desk::new(posts),
             is_answered: false,
@@ -116,6 +125,11 @@ impl<'a> Station<'a> {
         let silent = self.hearing.update(time, &self.ground, log);
         if let Some(why) = self.rejections.next_reason(time, self.ground.stats(), true) {
             log.line(time, "rejected", why);
+        }
+        let check = self.check.as_mut();
+        let checked = check.and_then(|it| it.turn(time, self.plan, &self.ground, log));
+        if checked.is_some() {
+            return checked;
         }
         let outcome = self.uploading(time);
         if outcome.is_some() {
@@ -135,7 +149,16 @@ impl<'a> Station<'a> {
         let alive = self.serve_status(time);
         let measured = self.measurements.as_ref().and_then(Measurements::wake);
         let late = self.uploading.as_ref().and_then(Uploading::wake);
-        let others = [silent, alive, measured, late, shown, self.tty.wake()];
+        let look_again = self.check.as_ref().map(|_| time + LOOK_AGAIN);
+        let others = [
+            look_again,
+            silent,
+            alive,
+            measured,
+            late,
+            shown,
+            self.tty.wake(),
+        ];
         let wake = others
             .into_iter()
             .flatten()

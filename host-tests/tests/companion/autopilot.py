@@ -17,6 +17,8 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     noise 150                    a SiK radio hears so much between frames
     clear 2                      a ground station clears relay 2: MAV_CMD_USER_1 to the companion, by way of this autopilot
     track                        from now on its place is an output line, too, 50 times a second, with this computer's time
+    params FILE                  its parameters, and with them its system number; in the format of its ground station
+    param NAME [VALUE]           another value of one; without VALUE it does not know it
     unplug, plug                 the tty or the UDP port vanishes; another one is there
 """
 
@@ -27,6 +29,7 @@ import os
 import pty
 import select
 import socket
+import struct
 import sys
 import time
 import tty
@@ -132,6 +135,7 @@ class Drone:
         self.kind, self.home, self.key = kind, at, key
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
         self.is_stranger = self.is_tracked = self.is_lost = False
+        self.system, self.parameters = SYSTEM, {}
         self.port = port_of(link)
         self.start()
         self.plug()
@@ -153,7 +157,7 @@ class Drone:
 
     def plug(self):
         self.port.open()
-        self.codec, self.reader = common.MAVLink(None, SYSTEM, 1), common.MAVLink(None)
+        self.codec, self.reader = common.MAVLink(None, self.system, 1), common.MAVLink(None)
         self.reader.robust_parsing = True
         for end in [self.codec, self.reader] if self.key else []:
             end.signing.secret_key, end.signing.sign_outgoing = self.key, True
@@ -190,6 +194,14 @@ class Drone:
                 self.noise(int(noise))
             case ["clear", *relays]:
                 self.forward(relays)
+            case ["params", file]:
+                fields = [line.split("\t" if self.kind == "px4" else ",") for line in open(file) if line[0] != "#"]
+                self.parameters = {line[-3 if self.kind == "px4" else 0]: float(line[-2 if self.kind == "px4" else 1]) for line in fields}
+                self.number()
+            case ["param", name, *value]:
+                self.parameters.pop(name, None)
+                self.parameters.update({name: float(number) for number in value})
+                self.number()
             case ["unplug"]:
                 self.port.close()
             case ["plug"]:
@@ -197,11 +209,26 @@ class Drone:
             case _:
                 raise ValueError(words)
 
+    def number(self):
+        """It takes its own system number from its parameters."""
+        self.system = int(self.parameters.get("MAV_SYS_ID", self.parameters.get("SYSID_THISMAV", SYSTEM)))
+        self.codec.srcSystem = self.system
+
+    def value(self, message):
+        """The value of a parameter; a PX4 says the bytes of an integer as those of a float."""
+        value = self.parameters.get(message.param_id)
+        if value is None or message.target_system != self.system:
+            return
+        kind = 6 if self.kind == "px4" and value == int(value) and message.param_id[:6] not in ("COM_OF", "RTL_RE", "GF_MAX") else 9
+        if kind == 6:
+            (value,) = struct.unpack("<f", struct.pack("<i", int(value)))
+        self.say(common.MAVLink_param_value_message(message.param_id.encode(), value, kind, len(self.parameters), 0))
+
     def forward(self, relays):
         """A command of a ground station, which the autopilot forwards to the companion as it is."""
         station = common.MAVLink(None, 255, 190)
         numbers = [float(relay) for relay in relays] + [0.0] * (7 - len(relays))
-        self.port.write(common.MAVLink_command_long_message(SYSTEM, 191, 31010, 0, *numbers).pack(station))
+        self.port.write(common.MAVLink_command_long_message(self.system, 191, 31010, 0, *numbers).pack(station))
 
     def noise(self, noise):
         """What a SiK radio says on the same link: it cannot sign."""
@@ -260,6 +287,8 @@ class Drone:
                 if has:
                     self.streams[int(message.param1)] = [message.param2 / 1e6, 0.0]
                 self.say(common.MAVLink_command_ack_message(511, 0 if has else 2))
+            elif name == "PARAM_REQUEST_READ":
+                self.value(message)
             elif name == "TIMESYNC" and message.tc1 == 0:
                 self.say(common.MAVLink_timesync_message(int(time.monotonic() * 1e9), message.ts1))
             elif name == "SET_POSITION_TARGET_GLOBAL_INT":
@@ -271,7 +300,7 @@ class Drone:
 
     def take(self, message):
         is_position = message.coordinate_frame == AMSL and message.type_mask & POSITION == 0
-        is_mine = (message.target_system, message.target_component) == (SYSTEM, 1)
+        is_mine = (message.target_system, message.target_component) == (self.system, 1)
         if not is_position or message.type_mask & ACCELERATION != ACCELERATION or not is_mine or self.refuses:
             return
         now = time.monotonic()

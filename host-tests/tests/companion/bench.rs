@@ -28,7 +28,7 @@ while True:
 "#;
 
 /// Replaces `socat` by a Python program in a script of `examples/LINUX.md` if `socat` is not installed.
-fn with_socat(script: &str, folder: &Path) -> String {
+pub(crate) fn with_socat(script: &str, folder: &Path) -> String {
     if Command::new("socat").arg("-V").output().is_ok() {
         return script.to_owned();
     }

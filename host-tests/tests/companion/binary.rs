@@ -7,15 +7,25 @@ use std::sync::OnceLock;
 /// Returns the path of the companion program, which is built with the tests' cargo profile.
 pub(crate) fn companion() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| build("linux_companion"))
+    PATH.get_or_init(|| build("uav-relay-linux", "linux_companion"))
 }
 
 pub(crate) fn ground() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| build("linux_ground"))
+    PATH.get_or_init(|| build("uav-relay-linux", "linux_ground"))
 }
 
-fn build(program: &str) -> PathBuf {
+pub(crate) fn plan() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| build("uav-relay-tools", "plan"))
+}
+
+pub(crate) fn provision() -> &'static Path {
+    static PATH: OnceLock<PathBuf> = OnceLock::new();
+    PATH.get_or_init(|| build("uav-relay-tools", "provision"))
+}
+
+fn build(package: &str, program: &str) -> PathBuf {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = manifest.parent().expect("the workspace is one up");
     // The target folder of these tests avoids a second build. Cargo holds no lock on it while tests run.
@@ -23,14 +33,7 @@ fn build(program: &str) -> PathBuf {
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .current_dir(root)
-        .args([
-            "build",
-            "--locked",
-            "--package",
-            "uav-relay-linux",
-            "--bin",
-            program,
-        ])
+        .args(["build", "--locked", "--package", package, "--bin", program])
         .args(["--message-format", "json-render-diagnostics"])
         .arg("--target-dir")
         .arg(target.expect("the folder for temporary files is in it"))

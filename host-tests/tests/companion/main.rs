@@ -5,6 +5,7 @@ mod acting;
 mod astray;
 mod bench;
 mod binary;
+mod bundle;
 mod captured;
 mod chain;
 mod change;

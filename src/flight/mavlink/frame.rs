@@ -73,6 +73,10 @@ pub struct Known {
 pub mod id {
     /// Message HEARTBEAT: type, mode and state of a system.
     pub const HEARTBEAT: u32 = 0;
+    /// Message PARAM_REQUEST_READ: a request for the value of a parameter.
+    pub const PARAM_REQUEST_READ: u32 = 20;
+    /// Message PARAM_VALUE: the value of a parameter.
+    pub const PARAM_VALUE: u32 = 22;
     /// Message GLOBAL_POSITION_INT: position of the vehicle.
     pub const GLOBAL_POSITION_INT: u32 = 33;
     /// Message COMMAND_LONG: a command with seven parameters.
@@ -121,8 +125,10 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
 /// Messages that the parser knows: messages of this crate, and those whose payload may contain frames.
 ///
 /// The parser skips the latter as a whole, so that it does not find a frame inside.
-const TABLE: [Known; 26] = [
+const TABLE: [Known; 28] = [
     known(id::HEARTBEAT, 50, 9),
+    known(id::PARAM_REQUEST_READ, 214, 20),
+    known(id::PARAM_VALUE, 220, 25),
     known(id::GLOBAL_POSITION_INT, 104, 28),
     known(id::COMMAND_LONG, 152, 33),
     known(id::COMMAND_ACK, 143, 10),

@@ -1,5 +1,6 @@
 //! `cargo provision`: writes the configuration block of one drone, or of all, from a scenario.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -10,9 +11,11 @@ use uav_relay_scenario::deployment::{Deployment, NETWORK, Network};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command;
 use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
+use uav_relay_tools::plan;
 use uav_relay_tools::plan::area;
-use uav_relay_tools::plan::flown::{Flown, flown, is_current};
+use uav_relay_tools::plan::flown::{Flown, flown, is_current, with_plan};
 use uav_relay_tools::provision::block::Flight;
+use uav_relay_tools::provision::bundle::{Bundle, FILL_IN};
 use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secret};
 use uav_relay_tools::provision::folder::{Heading, summary};
 use uav_relay_tools::provision::{block, folder};
@@ -21,6 +24,7 @@ use uav_relay_tools::provision::{block, folder};
 struct Asked<'a> {
     options: &'a Options,
     scenario: Scenario,
+    deployment: Deployment,
     name: String,
     network: u16,
     key_file: Option<PathBuf>,
@@ -57,6 +61,9 @@ fn run(options: &Options) -> Result<String, String> {
     if let Some(line) = mission::undescribed_relay_error(scenario, *uavs) {
         return Err(format!("{name}: {line}"));
     }
+    if let Some(dir) = &options.folder.bundle {
+        return asked.bundle(dir);
+    }
     let secret = asked.secret()?;
     let flight = asked.flight(secret)?;
     let flown = asked.flown()?;
@@ -76,7 +83,8 @@ fn run(options: &Options) -> Result<String, String> {
         (_, _, Some(dir)) => asked.folder(&flight, flown.as_ref(), dir)?,
         _ => {
             return Err(
-                "either --index with --out, or --all with --out-dir must be given".to_owned(),
+                "either --index with --out, or --all with --out-dir, or --bundle must be given"
+                    .to_owned(),
             );
         }
     };
@@ -90,15 +98,11 @@ fn run(options: &Options) -> Result<String, String> {
 
 impl<'a> Asked<'a> {
     fn new(options: &'a Options) -> Result<Self, String> {
-        let (
-            scenario,
-            Deployment {
-                network: section, ..
-            },
-        ) = match &options.scenario {
+        let (scenario, deployment) = match &options.scenario {
             Some(file) => Deployment::load(file).map_err(|error| error.to_string())?,
             None => Default::default(),
         };
+        let section = &deployment.network;
         // A path in the file is relative to its folder.
         let folder = options.scenario.as_deref().and_then(Path::parent);
         let of_file = section
@@ -133,7 +137,7 @@ impl<'a> Asked<'a> {
             PlannedMethod::Align => Method::Align,
             PlannedMethod::Joint => Method::Joint,
         });
-        overridden(options, &section, of_file.as_deref(), &name);
+        overridden(options, section, of_file.as_deref(), &name);
         let of_section = section.method.as_deref();
         let method = match (options.method, planned) {
             (Some(method), Some(planned)) if method != planned => {
@@ -145,7 +149,11 @@ impl<'a> Asked<'a> {
             (method, planned) => method.or(planned),
         };
         let method = chosen_method(method, of_section, &name, planned.is_some())?;
-        let probe_after_ms = block::probe_after_ms(&section, options.probe_after_ms, &name)?;
+        let probe_after_ms = match &options.folder.bundle {
+            // Linux computers have no limits of the firmware.
+            Some(_) => section.probe_after_ms.unwrap_or(0),
+            None => block::probe_after_ms(section, options.probe_after_ms, &name)?,
+        };
         let tolerance = match (options.tolerance, plan) {
             (Some(tolerance), Some(plan)) if tolerance.total_cmp(&plan.tolerance).is_ne() => {
                 return Err(other(
@@ -170,6 +178,7 @@ impl<'a> Asked<'a> {
             scenario,
             name,
             network: options.network.or(section.id).unwrap_or(NETWORK),
+            deployment,
             key_file: options.key_file.clone().or(of_file),
             uavs,
             method,
@@ -231,7 +240,7 @@ impl<'a> Asked<'a> {
         }
         if !self.scenario.knows_interference()
             || is_plain
-                && !self.options.folder.all
+                && !self.is_whole()
                 && self.scenario.plan.is_none()
                 && self.scenario.no_fly.is_empty()
         {
@@ -272,6 +281,11 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
+    /// Returns true if files for the whole flight are asked for.
+    const fn is_whole(&self) -> bool {
+        self.options.folder.all || self.options.folder.bundle.is_some()
+    }
+
     fn secret(&self) -> Result<Option<Secret>, String> {
         let Some(file) = &self.key_file else {
             return match self.options.epoch {
@@ -291,6 +305,88 @@ impl<'a> Asked<'a> {
             epoch: epoch
                 .ok_or("--epoch: is missing, and cannot be taken from the time, because this computer's clock is not set")?,
         }))
+    }
+
+    /// Writes the folders of drones and ground station into the new folder `dir`.
+    fn bundle(&self, dir: &Path) -> Result<String, String> {
+        let (name, options) = (&self.name, self.options);
+        let Some(line) = &self.scenario.line else {
+            return Err(format!(
+                "--bundle: {name} has no [site], the geographic ends of the line along which the drones fly"
+            ));
+        };
+        let section = &self.deployment.network;
+        let baud = section.baud.unwrap_or(options.baud);
+        let own = &self.deployment.companion;
+        if own.upstream.is_none() && own.downstream.is_none() {
+            let probe_after = block::silence(self.probe_after_ms)[0];
+            command::carries(baud, ChannelLoad::of_radios(self.uavs), probe_after)?;
+        }
+        // The tolerance of a companion.
+        let flight = Flight::new(&self.scenario, self.uavs, 1e-4, self.network)
+            .map_err(|error| format!("{name}: {error}"))?;
+        let flight = match self.method {
+            Method::Joint => flight.by(uav_relay::Method::Joint),
+            _ => flight,
+        };
+        let flight = flight
+            .with_access(&self.scenario)
+            .map_err(|error| format!("{name}: {error}"))?;
+        let flown = self.flown()?.filter(|_| self.method != Method::Adjust);
+        let text = match &options.scenario {
+            Some(file) => std::fs::read_to_string(file)
+                .map_err(|error| format!("{}: {error}", file.display()))?,
+            None => String::new(),
+        };
+        let planned = match self.method {
+            Method::Joint => PlannedMethod::Joint,
+            Method::Align | Method::Adjust => PlannedMethod::Align,
+        };
+        let text = match &flown {
+            Some(flown) => with_plan(&text, &plan::flown::planned(flown, planned, self.tolerance))?,
+            None => text,
+        };
+        let own_folder = options.scenario.as_deref().and_then(Path::parent);
+        let of_file = own.autopilot_key_file.as_ref();
+        let of_file = of_file.map(|file| own_folder.unwrap_or(Path::new("")).join(file));
+        let autopilot_key = options.autopilot_key_file.clone().or(of_file);
+        let autopilot_key = autopilot_key
+            .map(|file| key::load("--autopilot-key-file", &file))
+            .transpose()?;
+        let key = match &self.key_file {
+            Some(file) => key::load("--key-file", file)?,
+            None => new_key()?,
+        };
+        let relays: Vec<u16> = match options.index {
+            Some(index) => vec![index],
+            None => (1..=self.uavs).collect(),
+        };
+        let bundle = Bundle {
+            text,
+            deployment: &self.deployment,
+            uavs: self.uavs,
+            network: self.network,
+            method: &format!("{:?}", self.method).to_lowercase(),
+            mission: flight.mission(),
+            profiles: flight.profiles(),
+            places: flown.as_ref().map_or(&[], |flown| &flown.plan.places),
+            line,
+            key,
+            autopilot_key,
+        };
+        bundle.write(dir, &relays)?;
+        let made = if self.key_file.is_some() {
+            "the network's key"
+        } else {
+            "a new key"
+        };
+        Ok(format!(
+            "{}: {} folders of relays, and ground, with {made}, mission 0x{:04x}\n\
+             next: {FILL_IN} in each 70-uav-relay.rules, then on each computer: sudo sh install.sh; page.txt has the rest\n",
+            dir.display(),
+            relays.len(),
+            flight.mission().digest()
+        ))
     }
 
     fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
@@ -322,6 +418,16 @@ impl<'a> Asked<'a> {
             text.trim_end()
         ))
     }
+}
+
+/// Returns a new random key.
+fn new_key() -> Result<[u8; 32], String> {
+    let mut key = [0; 32];
+    let source = "/dev/urandom";
+    std::fs::File::open(source)
+        .and_then(|mut file| file.read_exact(&mut key))
+        .map_err(|error| format!("{source}: {error}"))?;
+    Ok(key)
 }
 
 /// Checks that the radio channel is fast enough for `uavs` relays; wired relays always pass.
@@ -356,7 +462,7 @@ fn measure(options: &Options, scenario: &Scenario) -> Result<Option<Measure>, St
     Ok(Some(Measure { i_max_w, samples }))
 }
 
-/// Writes the configuration block of one relay, or of all: its index and its mission.
+/// Writes the configuration block of one relay, or of all: its index and its mission. With --bundle writes the files of Linux computers.
 #[derive(Parser, Debug)]
 #[command(
     name = "provision",
@@ -371,7 +477,7 @@ struct Options {
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1000))]
     uavs: Option<u16>,
     /// Index of this drone's relay, 1 (next to the transmitter) to N
-    #[arg(long, value_name = "I", required_unless_present = "all", value_parser = whole::<u16>(1, 1000))]
+    #[arg(long, value_name = "I", required_unless_present_any = ["all", "bundle"], value_parser = whole::<u16>(1, 1000))]
     index: Option<u16>,
     /// Network number, 0 to 65535; frames of other networks are ignored. By default that of the scenario's section `network`, or
     /// 1
@@ -425,7 +531,7 @@ struct Options {
     #[arg(long)]
     stand_in: bool,
     /// File to write the block to
-    #[arg(long, value_name = "FILE", required_unless_present = "all")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["all", "bundle"])]
     out: Option<PathBuf>,
     #[command(flatten)]
     folder: FolderOptions,
@@ -435,11 +541,16 @@ struct Options {
 #[derive(Args, Debug)]
 struct FolderOptions {
     /// Write the blocks of all relays, relay1.bin and so on, and summary.txt: all of them, or none
-    #[arg(long, conflicts_with_all = ["index", "out"], requires = "out_dir")]
+    #[arg(long, conflicts_with_all = ["index", "out"])]
     all: bool,
     /// Output folder for the blocks of all relays; created if necessary
     #[arg(long, value_name = "DIR", requires = "all")]
     out_dir: Option<PathBuf>,
+    /// New folder for the files of Linux computers, in place of blocks: a folder for each drone with its configuration, key, unit, udev
+    /// rules, autopilot parameters and a page to print, and one for the ground station. Without a key file a new key is made. With
+    /// --index only that drone's folder and the ground station's. An existing folder is never overwritten
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "out_dir", "force", "epoch", "samples", "speed", "in_range", "wires", "rounds", "explore_m"])]
+    bundle: Option<PathBuf>,
     /// Overwrite blocks that are in that folder
     #[arg(long, requires = "all")]
     force: bool,

@@ -4,9 +4,12 @@
 //! | --- | --- |
 //! | [`config`] | block format, byte by byte; a crate of its own, shared with the firmware |
 //! | [`block`] | the block of one drone, and section `[network]` against what the firmware supports |
+//! | [`bundle`] | a folder for each drone and the ground station, if they have Linux computers |
 //! | [`folder`] | the blocks of a whole flight: all of them, or none; with `summary.txt`, the commands to flash them |
 
 pub mod block;
+#[cfg(unix)]
+pub mod bundle;
 pub mod folder;
 
 pub use uav_relay_block as config;

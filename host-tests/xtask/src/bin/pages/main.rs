@@ -34,9 +34,10 @@ use clap::Parser;
 use page::{Block, Kind};
 
 /// Pages of the documentation whose commands are run, in the order in which a new user reads them.
-const PAGES: [&str; 14] = [
+const PAGES: [&str; 15] = [
     "README.md",
     "examples/LINUX.md",
+    "examples/FIRST_FLIGHT.md",
     "examples/BOARDS.md",
     "examples/SCENARIOS.md",
     "examples/PAGE.md",

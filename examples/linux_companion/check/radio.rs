@@ -1,0 +1,328 @@
+//! Neighbours of this relay: heard both ways, with the same mission, network and key.
+//!
+//! A relay of the library answers the handshakes, but only hellos, claims, heartbeats and handshakes pass between it and the ports. So it
+//! receives no proposal and no vote, and sends none: it can not become a member of the chain. On a shared channel its hellos say, too,
+//! that it is outside.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use uav_relay::serial::SerialPort as _;
+use uav_relay::wire::deframe::Deframer;
+use uav_relay::wire::frame::{Header, open};
+use uav_relay::wire::message::Message;
+use uav_relay::{Auth, Duration, Event, Instant, MAX_FRAME, Port, Relay, Settings, Stats};
+use uav_relay_linux::tty::Tty;
+
+use super::Line;
+use crate::options::Plan;
+use crate::relay::seed;
+
+/// Longest silence of a neighbour in the check before it is probed.
+const PROBE_AFTER: Duration = Duration::from_millis(2_000);
+
+/// Number of own frames that are remembered, to recognise their echoes.
+const REMEMBERED: usize = 64;
+
+/// Number of damaged frames from which on the data rate is suspected.
+const DAMAGED: u32 = 5;
+
+/// Neighbour, by the frames that bear its number.
+#[derive(Clone, Copy, Debug, Default)]
+struct Heard {
+    /// True after a frame with its number in this network, to any relay.
+    is_received: bool,
+    /// True after a frame to this relay with the right key.
+    is_verified: bool,
+    /// True if the neighbour's last message says that it receives this relay.
+    hears: bool,
+    /// Digest of its mission.
+    mission: Option<u16>,
+    /// Frames with another key, without a signature, of another network, of an old epoch.
+    forged: u32,
+    unsigned: u32,
+    network: Option<u16>,
+    replayed: u32,
+}
+
+/// Port toward neighbours, with the received bytes of an incomplete frame, and the bytes to send.
+struct Wire {
+    port: Port,
+    tty: Tty,
+    received: Vec<u8>,
+    outgoing: Vec<u8>,
+}
+
+pub(super) struct Radio {
+    relay: Relay,
+    wires: Vec<Wire>,
+    index: u16,
+    of: u16,
+    network: u16,
+    digest: u16,
+    baud: u32,
+    epoch: Option<u32>,
+    heard: BTreeMap<u16, Heard>,
+    sent: VecDeque<Vec<u8>>,
+    /// Number of frames of another node with this relay's number.
+    twins: u32,
+    damaged: u32,
+}
+
+impl Radio {
+    pub(super) fn new(
+        plan: &Plan,
+        auth: Option<Auth>,
+        ports: Vec<(Port, Tty)>,
+        now: Instant,
+    ) -> Result<Self, String> {
+        let probe_after = plan.settings.probe_after.min(PROBE_AFTER);
+        let settings = Settings {
+            auth,
+            guard: None,
+            leave_without_guard: true,
+            probe_after,
+            dead_after: probe_after.times(3),
+            ..plan.settings
+        };
+        let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now)
+            .map_err(|error| error.to_string())?;
+        relay.leave(now, None);
+        let wire = |(port, tty)| Wire {
+            port,
+            tty,
+            received: Vec::new(),
+            outgoing: Vec::new(),
+        };
+        Ok(Self {
+            relay,
+            wires: ports.into_iter().map(wire).collect(),
+            index: plan.identity.index,
+            of: plan.mission.relays(),
+            network: plan.identity.network,
+            digest: plan.mission.digest(),
+            baud: plan.options.baud,
+            epoch: auth.map(|auth| auth.epoch),
+            heard: BTreeMap::new(),
+            sent: VecDeque::new(),
+            twins: 0,
+            damaged: 0,
+        })
+    }
+
+    /// Exchanges frames with the neighbours; without `may_send` it only listens.
+    pub(super) fn exchange(&mut self, now: Instant, may_send: bool) {
+        for at in 0..self.wires.len() {
+            for (port, frame) in self.read(at) {
+                self.take(now, port, &frame);
+            }
+        }
+        self.relay.handle_timeout(now);
+        while let Some(event) = self.relay.poll_event() {
+            if let Event::DuplicateIndex { node } = event
+                && node == self.index
+            {
+                self.twins += 1;
+            }
+        }
+        let mut frame = [0; MAX_FRAME];
+        loop {
+            // Its votes go nowhere, so they are not stored either.
+            self.relay.persist(|_| true);
+            let Some(transmit) = self.relay.poll_transmit(now, &mut frame) else {
+                break;
+            };
+            let bytes = frame.get(..transmit.len).unwrap_or_default();
+            if !may_send || !decoded(bytes).is_some_and(|(_, content)| content.is_harmless()) {
+                continue;
+            }
+            self.sent.push_back(bytes.to_vec());
+            if self.sent.len() > REMEMBERED {
+                self.sent.pop_front();
+            }
+            for wire in self
+                .wires
+                .iter_mut()
+                .filter(|wire| wire.port == transmit.port)
+            {
+                wire.outgoing.extend_from_slice(bytes);
+            }
+        }
+        for wire in &mut self.wires {
+            let sent = wire.tty.write(&wire.outgoing).unwrap_or(0);
+            wire.outgoing.drain(..sent);
+        }
+    }
+
+    /// Returns the whole frames received at a port, each with its delimiter.
+    fn read(&mut self, at: usize) -> Vec<(Port, Vec<u8>)> {
+        let Some(wire) = self.wires.get_mut(at) else {
+            return Vec::new();
+        };
+        let mut bytes = [0; 256];
+        while let Ok(count @ 1..) = wire.tty.read(&mut bytes) {
+            wire.received
+                .extend_from_slice(bytes.get(..count).unwrap_or_default());
+        }
+        let mut frames = Vec::new();
+        while let Some(end) = wire.received.iter().position(|byte| *byte == 0) {
+            frames.push((wire.port, wire.received.drain(..=end).collect()));
+        }
+        if wire.received.len() > 2 * MAX_FRAME {
+            // Noise without any delimiter.
+            frames.push((wire.port, std::mem::take(&mut wire.received)));
+        }
+        frames
+    }
+
+    fn take(&mut self, now: Instant, port: Port, frame: &[u8]) {
+        let Some((header, content)) = decoded(frame) else {
+            self.damaged += u32::from(frame.len() > 1);
+            return;
+        };
+        if self.sent.iter().any(|sent| sent == frame) {
+            return;
+        }
+        let heard = self.heard.entry(header.sender).or_default();
+        if header.network != self.network {
+            heard.network = Some(header.network);
+            return;
+        }
+        if header.sender == self.index {
+            self.twins += 1;
+            return;
+        }
+        heard.is_received = true;
+        if !content.is_harmless() {
+            return;
+        }
+        let before = *self.relay.stats();
+        self.relay.handle_bytes(now, port, frame);
+        let after = self.relay.stats();
+        let more = |of: fn(&Stats) -> u32| of(after).saturating_sub(of(&before));
+        heard.forged += more(|stats| stats.forged);
+        heard.replayed += more(|stats| stats.replayed);
+        heard.unsigned += more(|stats| stats.unsigned) + more(|stats| stats.version);
+        if more(|stats| stats.received) + more(|stats| stats.handshakes) == 0 {
+            return;
+        }
+        heard.is_verified = true;
+        match content {
+            Content::Handshake(epoch) => heard.hears |= self.epoch == Some(epoch),
+            Content::Message(Message::Hello(hello)) => {
+                let distance = header.sender.abs_diff(self.index);
+                heard.mission = Some(hello.mission);
+                heard.hears = (1..=4).contains(&distance) && hello.hears >> (distance - 1) & 1 == 1;
+            }
+            Content::Message(Message::Heartbeat { mission, reply, .. }) => {
+                heard.mission = Some(mission);
+                heard.hears |= reply != 0;
+            }
+            Content::Message(_) => {}
+        }
+    }
+
+    /// Returns the findings about the neighbours and this relay's number.
+    pub(super) fn lines(&self) -> Vec<Line> {
+        let mut lines = Vec::new();
+        let neighbours = [self.index.checked_sub(1), self.index.checked_add(1)];
+        let neighbours = neighbours
+            .into_iter()
+            .flatten()
+            .filter(|node| (1..=self.of).contains(node));
+        lines.extend(neighbours.map(|node| ("neighbour", self.neighbour(node))));
+        lines.push(("number", match self.twins {
+            0 => Ok(format!("no other relay {} is heard", self.index)),
+            twins => Err(format!("another relay {} is on the channel ({twins} frames): two drones have the same number", self.index)),
+        }));
+        lines
+    }
+
+    fn neighbour(&self, node: u16) -> Result<String, String> {
+        let heard = self.heard.get(&node).copied().unwrap_or_default();
+        let digest = self.digest;
+        if let Some(other) = heard
+            .mission
+            .filter(|other| heard.is_verified && *other != digest)
+        {
+            return Err(format!(
+                "relay {node} has another mission, 0x{other:04x} instead of 0x{digest:04x}"
+            ));
+        }
+        if heard.is_verified {
+            return match (heard.hears, heard.mission) {
+                (true, Some(_)) => Ok(format!(
+                    "relay {node}: heard both ways, mission 0x{digest:04x}"
+                )),
+                (true, None) => Err(format!(
+                    "relay {node} hears this relay, but has not told its mission: is it 0x{digest:04x}, too?"
+                )),
+                (false, _) => Err(format!(
+                    "relay {node} is heard, but has not heard this relay: one way only"
+                )),
+            };
+        }
+        Err(match heard {
+            Heard {
+                network: Some(other),
+                ..
+            } => format!(
+                "relay {node} is in network {other}, this relay in {}",
+                self.network
+            ),
+            Heard { forged: 1.., .. } => format!("relay {node} signs with another key"),
+            Heard { replayed: 1.., .. } => format!("relay {node} signs with an old epoch"),
+            Heard { unsigned: 1.., .. } if self.epoch.is_some() => {
+                format!("relay {node} does not sign, or has another version")
+            }
+            Heard { unsigned: 1.., .. } => {
+                format!("relay {node} signs, and this relay has no --key-file")
+            }
+            Heard {
+                is_received: true, ..
+            } => format!(
+                "relay {node} is received, but sends nothing to this relay: it does not hear it, or has another key"
+            ),
+            _ if self.damaged >= DAMAGED => format!(
+                "relay {node}: nothing but {} damaged frames: is {} bit/s the data rate at both ends?",
+                self.damaged, self.baud
+            ),
+            _ => format!("relay {node}: nothing heard"),
+        })
+    }
+}
+
+/// Content of an intact frame.
+enum Content {
+    /// Handshake, with the epoch of its receiver as far as the sender knows it.
+    Handshake(u32),
+    Message(Message),
+}
+
+impl Content {
+    /// Returns true for messages from which nothing is agreed on.
+    const fn is_harmless(&self) -> bool {
+        use Message::{Claim, Heartbeat, Hello};
+        matches!(
+            self,
+            Self::Handshake(_) | Self::Message(Hello(_) | Claim(_) | Heartbeat { .. })
+        )
+    }
+}
+
+/// Returns header and content of an intact frame; `None` for a damaged one.
+fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
+    let mut deframer = Deframer::new();
+    let (last, start) = frame.split_last()?;
+    for byte in start {
+        _ = deframer.push(*byte);
+    }
+    let opened = open(deframer.push(*last)?.ok()?).ok()?;
+    let content = if opened.handshake {
+        // After the sender's nonce; the upper half of the receiver's is its epoch.
+        let epoch = opened.body.get(12..16).and_then(<[u8]>::first_chunk);
+        Content::Handshake(u32::from_le_bytes(*epoch?))
+    } else {
+        Content::Message(Message::decode(opened.body).ok()?)
+    };
+    Some((opened.header, content))
+}

@@ -1,0 +1,146 @@
+//! Check before flight of a whole chain, `--check`: a table of the relays' reports.
+
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::{Duration, Ground, Instant, Phase, Report};
+use uav_relay_linux::log::Log;
+
+use crate::options::Plan;
+use crate::uploading::{Fault, Outcome};
+
+/// Age from which a report is too old.
+const OLD: Duration = Duration::from_millis(10_000);
+
+/// Time for which all relays must be green: a report has neighbours and version in every eighth entry only.
+const GREEN_FOR: Duration = Duration::from_millis(2_000);
+
+/// Check of a chain in progress.
+#[derive(Debug)]
+pub(crate) struct Check {
+    end: Instant,
+    green_since: Option<Instant>,
+}
+
+impl Check {
+    /// Requests the reports of all relays. The check takes at most `seconds`.
+    pub(crate) fn begin(now: Instant, seconds: u64, ground: &mut Ground) -> Self {
+        ground.watch(now, true);
+        Self {
+            end: now + Duration::from_millis(1_000 * seconds),
+            green_since: None,
+        }
+    }
+
+    /// Logs the table and returns the result once all relays are green, or the time is over.
+    pub(crate) fn turn(
+        &mut self,
+        now: Instant,
+        plan: &Plan,
+        ground: &Ground,
+        log: &Log,
+    ) -> Outcome {
+        let reports: Vec<Report> = ground.reports().collect();
+        let version = reports.iter().map(|it| it.version).max().unwrap_or(0);
+        let relays = plan.loaded.mission.relays();
+        let rows = (1..=relays).map(|index| {
+            let report = reports.iter().find(|it| it.relay == index);
+            let faults = report.map_or(vec!["no report"], |it| faults(now, it, relays, version));
+            (index, report, faults)
+        });
+        let rows: Vec<_> = rows.collect();
+        let red = rows
+            .iter()
+            .filter(|(_, _, faults)| !faults.is_empty())
+            .count();
+        let since = self.green_since.get_or_insert(now);
+        if red > 0 {
+            self.green_since = None;
+        } else if now.since(*since) >= GREEN_FOR {
+            self.end = now;
+        }
+        if now < self.end {
+            return None;
+        }
+        log.line(
+            now,
+            "check",
+            "relay  colour  control   position             neighbours  mission  faults",
+        );
+        for (index, report, faults) in &rows {
+            let colour = if faults.is_empty() { "green" } else { "red" };
+            let row = report.map(|it| {
+                let position = it.position.map_or_else(String::new, |at| {
+                    format!("{:.0}, {:.0}, {:.0} m", at.x_m, at.y_m, at.altitude_m)
+                });
+                let node = |node: Option<u16>| {
+                    node.map_or_else(|| "-".to_owned(), |node| node.to_string())
+                };
+                let [before, after] = it.neighbours.map(node);
+                let control = it
+                    .control
+                    .map_or_else(|| "-".to_owned(), |state| format!("{state:?}"));
+                format!(
+                    "{control:<9} {position:<20} {:<11} {:<8}",
+                    format!("{before}, {after}"),
+                    it.version
+                )
+            });
+            let faults = faults.join(", ");
+            log.line(
+                now,
+                "check",
+                format_args!(
+                    "{index:<6} {colour:<7} {:<51} {faults}",
+                    row.unwrap_or_default()
+                ),
+            );
+        }
+        Some(match red {
+            0 => Ok(()),
+            _ => Err(Fault {
+                line: format!("{red} of {relays} relays are red: do not fly"),
+                status: 1,
+            }),
+        })
+    }
+}
+
+/// Returns what is wrong with a relay before flight; nothing for a green one.
+fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'static str> {
+    let Report {
+        relay,
+        control,
+        position,
+        neighbours,
+        phase,
+        ..
+    } = *report;
+    let expected = [relay - 1, if relay < relays { relay + 1 } else { 0 }];
+    let expected = expected.map(|node| Some(node).filter(|node| *node != 0));
+    let all = [
+        (now.since(report.at) >= OLD, "report older than 10 s"),
+        (report.is_duplicated, "another relay has its number"),
+        (control.is_none(), "no autopilot"),
+        (control == Some(State::Silent), "autopilot silent"),
+        (
+            matches!(
+                control,
+                Some(State::Standby | State::Engaged | State::Blind)
+            ),
+            "in the air",
+        ),
+        (position.is_none(), "no position"),
+        (neighbours != expected, "other neighbours"),
+        (report.silent.contains(&true), "a neighbour is silent"),
+        (phase == Phase::NoQuorum, "no quorum"),
+        (phase == Phase::Infeasible, "no feasible positions"),
+        (
+            report.agreed.is_none() || !report.holds_lease,
+            "no agreement",
+        ),
+        (report.version != version, "older mission"),
+    ];
+    all.into_iter()
+        .filter(|(is, _)| *is)
+        .map(|(_, fault)| fault)
+        .collect()
+}

@@ -1,0 +1,600 @@
+//! Bundles of `cargo provision --bundle`: their checks before flight, planted faults, and a flight from their folders.
+
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::Duration;
+
+use host_tests::python;
+use uav_relay_scenario::Scenario;
+
+use crate::bench::with_socat;
+use crate::binary::{companion, ground, plan, provision};
+use crate::chain::{Chain, QUICK, simulated};
+use crate::files::Files;
+use crate::medium::{Medium, Noise, QUIET};
+use crate::peer::{Peer, RX, distance_to_m};
+use crate::process::{Relay, bits};
+
+/// Text in the udev rules of a new bundle.
+const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
+
+/// Planned places of three relays, m along the line.
+const PLACES: [f64; 3] = [343.5, 380.9, 417.4];
+
+/// Scenario of `examples/drone.toml` without ports and files, with short times.
+fn scenario() -> String {
+    let example = include_str!("../../../examples/drone.toml");
+    let text = example.split("[companion]").next().unwrap();
+    text.replace("key_file = \"network7.key\"", "")
+        .replace("probe_after_ms = 30000", "probe_after_ms = 1000")
+        .replace("dead_after_ms = 90000", "dead_after_ms = 3000")
+}
+
+/// Runs `cargo provision` with the scenario `text`, a bundle in `out` and `more` options.
+fn bundle(files: &Files, text: &str, more: &str) -> Output {
+    let scenario = files.write("scenario.toml", text);
+    let mut command = Command::new(provision());
+    command.args(["--scenario", &scenario, "--bundle", &files.text("out")]);
+    command.args(more.split_whitespace()).output().unwrap()
+}
+
+/// Computers of three relays and a ground station on one channel, with the folders of a bundle.
+struct Bench {
+    files: Files,
+    channel: Medium,
+    drones: Vec<Peer>,
+}
+
+impl Bench {
+    /// Makes the bundle, and does what its pages ask for: serial numbers and the parameters of the autopilots.
+    fn new() -> Self {
+        let files = Files::new();
+        let made = bundle(&files, &scenario(), "");
+        assert!(made.status.success(), "{made:?}");
+        let channel = Medium::new(6, QUIET);
+        let mut bench = Self {
+            files,
+            channel,
+            drones: Vec::new(),
+        };
+        for index in 1..=3 {
+            let port = bench.channel.tty(index - 1).to_owned();
+            bench.installs(&format!("relay{index}/drone.toml"), &port);
+            let kind = ["px4", "arducopter"][(index + 1) % 2];
+            let link = bench.files.text(&format!("autopilot{index}"));
+            let mut drone = Peer::autopilot(kind, &link, PLACES[index - 1] - 20.0, None);
+            let file = if kind == "px4" {
+                "px4.params"
+            } else {
+                "ardupilot.parm"
+            };
+            drone.order(&format!(
+                "params {}",
+                bench.path(&format!("relay{index}/{file}")).display()
+            ));
+            bench.drones.push(drone);
+        }
+        let port = bench.channel.tty(3).to_owned();
+        bench.installs("ground/ground.toml", &port);
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.files.path("out").join(name)
+    }
+
+    /// Changes the paths of a computer to those of this bench, and fills in the serial number.
+    fn installs(&self, config: &str, port: &str) {
+        let (path, folder) = (self.path(config), self.path(config));
+        let folder = folder.parent().unwrap();
+        let own = folder.file_name().unwrap().to_str().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("/dev/uav-relay-shared") && text.contains("/var/lib/uav-relay/"));
+        let text = text
+            .replace("/dev/uav-relay-shared", port)
+            .replace(
+                "/dev/ttyAMA0",
+                &self.files.text(&own.replace("relay", "autopilot")),
+            )
+            .replace("/var/lib/uav-relay", folder.to_str().unwrap());
+        std::fs::write(&path, text).unwrap();
+        self.rules(own, FILL_IN, "A50285BI");
+    }
+
+    fn rules(&self, folder: &str, before: &str, after: &str) {
+        let path = self.path(&format!("{folder}/70-uav-relay.rules"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(&format!(
+            "ATTRS{{serial}}==\"{before}\", SYMLINK+=\"uav-relay-shared\""
+        )));
+        let text = text.replace(&format!("\"{before}\""), &format!("\"{after}\""));
+        std::fs::write(path, text).unwrap();
+    }
+
+    /// Starts the companion of relay `index` with the file of its folder and `more` options.
+    fn companion(&self, index: usize, more: &str) -> Relay {
+        let config = self.path(&format!("relay{index}/drone.toml"));
+        Relay::start(&format!("--config {} {more}", config.display()))
+    }
+
+    /// Starts relays 1 and 3, which run while relay 2 is checked.
+    fn neighbours(&self) -> [Relay; 2] {
+        let mut relays = [1, 3].map(|index| self.companion(index, ""));
+        for relay in &mut relays {
+            relay.line("started: ");
+        }
+        relays
+    }
+
+    /// Checks relay 2 and returns its red lines. Fails if the status does not agree with them.
+    fn reds(&self, more: &str, seconds: u64) -> Vec<String> {
+        let ended = self
+            .companion(2, &format!("--check={seconds} {more}"))
+            .end();
+        let mut lines = ended.stdout;
+        lines.retain(|line| line.starts_with("red "));
+        assert!(
+            ended.stderr.is_empty() || lines.is_empty(),
+            "{:?}",
+            ended.stderr
+        );
+        assert_eq!(
+            ended.status,
+            Some(i32::from(!lines.is_empty())),
+            "{:?} {lines:?}",
+            ended.stderr
+        );
+        lines
+    }
+
+    /// Checks that exactly the red lines with `parts` appear.
+    fn finds(&self, more: &str, parts: &[&str]) {
+        let reds = self.reds(more, 4);
+        println!("{more}: {reds:#?}");
+        assert_eq!(reds.len(), parts.len(), "{more}: {reds:#?}");
+        for (red, part) in reds.iter().zip(parts) {
+            assert!(red.contains(part), "{more}: {part} not in {red}");
+        }
+    }
+}
+
+#[test]
+fn a_bundle_is_green_and_its_relays_agree() {
+    let mut bench = Bench::new();
+    let checks = [1, 2, 3].map(|index| bench.companion(index, "--check=30"));
+    for check in checks {
+        let lines = check.succeeds();
+        println!("{}", lines.join("\n"));
+        assert!(lines.last().unwrap().ends_with("lines are green"));
+        assert!(
+            lines.iter().any(|line| line.contains("as in ")),
+            "{lines:#?}"
+        );
+    }
+    for drone in &mut bench.drones {
+        let asked = drone.so_far();
+        assert!(asked.iter().any(|it| it.is("PARAM_REQUEST_READ")));
+        let moves = [
+            "SET_POSITION_TARGET_GLOBAL_INT",
+            "SET_POSITION_TARGET_LOCAL_NED",
+            "SET_MODE",
+        ];
+        assert!(!asked.iter().any(|it| moves.iter().any(|name| it.is(name))));
+        assert!(
+            asked
+                .iter()
+                .all(|it| !it.is("COMMAND_LONG") || it.requested_interval().is_some())
+        );
+    }
+    for index in 1..=3 {
+        assert!(
+            !bench.path(&format!("relay{index}/views")).exists(),
+            "it has not voted"
+        );
+    }
+
+    let mut relays = [1, 2, 3].map(|index| bench.companion(index, ""));
+    let scenario = Scenario {
+        distance_m: distance_to_m(RX),
+        ..Scenario::default()
+    };
+    // A guarded relay has no setpoint before its drone is engaged.
+    for (relay, place) in relays.iter_mut().zip(simulated(&scenario, 3)) {
+        assert_eq!(bits(&relay.line("converged: "))[0], place[3]);
+    }
+
+    let ground = bench.path("ground/ground.toml");
+    let check = |limit| Relay::ground(&format!("--config {} --check={limit}", ground.display()));
+    let rows = check(60).succeeds();
+    println!("{}", rows.join("\n"));
+    for (row, neighbours) in rows
+        .iter()
+        .skip(rows.len() - 3)
+        .zip(["-, 2", "1, 3", "2, -"])
+    {
+        assert!(
+            row.contains("green") && row.contains("Grounded") && row.contains(neighbours),
+            "{row}"
+        );
+    }
+    bench.drones[1].order("lose");
+    bench.drones[2].order("mute");
+    let (rows, line) = check(15).fails(1);
+    println!("{}", rows.join("\n"));
+    assert_eq!(line, "2 of 3 relays are red: do not fly");
+    for (row, fault) in
+        rows.iter()
+            .skip(rows.len() - 3)
+            .zip(["green", "no position", "autopilot silent"])
+    {
+        assert!(row.contains(fault), "{row}");
+    }
+
+    // A relay that is gone does not report.
+    drop(relays);
+    let (rows, _) = check(5).fails(1);
+    assert_eq!(
+        rows.iter().filter(|row| row.contains("no report")).count(),
+        3,
+        "{rows:#?}"
+    );
+}
+
+#[test]
+fn a_check_names_planted_faults_of_the_computer() {
+    let bench = Bench::new();
+    let statics = |more: &str, parts: &[&str]| {
+        let mut reds = bench.reds(more, 1);
+        reds.retain(|line| {
+            !["neighbour ", "autopilot", "position"]
+                .iter()
+                .any(|it| line.contains(&format!("red    {it}")))
+                && !line.contains("parameters")
+        });
+        println!("{more}: {reds:#?}");
+        assert_eq!(reds.len(), parts.len(), "{more}: {reds:#?}");
+        for (red, part) in reds.iter().zip(parts) {
+            assert!(red.contains(part), "{more}: {part} not in {red}");
+        }
+    };
+    statics(
+        "--shared /dev/nowhere",
+        &[
+            "port        --shared /dev/nowhere: there is no such device",
+            "neighbours  not checked: a port",
+        ],
+    );
+    let missing = bench.files.text("missing/epoch");
+    statics(
+        &format!("--epoch-file {missing}"),
+        &[
+            "disk        --epoch-file",
+            "epoch       --epoch-file",
+            "neighbours  not checked: without an epoch",
+        ],
+    );
+    statics(
+        "--log-file /dev/full",
+        &["disk        --log-file /dev/full: cannot be written: No space left"],
+    );
+    statics(
+        "--capture /proc/frames",
+        &["disk        --capture /proc/frames: cannot be written"],
+    );
+    let views = bench.files.text("views-of-another-mission");
+    let mut other = bench.companion(
+        2,
+        &format!("--altitude 21 --view-file {views} --upload-file {views}-m"),
+    );
+    other.line("started: ");
+    other.stopped();
+    statics(
+        &format!("--view-file {views}"),
+        &["votes       --view-file"],
+    );
+    let upload = bench.files.write("upload", "damaged");
+    statics(
+        &format!("--upload-file {upload}"),
+        &["is damaged, or not an uploaded mission"],
+    );
+    bench.rules("relay2", "A50285BI", FILL_IN);
+    statics(
+        "",
+        &["70-uav-relay.rules:3: FILL-IN-SERIAL-NUMBER is not replaced"],
+    );
+    bench.rules("relay2", FILL_IN, "A50285BI");
+    statics("", &[]);
+    let other_port = Relay::start(&format!(
+        "--index 1 --of 1 --upstream {}",
+        bench.channel.tty(4)
+    ));
+    std::thread::sleep(Duration::from_millis(300));
+    statics(
+        &format!("--shared {}", bench.channel.tty(4)),
+        &["is already in use", "neighbours  not checked"],
+    );
+    drop(other_port);
+    let key = bench.path("relay2/network.key");
+    std::fs::set_permissions(key, std::fs::Permissions::from_mode(0o644)).unwrap();
+    let line = bench.companion(2, "--check=1").refused(2);
+    assert!(line.contains("has the mode 0644"), "{line}");
+}
+
+#[test]
+fn a_check_names_planted_faults_of_the_autopilot() {
+    let mut bench = Bench::new();
+    let _relays = bench.neighbours();
+    bench.finds("", &[]);
+    let mut with = |orders: &[&str], parts: &[&str], back: &[&str], more: &str| {
+        for order in orders {
+            bench.drones[1].order(order);
+        }
+        bench.finds(more, parts);
+        for order in back {
+            bench.drones[1].order(order);
+        }
+    };
+    with(&["mute"], &["autopilot   --autopilot"], &["speak"], "");
+    with(
+        &["stranger"],
+        &["no frame is from a PX4 or an ArduCopter"],
+        &["vehicle"],
+        "",
+    );
+    with(
+        &[
+            "mode companion",
+            "lose",
+            "param FENCE_ACTION 1",
+            "param FENCE_TYPE",
+            "param SYSID_THISMAV 9",
+        ],
+        &[
+            "mode        OFFBOARD or GUIDED",
+            "position    none from the autopilot",
+            "parameters  FENCE_ACTION is 1 instead of 4, SYSID_THISMAV is 9 instead of 2, FENCE_TYPE is unanswered; see ",
+        ],
+        &[
+            "find",
+            "param FENCE_ACTION 4",
+            "param FENCE_TYPE 3",
+            "param SYSID_THISMAV 2",
+            "mode rtl",
+        ],
+        "",
+    );
+    let far = "20 m from its planned place, more than 10 m";
+    with(
+        &[],
+        &["mode        mode 6 returns or lands", far],
+        &["mode pilot"],
+        "--start-within 10",
+    );
+    bench.drones[1].order("arm");
+    let reds = bench.reds("", 3);
+    assert!(
+        reds.iter().any(|it| it.contains("armed or in the air")),
+        "{reds:#?}"
+    );
+}
+
+#[test]
+fn a_check_names_planted_faults_of_the_radio() {
+    let bench = Bench::new();
+    let relays = bench.neighbours();
+    bench.finds("", &[]);
+    bench.finds(
+        "--network 8",
+        &[
+            "relay 1 is in network 7, this relay in 8",
+            "relay 3 is in network 7, this",
+        ],
+    );
+    bench.finds(
+        "--altitude 21",
+        &[
+            "relay 1 has another mission, 0x",
+            "relay 3 has another mission, 0x",
+        ],
+    );
+    let other = format!("--key-file {}", bench.files.text("other"));
+    // Its neighbours may send nothing to it, so that the key is one of two causes.
+    bench.finds(&other, &["another key"; 2]);
+    drop(relays);
+    // A neighbour that is checked, too.
+    let third = || bench.companion(3, "--check=6 --altitude 21");
+    let checked = [bench.companion(1, "--check=6"), third()];
+    bench.finds("", &["relay 3 has another mission, 0x"]);
+    drop(checked);
+    let checked = [bench.companion(1, "--check=6"), third()];
+    bench.channel.cut(0b010);
+    bench.finds(
+        "",
+        &[
+            "relay 1 is heard, but has not heard this relay: one way only",
+            "relay 3 ",
+        ],
+    );
+    drop(checked);
+    bench.channel.cut(0);
+    let mut relays = bench.neighbours();
+    bench.finds("", &[]);
+    bench.channel.cut(0b001);
+    bench.finds("", &["relay 1: nothing heard"]);
+    bench.channel.cut(0);
+    for relay in &mut relays {
+        assert!(
+            !relay.has_printed("the chain has 3 relays"),
+            "a view with a relay that is only checked"
+        );
+    }
+    let twin = bench.companion(
+        2,
+        &format!(
+            "--shared {} --epoch-file {}",
+            bench.channel.tty(5),
+            bench.files.text("twin")
+        ),
+    );
+    std::thread::sleep(Duration::from_secs(2));
+    let reds = bench.reds("", 5);
+    assert!(
+        reds.iter()
+            .any(|it| it.contains("another relay 2 is on the channel")),
+        "{reds:#?}"
+    );
+    drop((twin, relays));
+    // At another data rate no frame is whole.
+    let (loss, corrupt, seed) = (0.0, 0.3, 1);
+    let noisy = Medium::new(
+        3,
+        Noise {
+            loss,
+            corrupt,
+            seed,
+        },
+    );
+    let port = |index: usize| format!("--shared {}", noisy.tty(index - 1));
+    let _relays = [1, 3].map(|index| bench.companion(index, &port(index)));
+    let damaged = "damaged frames: is 57600 bit/s the data rate at both ends?";
+    bench.finds(&port(2), &[damaged; 2]);
+}
+
+/// Checks that a relay on two wires is green beside running relays, which form no view with it.
+#[test]
+fn a_relay_on_wires_is_checked() {
+    let chain = Chain::on_wires(3, QUIET).with(QUICK);
+    let start = |index: usize, more: &str| {
+        let signed = chain.files.signed("key", &format!("epoch{index}"));
+        chain.relay(index, &format!("{signed} {more}"))
+    };
+    let mut relays = [start(1, ""), start(3, "")];
+    let lines = start(2, "--check=20").succeeds();
+    println!("{}", lines.join("\n"));
+    assert_eq!(
+        lines
+            .iter()
+            .filter(|it| it.contains("heard both ways"))
+            .count(),
+        2
+    );
+    for relay in &mut relays {
+        assert!(!relay.has_printed("converged: "));
+    }
+}
+
+#[test]
+fn a_bundle_is_written_whole_or_not_at_all() {
+    let files = Files::new();
+    let made = bundle(&files, &scenario(), "--index 2");
+    let said = format!("{made:?}");
+    let key = std::fs::read_to_string(files.path("out/relay2/network.key")).unwrap();
+    assert!(
+        made.status.success() && key.len() == 64 && !said.contains(&key),
+        "{said}"
+    );
+    for (file, mode) in [
+        ("network.key", 0o600),
+        ("install.sh", 0o755),
+        ("drone.toml", 0o644),
+    ] {
+        let about = files.path("out/relay2").join(file).metadata().unwrap();
+        assert_eq!(about.permissions().mode() & 0o777, mode, "{file}");
+    }
+    assert!(!files.path("out/relay1").exists() && files.path("out/ground/page.txt").exists());
+    let refused = |text: &str, more: &str, part: &str| {
+        let output = bundle(&files, text, more);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            !output.status.success() && said.contains(part),
+            "{part} not in {said}"
+        );
+        assert!(output.stdout.is_empty(), "{:?}", output.stdout);
+    };
+    refused(
+        &scenario(),
+        "",
+        "exists already, and a bundle is never overwritten",
+    );
+    assert_eq!(
+        std::fs::read_to_string(files.path("out/relay2/network.key")).unwrap(),
+        key
+    );
+    std::fs::remove_dir_all(files.path("out")).unwrap();
+    refused(
+        &scenario(),
+        "--key-file nowhere.key",
+        "--key-file nowhere.key: cannot be read",
+    );
+    let nowhere = files.text("nowhere/out");
+    let output = Command::new(provision())
+        .args([
+            "--scenario",
+            &files.text("scenario.toml"),
+            "--bundle",
+            &nowhere,
+        ])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("nowhere: No such file"), "{said}");
+    let unsited = scenario().replace("[site]", "[geometry.site]");
+    refused(&unsited, "", "site");
+    let left: Vec<_> = std::fs::read_dir(files.path(""))
+        .unwrap()
+        .flatten()
+        .map(|it| it.file_name())
+        .collect();
+    assert!(
+        !left
+            .iter()
+            .any(|name| name.to_string_lossy().contains("bundle")),
+        "{left:?}"
+    );
+}
+
+/// Checks that the commands of `examples/FIRST_FLIGHT.md` lead from coordinates to six relays that agree.
+#[test]
+fn first_flight() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let page = include_str!("../../../examples/FIRST_FLIGHT.md");
+    let blocks = page.split("```bash tested\n").skip(1);
+    let mut script: String = blocks
+        .map(|block| block.split("```").next().unwrap())
+        .collect();
+    for (name, is) in [
+        ("bench/bin/python", python::interpreter().as_path()),
+        ("cargo companion", companion()),
+        ("cargo ground", ground()),
+        ("cargo plan", plan()),
+        ("cargo provision", provision()),
+        ("host-tests/tests", &root.join("host-tests/tests")),
+        ("examples/hills.tif", &root.join("examples/hills.tif")),
+    ] {
+        assert!(script.contains(name), "{name}");
+        script = script.replace(name, is.to_str().unwrap());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let script = with_socat(&script, folder.path());
+    // A process that is left would keep the output open.
+    let script = format!("trap 'kill $(jobs -p)' EXIT\n{script}");
+    let mut command = Command::new("timeout");
+    command.args(["--kill-after=5", "180", "bash", "-e", "-c", &script]);
+    let output = command.current_dir(folder.path()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    println!("{said}");
+    assert!(output.status.success(), "{output:?}");
+    for part in [
+        "RELAY 2, chain of 6 relays",
+        "lines are green",
+        "6      green",
+    ] {
+        assert!(said.contains(part), "no `{part}` in\n{said}");
+    }
+    assert_eq!(
+        said.matches("converged: positions agreed").count(),
+        6,
+        "{said}"
+    );
+}

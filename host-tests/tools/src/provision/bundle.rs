@@ -1,0 +1,447 @@
+//! Bundles of a flight on Linux computers: one folder for each drone, and one for the ground station.
+
+use std::fmt::Write as _;
+use std::fs::{OpenOptions, Permissions};
+use std::io::Write as _;
+use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
+use std::path::Path;
+
+use toml_edit::{DocumentMut, Item, Table, TableLike, value};
+use uav_relay::{GuardConfig, Mission, Placement, Profile, Side};
+use uav_relay_scenario::Line;
+use uav_relay_scenario::deployment::Deployment;
+
+/// Text in a udev rule that the operator replaces by the serial number of an adapter.
+pub const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
+
+/// Beginning of the port names in `/dev` that the udev rules of a bundle create.
+const LINK: &str = "uav-relay-";
+
+const RELAY_UNIT: &str = include_str!("../../../../examples/linux_companion/uav-relay@.service");
+
+/// Type of an integer parameter in a PX4 parameter file, `MAV_PARAM_TYPE_INT32`.
+const INT: u8 = 6;
+
+/// Type of a parameter with decimals in a PX4 parameter file, `MAV_PARAM_TYPE_REAL32`.
+const FLOAT: u8 = 9;
+
+/// Flight for which a bundle is made.
+#[derive(Debug)]
+pub struct Bundle<'a> {
+    /// Scenario file, with its plan if the positions are known.
+    pub text: String,
+    /// Sections of the scenario file for the programs.
+    pub deployment: &'a Deployment,
+    /// Number of relays.
+    pub uavs: u16,
+    /// Network number of the relays.
+    pub network: u16,
+    /// Method by which the relays choose their positions.
+    pub method: &'a str,
+    /// Mission that the relays load.
+    pub mission: &'a Mission,
+    /// Profiles of the relays that differ from the mission's.
+    pub profiles: &'a [(u16, Profile)],
+    /// Positions on which the relays will settle; empty if unknown.
+    pub places: &'a [(Placement, Profile)],
+    /// Line from Tx to Rx.
+    pub line: &'a Line,
+    /// Key of the network.
+    pub key: [u8; 32],
+    /// Signing key of the autopilots, if they have one.
+    pub autopilot_key: Option<[u8; 32]>,
+}
+
+/// File of a bundle: name, mode, content.
+type File = (&'static str, u32, String);
+
+/// Autopilot parameter: its names and values in a PX4 and in an ArduCopter, if they have it, and its PX4 type.
+type Parameter = (Option<(&'static str, u8, f64)>, Option<(&'static str, f64)>);
+
+impl Bundle<'_> {
+    /// Writes the folders of the relays `relays` and of the ground station into the new folder `dir`.
+    ///
+    /// All files are written into a temporary folder beside `dir`, which is renamed at the end.
+    ///
+    /// # Errors
+    /// A line that names the folder or file and the reason. `dir` then does not exist.
+    pub fn write(&self, dir: &Path, relays: &[u16]) -> Result<(), String> {
+        let named = |at: &Path, error: &dyn std::fmt::Display| {
+            format!("--bundle {}: {error}", at.display())
+        };
+        if dir.symlink_metadata().is_ok() {
+            return Err(named(
+                dir,
+                &"exists already, and a bundle is never overwritten: name another folder, or remove this one",
+            ));
+        }
+        let parent = dir.parent().filter(|it| !it.as_os_str().is_empty());
+        let parent = parent.unwrap_or(Path::new("."));
+        let staged = tempfile::Builder::new()
+            .prefix(".bundle")
+            .tempdir_in(parent)
+            .map_err(|error| named(parent, &error))?;
+        let ground = (
+            "ground".to_owned(),
+            self.ground().map_err(|e| named(dir, &e))?,
+        );
+        let mut folders = vec![ground];
+        for index in relays {
+            let files = self.relay(*index).map_err(|error| named(dir, &error))?;
+            folders.push((format!("relay{index}"), files));
+        }
+        for (name, files) in folders {
+            let folder = staged.path().join(&name);
+            std::fs::create_dir(&folder).map_err(|error| named(&dir.join(&name), &error))?;
+            for (file, mode, content) in files {
+                write(&folder.join(file), mode, &content)
+                    .map_err(|error| named(&dir.join(&name).join(file), &error))?;
+            }
+        }
+        // Other users of this computer see the names of the files, not the keys.
+        std::fs::set_permissions(staged.path(), Permissions::from_mode(0o755))
+            .and_then(|()| std::fs::rename(staged.path(), dir))
+            .map_err(|error| named(dir, &error))
+    }
+
+    fn key_files(&self) -> impl Iterator<Item = File> {
+        let hex = |key: [u8; 32]| {
+            key.iter()
+                .fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"))
+        };
+        let autopilot = self
+            .autopilot_key
+            .map(|key| ("autopilot.key", 0o600, hex(key)));
+        std::iter::once(("network.key", 0o600, hex(self.key))).chain(autopilot)
+    }
+
+    /// Returns the files of relay `index`.
+    fn relay(&self, index: u16) -> Result<Vec<File>, String> {
+        let own = &self.deployment.companion;
+        let mut file = self.document()?;
+        _ = file.remove("ground");
+        let section = section(&mut file, "companion")?;
+        section.insert("index", value(i64::from(index)));
+        let mut ports = vec!["shared"];
+        if own.upstream.is_some() || own.downstream.is_some() {
+            ports = vec!["upstream", "downstream"];
+        }
+        // At an end of the chain the second wire leads to the ground station, or nowhere.
+        let at_rx = self.deployment.ground.end.as_deref() == Some("rx");
+        let ends = [
+            ("upstream", index == 1 && at_rx),
+            ("downstream", index == self.uavs && !at_rx),
+        ];
+        for (port, is_missing) in ends {
+            if is_missing && ports.contains(&port) {
+                ports.retain(|other| *other != port);
+                _ = section.remove(port);
+            }
+        }
+        for port in &ports {
+            default(section, port, &format!("/dev/{LINK}{port}"));
+        }
+        for (key, name) in [
+            ("epoch_file", "epoch"),
+            ("upload_file", "mission"),
+            ("view_file", "views"),
+        ] {
+            state_file(section, key, name);
+        }
+        if own.positions.is_none() {
+            default(section, "autopilot", "/dev/ttyAMA0");
+        }
+        if self.autopilot_key.is_some() {
+            section.insert("autopilot_key_file", value("autopilot.key"));
+        }
+        let unit = RELAY_UNIT
+            .split_once("\n\n")
+            .map_or(RELAY_UNIT, |(_, unit)| unit)
+            .replace(" --index %i", "")
+            .replace("Relay %i of", &format!("Relay {index} of"))
+            .replace("uav-relay@%i", "uav-relay");
+        let parameters = self.parameters(index);
+        let mut px4 = "# Vehicle-Id\tComponent-Id\tName\tValue\tType\n".to_owned();
+        let mut ardupilot = String::new();
+        for (of_px4, of_ardupilot) in parameters {
+            if let Some((name, kind, value)) = of_px4 {
+                _ = writeln!(px4, "{index}\t1\t{name}\t{value}\t{kind}");
+            }
+            if let Some((name, value)) = of_ardupilot {
+                _ = writeln!(ardupilot, "{name},{value}");
+            }
+        }
+        let rules = rules(section, &ports);
+        let mut files = vec![
+            ("drone.toml", 0o644, file.to_string()),
+            ("uav-relay.service", 0o644, unit),
+            ("70-uav-relay.rules", 0o644, rules),
+            ("px4.params", 0o644, px4),
+            ("ardupilot.parm", 0o644, ardupilot),
+            ("page.txt", 0o644, self.page(index)),
+            (
+                "install.sh",
+                0o755,
+                install("linux_companion", "drone.toml", "uav-relay"),
+            ),
+        ];
+        files.extend(self.key_files());
+        Ok(files)
+    }
+
+    /// Returns the files of the ground station.
+    fn ground(&self) -> Result<Vec<File>, String> {
+        let own = &self.deployment.companion;
+        let is_shared = own.upstream.is_none() && own.downstream.is_none();
+        let mut file = self.document()?;
+        _ = file.remove("companion");
+        let section = section(&mut file, "ground")?;
+        default(section, "tty", &format!("/dev/{LINK}shared"));
+        default(section, "end", "tx");
+        state_file(section, "epoch_file", "epoch");
+        if !section.contains_key("shared") {
+            section.insert("shared", value(is_shared));
+        }
+        let unit = RELAY_UNIT
+            .split_once("\n\n")
+            .map_or(RELAY_UNIT, |(_, unit)| unit)
+            .replace("Relay %i of a chain", "Ground station of a chain")
+            .replace(
+                "linux_companion --config /etc/uav-relay/drone.toml --index %i",
+                "linux_ground --config /etc/uav-relay/ground.toml --stand",
+            )
+            .replace("uav-relay@%i", "uav-relay-ground");
+        let rules = rules(section, &["tty"]);
+        let mut page = self.heading("ground station");
+        page.push_str(
+            "Before flight, while the relays run:\n\
+             [ ] serial number of the radio in 70-uav-relay.rules, then: sudo sh install.sh\n\
+             [ ] sudo systemctl stop uav-relay-ground; sudo -u uav-relay linux_ground --check --config /etc/uav-relay/ground.toml\n\
+             [ ] all relays green, then: sudo systemctl start uav-relay-ground\n",
+        );
+        let mut files = vec![
+            ("ground.toml", 0o644, file.to_string()),
+            ("uav-relay-ground.service", 0o644, unit),
+            ("70-uav-relay.rules", 0o644, rules),
+            ("page.txt", 0o644, page),
+            (
+                "install.sh",
+                0o755,
+                install("linux_ground", "ground.toml", "uav-relay-ground"),
+            ),
+        ];
+        files.extend(self.key_files().take(1));
+        Ok(files)
+    }
+
+    /// Returns the scenario file with the section `[network]` of this flight, and without the terrain.
+    fn document(&self) -> Result<DocumentMut, String> {
+        let mut file: DocumentMut = self
+            .text
+            .parse()
+            .map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
+        // Only the planner reads the elevation files, which are not in the bundle.
+        _ = file.remove("terrain");
+        let network = section(&mut file, "network")?;
+        network.insert("id", value(i64::from(self.network)));
+        network.insert("relays", value(i64::from(self.uavs)));
+        network.insert("method", value(self.method));
+        network.insert("key_file", value("network.key"));
+        Ok(file)
+    }
+
+    /// Returns the geofence of relay `index`, as its guard has it.
+    fn fence(&self, index: u16) -> uav_relay::Geofence {
+        let own = self.profiles.iter().find(|(of, _)| *of == index);
+        let profile = own.map_or(self.mission.config().common, |(_, profile)| *profile);
+        GuardConfig::of(self.mission, profile).geofence
+    }
+
+    /// Returns the parameters that the chain needs in the autopilot of relay `index`.
+    ///
+    /// Drones return at different altitudes, because a returning drone crosses the line of the others.
+    fn parameters(&self, index: u16) -> Vec<Parameter> {
+        let config = self.mission.config();
+        let fence = self.fence(index);
+        let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
+        let highest = (1..=self.uavs).map(|of| f64::from(self.fence(of).most_altitude_m));
+        // Altitudes are above the line between the sites, those of an autopilot above its home.
+        let top_m = highest.fold(20.0, f64::max) + (tx - rx).abs();
+        let step_m = (f64::from(config.min_separation_m) + 2.0).max(6.0).ceil();
+        let return_m = |index: u16| (top_m + 10.0).ceil() + step_m * f64::from(index - 1);
+        let wide_m = f64::from(fence.most_y_m.max(-fence.least_y_m));
+        let radius_m = (f64::from(config.distance_m) + wide_m + 200.0).ceil();
+        let ceiling_m = return_m(self.uavs) + 20.0;
+        let baud = self.deployment.companion.autopilot_baud.unwrap_or(115_200);
+        let (own, baud) = (f64::from(index), f64::from(baud));
+        let px4 = |name, kind, value| (Some((name, kind, value)), None);
+        let ardupilot = |name, value| (None, Some((name, value)));
+        vec![
+            (Some(("MAV_SYS_ID", INT, own)), Some(("SYSID_THISMAV", own))),
+            // TELEM 2, messages for an onboard computer.
+            px4("MAV_1_CONFIG", INT, 102.0),
+            px4("MAV_1_MODE", INT, 2.0),
+            (
+                Some(("SER_TEL2_BAUD", INT, baud)),
+                Some(("SERIAL2_BAUD", (baud / 1e3).floor())),
+            ),
+            ardupilot("SERIAL2_PROTOCOL", 2.0),
+            ardupilot("BRD_SER2_RTSCTS", 0.0),
+            // Hold when the companion is silent for 1 s; no failsafe in OFFBOARD when the remote control is lost.
+            px4("COM_OF_LOSS_T", FLOAT, 1.0),
+            px4("COM_OBL_RC_ACT", INT, 5.0),
+            px4("COM_RCL_EXCEPT", INT, 4.0),
+            (
+                Some(("RTL_RETURN_ALT", FLOAT, return_m(index))),
+                Some(("RTL_ALT", 100.0 * return_m(index))),
+            ),
+            // Hold, or brake, at a fence around home that contains the flight.
+            (Some(("GF_ACTION", INT, 2.0)), Some(("FENCE_ACTION", 4.0))),
+            ardupilot("FENCE_ENABLE", 1.0),
+            ardupilot("FENCE_TYPE", 3.0),
+            (
+                Some(("GF_MAX_HOR_DIST", FLOAT, radius_m)),
+                Some(("FENCE_RADIUS", radius_m)),
+            ),
+            (
+                Some(("GF_MAX_VER_DIST", FLOAT, ceiling_m)),
+                Some(("FENCE_ALT_MAX", ceiling_m)),
+            ),
+        ]
+    }
+
+    fn heading(&self, who: &str) -> String {
+        let (uavs, network, digest) = (self.uavs, self.network, self.mission.digest());
+        format!("{who}, chain of {uavs} relays, network {network}, mission 0x{digest:04x}\n\n")
+    }
+
+    /// Returns the page to print for relay `index`.
+    fn page(&self, index: u16) -> String {
+        let mut page = self.heading(&format!("RELAY {index}"));
+        let fence = self.fence(index);
+        let place = self
+            .places
+            .get(usize::from(index) - 1)
+            .map(|(place, _)| *place);
+        match place {
+            None => page.push_str("place: the relays find it in flight\n"),
+            Some(at) => {
+                let Placement {
+                    x_m,
+                    y_m,
+                    altitude_m,
+                } = at;
+                _ = writeln!(
+                    page,
+                    "place: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m above the line between the sites"
+                );
+                if let Some(point) = self.line.axis.point(at) {
+                    let [lat, lon] = [point.lat_e7, point.lon_e7].map(|part| f64::from(part) / 1e7);
+                    let amsl = f64::from(point.amsl_mm) / 1e3;
+                    _ = writeln!(
+                        page,
+                        "       {lat:.7}, {lon:.7}, {amsl:.1} m above the mean sea level"
+                    );
+                }
+            }
+        }
+        _ = writeln!(
+            page,
+            "box:   x {:.0} to {:.0} m, y {:.0} to {:.0} m, altitude {:.1} to {:.1} m",
+            fence.least_x_m,
+            fence.most_x_m,
+            fence.least_y_m,
+            fence.most_y_m,
+            fence.least_altitude_m,
+            fence.most_altitude_m
+        );
+        let neighbour = |side| match (side, index) {
+            (Side::Upstream, 1) => "the transmitter".to_owned(),
+            (Side::Upstream, index) => format!("relay {}", index - 1),
+            (Side::Downstream, index) if index == self.uavs => "the receiver".to_owned(),
+            (Side::Downstream, index) => format!("relay {}", index + 1),
+        };
+        let [before, after] = [Side::Upstream, Side::Downstream].map(neighbour);
+        _ = writeln!(page, "neighbours: {before} and {after}\n");
+        page.push_str(
+            "Before flight, propellers off:\n\
+             [ ] serial numbers of the adapters in 70-uav-relay.rules, then: sudo sh install.sh\n\
+             [ ] px4.params or ardupilot.parm loaded into the autopilot, which is then restarted\n\
+             [ ] sudo systemctl stop uav-relay; sudo -u uav-relay linux_companion --check --config /etc/uav-relay/drone.toml\n\
+             [ ] all lines green, then: sudo rm -f /var/lib/uav-relay/views; sudo systemctl start uav-relay\n\
+             In the air:\n\
+             [ ] flown by hand to its place in the order along the line, between its neighbours\n\
+             [ ] OFFBOARD or GUIDED chosen after the log line `ready`; any other mode takes the drone back\n",
+        );
+        page
+    }
+}
+
+/// Returns the section `name` of a file, which is added if it is missing.
+fn section<'a>(file: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
+    let new = || Item::Table(Table::new());
+    let item = file.entry(name).or_insert_with(new);
+    // The scenario was read before, so that its sections are tables.
+    item.as_table_like_mut()
+        .ok_or_else(|| format!("{name} is not a section"))
+}
+
+fn default(section: &mut dyn TableLike, key: &str, text: &str) {
+    if !section.contains_key(key) {
+        section.insert(key, value(text));
+    }
+}
+
+/// Places a file that the program writes into the folder that its unit may write, unless its path is absolute.
+fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
+    let given = section.get(key).and_then(Item::as_str).unwrap_or(name);
+    let path = Path::new("/var/lib/uav-relay").join(given);
+    section.insert(key, value(path.display().to_string()));
+}
+
+/// Returns the udev rules for the ports `ports`; those with another name need none.
+fn rules(section: &dyn TableLike, ports: &[&str]) -> String {
+    let paths = ports.iter().filter_map(|port| section.get(port)?.as_str());
+    let links: Vec<&str> = paths
+        .filter_map(|path| path.strip_prefix("/dev/"))
+        .collect();
+    let mut rules = format!(
+        "# Names of the adapters. Replace {FILL_IN}; this command prints it, for the adapter at /dev/ttyUSB0:\n\
+         # udevadm info --attribute-walk /dev/ttyUSB0 | grep --max-count 1 serial\n"
+    );
+    for link in links.iter().filter(|link| link.starts_with(LINK)) {
+        _ = writeln!(
+            rules,
+            "SUBSYSTEM==\"tty\", ATTRS{{serial}}==\"{FILL_IN}\", SYMLINK+=\"{link}\""
+        );
+    }
+    rules
+}
+
+/// Returns the script that installs a folder of a bundle on its computer, with `program` and its `config` and unit.
+fn install(program: &str, config: &str, unit: &str) -> String {
+    format!(
+        "#!/bin/sh\n\
+         # Installs this folder; {program} is already in /usr/local/bin. Type: sudo sh install.sh\n\
+         set -e\n\
+         cd \"$(dirname \"$0\")\"\n\
+         test -x /usr/local/bin/{program} || {{ echo \"/usr/local/bin/{program} is missing\"; exit 1; }}\n\
+         id uav-relay > /dev/null 2>&1 || useradd --system --groups dialout uav-relay\n\
+         install -d -m 755 /etc/uav-relay\n\
+         install -d -m 700 -o uav-relay /var/lib/uav-relay\n\
+         install -m 640 -g uav-relay *.key /etc/uav-relay/\n\
+         install -m 644 {config} *.rules *.txt $(ls *.params *.parm 2> /dev/null) /etc/uav-relay/\n\
+         install -m 644 *.rules /etc/udev/rules.d/\n\
+         install -m 644 {unit}.service /etc/systemd/system/\n\
+         udevadm control --reload && udevadm trigger --subsystem-match=tty\n\
+         systemctl daemon-reload\n\
+         systemctl enable {unit}\n"
+    )
+}
+
+fn write(file: &Path, mode: u32, content: &str) -> std::io::Result<()> {
+    let mut options = OpenOptions::new();
+    let mut new = options.write(true).create_new(true).mode(mode).open(file)?;
+    new.write_all(content.as_bytes())?;
+    new.sync_all()
+}
