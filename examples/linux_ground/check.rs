@@ -10,7 +10,7 @@ use crate::uploading::{Fault, Outcome};
 /// Age from which a report is too old.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Time for which all relays must be green: a report has neighbours and version in every eighth entry only.
+/// Time for which all relays must be green. Only every eighth entry has neighbours and version.
 const GREEN_FOR: Duration = Duration::from_millis(2_000);
 
 /// Check of a chain in progress.

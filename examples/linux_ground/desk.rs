@@ -193,7 +193,8 @@ impl Desk {
     }
 }
 
-/// Reads the values of a preview.
+/// Reads the form of preview `number` from `body`, a JSON object of texts. With `sited`, the receiver may have
+/// latitude and longitude.
 fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
     let mut given: BTreeMap<String, String> =
         serde_json::from_str(body).map_err(|error| format!("not an object of texts: {error}"))?;

@@ -228,8 +228,9 @@ pub struct LocalSearch {
 }
 
 impl LocalSearch {
-    /// Starts a search by a relay at `at`, up to `explore_m` metres above and below it. `band` is the lowest and the
-    /// highest allowed altitude, m.
+    /// Starts the search of a relay at `at` for the position with the largest SIR of its two hops, `hops`.
+    ///
+    /// It reaches up to `explore_m` metres above and below. `band` is the lowest and the highest allowed altitude, m.
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);

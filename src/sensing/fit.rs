@@ -246,7 +246,9 @@ impl Fit {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
 
-    /// Returns the information in the measurements: positions over the variance of one position's error.
+    /// Returns the information in the measurements.
+    ///
+    /// It is the number of positions divided by the variance of one position's error.
     pub(crate) fn information(&self) -> f64 {
         self.count / self.variance
     }

@@ -28,10 +28,10 @@ use crate::relay::{auth, seed};
 use drone::Drone;
 use radio::Radio;
 
-/// One line of the check: its subject, and the finding. An `Err` is red.
+/// Line of the check: its subject, and the finding. An `Err` is red.
 pub(crate) type Line = (&'static str, Result<String, String>);
 
-/// Time for which the check goes on answering its neighbours after all lines are green: they may be checked, too.
+/// Time for which the check answers its neighbours after all lines are green. They may be checked, too.
 const LINGER: Duration = Duration::from_secs(5);
 
 /// Pause between two turns of the main loop.
@@ -43,7 +43,7 @@ const FREE: u64 = 64 << 20;
 /// Seconds from 1970 to 2024. A clock before that is not set.
 const YEAR_2024_S: u64 = 1_704_067_200;
 
-/// Files beside the configuration, or at their installed place, that contain the udev rules of a bundle.
+/// Files with the udev rules of a bundle: beside the configuration, or where they are installed.
 const RULES: &str = "70-uav-relay.rules";
 
 /// Checks this computer, the autopilot and the neighbours for at most `limit`. Prints all lines; returns true if all are
@@ -134,7 +134,7 @@ pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     red == 0
 }
 
-/// Exchanges messages with the drone and the neighbours until all lines have been green for a while, or until `limit`.
+/// Exchanges messages with the drone and the neighbours until all lines stay green, or until `limit`.
 fn watch(
     now: impl Fn() -> Instant,
     limit: Duration,

@@ -77,7 +77,7 @@ pub struct Ladder {
     /// Target SIR with index 7 of 0 to 15, or the only one: the bits of its f32 in hexadecimal. The other targets
     /// follow from it in both directions.
     pub anchor: String,
-    /// Code of the relative gap between the anchor and the next targets, 0 for a single target.
+    /// Code of the relative gap between the anchor and the next target SIRs; 0 for a single target.
     pub gap: u8,
     /// Code of the factor by which each gap exceeds the adjacent gap that is nearer to the anchor.
     pub growth: u8,

@@ -104,7 +104,7 @@ impl Area {
         self.nearest([x + sum[0] / (3.0 * area), y + sum[1] / (3.0 * area)])
     }
 
-    /// Returns the corners of the smallest rectangle along x and y around the area: the least and the greatest ones.
+    /// Returns the least and the greatest corner of the smallest rectangle along x and y around the area.
     pub fn bounds(&self) -> [[f64; 2]; 2] {
         match self {
             Self::Circle {

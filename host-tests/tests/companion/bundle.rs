@@ -1,4 +1,4 @@
-//! Bundles of `cargo provision --bundle`: their checks before flight, planted faults, and a flight from their folders.
+//! Bundles of `cargo provision --bundle`: checks before flight, planted faults, a flight.
 
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Makes the bundle, and does what its pages ask for: serial numbers and the parameters of the autopilots.
+    /// Makes the bundle, and enters what its pages ask for: serial numbers, autopilot parameters.
     fn new() -> Self {
         let files = Files::new();
         let made = bundle(&files, &scenario(), "");
@@ -554,7 +554,7 @@ fn a_bundle_is_written_whole_or_not_at_all() {
     );
 }
 
-/// Checks that the commands of `examples/FIRST_FLIGHT.md` lead from coordinates to six relays that agree.
+/// Checks that the commands of `examples/FIRST_FLIGHT.md` lead to six relays that agree.
 #[test]
 fn first_flight() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

@@ -15,7 +15,7 @@ use super::ALLOWED;
 use super::lateral_scene::LateralScene;
 use super::scene::Scene;
 
-/// Result of the solution for one scene, compared with brute force.
+/// Position of one relay by the theorems for one scene, compared with brute force.
 struct SceneResult {
     /// Name of the theorem's case by which the solution was found.
     case: String,

@@ -237,7 +237,7 @@ fn draw(seed: u64) -> Drawn {
     }
 }
 
-/// Judge: the SIR of the worst hop for every position of the interferers on the grid, one after the other.
+/// Judge: the SIR of the worst hop for every position of the interferers on a grid.
 struct Judge<'a> {
     drawn: &'a Drawn,
     scene: Scene,

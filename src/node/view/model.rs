@@ -64,7 +64,7 @@ fn chains_of_three_and_four_have_one_sequence_of_views() {
     all_holds(4, (2, 3, 0), false);
 }
 
-/// Checks that a relay that leaves, or a spare that joins before, keeps one sequence of views.
+/// Checks that there is one sequence of views when a spare joins and a relay leaves.
 #[test]
 fn departures_and_joins_keep_one_sequence_of_views() {
     for (relays, outside, (cuts, proposals, reboots, moves)) in [

@@ -521,8 +521,9 @@ struct TerrainOptions {
 /// Interferers that may be anywhere in an area, and no-fly areas.
 #[derive(Args, Debug)]
 struct AreaOptions {
-    /// Maximise the SIR that the worst hop has for this fraction of the interferer's positions and powers, 0.5 to 0.99, in place of its
-    /// worst position. Needs an interferer with an area
+    /// Maximise the SIR for this fraction of the interferer's positions and powers, 0.5 to 0.99
+    ///
+    /// Without the option the SIR counts for the interferer's worst position. Needs an interferer with an area
     #[arg(long, value_name = "Q", value_parser = |text: &str| number(text, 0.5, 0.99))]
     quantile: Option<f64>,
     /// Draw the SIR of the worst hop for each position of the interferer (SVG). Needs an interferer with an area

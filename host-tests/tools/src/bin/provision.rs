@@ -546,9 +546,11 @@ struct FolderOptions {
     /// Output folder for the blocks of all relays; created if necessary
     #[arg(long, value_name = "DIR", requires = "all")]
     out_dir: Option<PathBuf>,
-    /// New folder for the files of Linux computers, in place of blocks: a folder for each drone with its configuration, key, unit, udev
-    /// rules, autopilot parameters and a page to print, and one for the ground station. Without a key file a new key is made. With
-    /// --index only that drone's folder and the ground station's. An existing folder is never overwritten
+    /// New folder for the files of Linux computers, in place of blocks
+    ///
+    /// It has a folder for each drone with its configuration, key, unit, udev rules, autopilot parameters and a page to print, and one for
+    /// the ground station. Without a key file a new key is made. With --index only that drone's folder and the ground station's. An existing
+    /// folder is never overwritten
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "out_dir", "force", "epoch", "samples", "speed", "in_range", "wires", "rounds", "explore_m"])]
     bundle: Option<PathBuf>,
     /// Overwrite blocks that are in that folder

@@ -229,7 +229,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// x of the receiver (within `to`) for which the sender's x is smallest.
+    /// x of the receiver, within `to`, that a sender reaches from the smallest x.
     farthest: f64,
 }
 

@@ -32,7 +32,7 @@ const MOST_SEARCHED: u16 = 50;
 /// Quantile that is reported if no other one is asked for.
 pub const QUANTILE: f64 = 0.95;
 
-/// Number of draws of the interferers' positions and powers with which a quantile is optimised, and reported.
+/// Numbers of draws of the interferers with which a quantile is optimised, and reported.
 const DRAWS: [usize; 2] = [400, 4000];
 
 /// Seed of the draws, so that equal scenarios have equal plans.
@@ -50,7 +50,7 @@ const ROUNDING_M: f64 = 0.01;
 /// Number of x, y and altitudes of the first grid, where they are free.
 const GRID: [u32; 3] = [40, 7, 5];
 
-/// Largest number of windows around the relays, and the factor on the width of the next one if a window gains little.
+/// Largest number of windows around the relays, and factor on their width where one gains little.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
 /// Largest number of times that the windows begin again with their full width.
@@ -68,7 +68,7 @@ pub struct Criterion {
     pub allow_crossing: bool,
 }
 
-/// Finds the positions that `ask` requests, with the interferers anywhere in their areas and outside the no-fly areas.
+/// Plans the positions that `ask` requests, for interferers in areas and outside no-fly areas.
 ///
 /// With a quantile the positions maximise this quantile over the areas, else the worst case. The SIRs of the plan are those of the
 /// worst case.
@@ -612,7 +612,7 @@ impl Draws {
         }
     }
 
-    /// Returns the SIR of the chain's worst hop for each draw, with the number of the draw; the largest SIR is first.
+    /// Returns the SIR of the worst hop and the number of each draw, by falling SIR.
     fn sirs(&self, chain: &[Place]) -> Vec<(f64, usize)> {
         let mut scene = self.scene.clone();
         let each = self.draws.iter().enumerate().map(|(at, draw)| {

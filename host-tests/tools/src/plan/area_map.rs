@@ -1,4 +1,4 @@
-//! Maps of the SIR for each position of an interferer: a picture, and cells with geographic coordinates.
+//! Maps of the SIR for each position of an interferer: a picture, and geographic cells.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ const COLOURS: [[f64; 3]; 5] = [
 /// Number of steps of the legend.
 const STEPS: u32 = 5;
 
-/// Returns the picture of `cells`, seen from above: x to the right, and y, the right side of the line, downward.
+/// Returns the picture of `cells` from above: x points to the right, y (right of the line) down.
 pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
     let sirs = || cells.iter().map(|cell| cell.sir_db);
     let (least, most) = (

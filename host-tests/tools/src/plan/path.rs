@@ -335,8 +335,8 @@ impl<'a> Layers<'a> {
         }
     }
 
-    /// Adds the next relay, which may be at `points`. `known` has the hop times between all pairs of points, if
-    /// computed.
+    /// Adds the next relay, which may be at `points`. `known` has the times of the hops from every point of the
+    /// relay before to every one of `points`, if they are computed already.
     fn add(&mut self, points: Vec<Point>, known: Option<&[f64]>) {
         let node = self.layers.len() + 1;
         let times = self.times;

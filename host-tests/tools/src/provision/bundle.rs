@@ -55,7 +55,7 @@ pub struct Bundle<'a> {
 /// File of a bundle: name, mode, content.
 type File = (&'static str, u32, String);
 
-/// Autopilot parameter: its names and values in a PX4 and in an ArduCopter, if they have it, and its PX4 type.
+/// Autopilot parameter: names and values in PX4 and in ArduCopter, where they exist, and PX4 type.
 type Parameter = (Option<(&'static str, u8, f64)>, Option<(&'static str, f64)>);
 
 impl Bundle<'_> {
@@ -392,7 +392,7 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
     }
 }
 
-/// Places a file that the program writes into the folder that its unit may write, unless its path is absolute.
+/// Moves a relative path of a written file into the folder that the unit may write.
 fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
     let given = section.get(key).and_then(Item::as_str).unwrap_or(name);
     let path = Path::new("/var/lib/uav-relay").join(given);
@@ -418,7 +418,7 @@ fn rules(section: &dyn TableLike, ports: &[&str]) -> String {
     rules
 }
 
-/// Returns the script that installs a folder of a bundle on its computer, with `program` and its `config` and unit.
+/// Returns the script that installs `program`, its `config` and its unit on the computer.
 fn install(program: &str, config: &str, unit: &str) -> String {
     format!(
         "#!/bin/sh\n\

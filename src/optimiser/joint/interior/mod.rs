@@ -164,8 +164,8 @@ enum Work {
     Accept(u16),
     /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Computation of the relays' Newton steps; the fields are the next segment of the chain and its part. `true` is
-    /// the second part, which is computed before the first one.
+    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and which half of it:
+    /// `true` for the second half, which is computed before the first one.
     Substitute(u16, bool),
 }
 
