@@ -245,7 +245,7 @@ impl Ground {
     pub fn watch(&mut self, now: Instant, is_on: bool) {
         let now = self.clock.advance(now);
         self.watching.repeat_at = is_on.then_some(now);
-        self.watching.request(now, self.reach, self.node.into());
+        _ = self.watching.request(now, self.reach, self.node.into());
     }
 
     /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
@@ -300,6 +300,8 @@ impl Ground {
                     let now = self.clock.now();
                     match self.endpoint.check(now, &frame, &mut self.stats) {
                         Some(Checked::Fresh { .. }) => {
+                            #[cfg(feature = "telemetry")]
+                            self.watching.hear(distance);
                             let message = Message::decode(frame.body);
                             self.handle_message(header.sender, distance, message.as_ref().ok());
                         }
@@ -467,7 +469,12 @@ impl Ground {
         #[cfg(feature = "telemetry")]
         {
             self.watching.apply(now);
-            self.watching.request(now, self.reach, self.node.into());
+            let is_silent = self.watching.request(now, self.reach, self.node.into());
+            let to = self.at(self.watching.distance);
+            if let Some(session) = self.endpoint.session_mut().filter(|_| is_silent) {
+                // The relay may have restarted: then it accepts only handshakes.
+                session.request_reply_of_silent(to);
+            }
         }
         if self.repeat_at.is_none_or(|again| again > now) {
             return;
@@ -610,6 +617,8 @@ struct Watching {
     /// is sent.
     distance: u16,
     is_due: bool,
+    /// Bit mask of the relays that have been received since the last request to each.
+    heard: u8,
     /// Report entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
     /// Newest known state of every relay that has reported, in the order of their node numbers.
@@ -641,13 +650,22 @@ impl Watching {
             number: (epoch as u16) << 10,
             distance: 0,
             is_due: false,
+            heard: 0,
             arrived: heapless::Vec::new(),
             known: heapless::Vec::new(),
         }
     }
 
+    /// Records a message of the relay at `distance`.
+    const fn hear(&mut self, distance: u16) {
+        self.heard |= bit(distance);
+    }
+
     /// Schedules a request for reports, if due, to the next of the `reach` nearest relays. The farthest comes first.
-    fn request(&mut self, now: Instant, reach: u16, node: u64) {
+    ///
+    /// Returns true if that relay has sent no message since the last request to it.
+    fn request(&mut self, now: Instant, reach: u16, node: u64) -> bool {
+        let mut is_silent = false;
         if self.repeat_at.is_some_and(|at| at <= now) {
             // Two stations do not request at the same time again and again.
             let turn = (WATCH_EVERY.as_micros() + 100_000 * (node % 7)) / u64::from(reach.max(1));
@@ -661,7 +679,10 @@ impl Watching {
                 reach
             };
             self.is_due = true;
+            is_silent = self.heard & bit(self.distance) == 0;
+            self.heard &= !bit(self.distance);
         }
+        is_silent
     }
 
     /// Schedules the request for reports again for the relay at `distance`. That relay could not verify an earlier

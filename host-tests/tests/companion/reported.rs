@@ -86,6 +86,15 @@ impl Page {
         next
     }
 
+    /// Waits for the next snapshot, at most for `limit`. Returns false if none has arrived.
+    pub(crate) fn arrives(&mut self, limit: Duration) -> bool {
+        let next = self.arriving.recv_timeout(limit);
+        if let Ok((_, snapshot)) = &next {
+            self.last = snapshot.clone();
+        }
+        next.is_ok()
+    }
+
     /// Waits for a snapshot of the page for which `is_so` is true. Returns the time until then.
     pub(crate) fn until(
         &mut self,

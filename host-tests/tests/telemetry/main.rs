@@ -331,6 +331,24 @@ fn a_lost_relay_and_a_restarted_one() {
     assert!(later.age_s(0.95) <= 10.0, "{}", later.age_s(0.95));
 }
 
+/// The station's session with a restarted relay is void: without a new handshake that relay would never report again.
+#[test]
+fn relays_next_to_the_station_report_again_after_a_restart() {
+    for (access, relay) in [(Some(Access::Csma), 1), (Some(Access::Csma), 2), (None, 1)] {
+        let mut setup = setup(8, access, s(1), s(100));
+        setup.boots = vec![(relay, s(60))];
+        let mut chain = Chain::new(flown(setup)).unwrap();
+        let mut figures = Figures::default();
+        figures.watch(&mut chain, Side::Upstream, &all(8), [s(75), s(100)]);
+        let ages: Vec<f64> = figures.ages_s.iter().map(|it| quantile(it, 1.0)).collect();
+        println!("{access:?}: relay {relay} restarted, longest ages {ages:.1?} s");
+        assert!(
+            figures.age_s(1.0) <= 5.0,
+            "{access:?}: relay {relay}: {ages:.1?}"
+        );
+    }
+}
+
 #[test]
 fn a_hundred_relays_on_wires() {
     let span = [s(120), s(240)];
