@@ -17,6 +17,9 @@ const FEW: usize = 7;
 /// Permitted time until an alarm beyond the time in which the chain itself notices the fault, s.
 const SOON_S: f64 = 2.0;
 
+/// Time after which the station misses the reports of a lost relay, s. They may have gone through another lost relay.
+const LOST_S: f64 = 10.0;
+
 /// Time after which a fault that neither a companion nor the page has noticed is a failure.
 const MOST: Duration = Duration::from_secs(90);
 
@@ -175,10 +178,17 @@ impl Stage {
                 ));
             }
         }
-        for ((what, relay, ..), [own, shown]) in group.iter().zip(&times) {
+        for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(&times) {
             let own_s = own.map_or("not before the alarm".to_owned(), |it| format!("{it:.1} s"));
             println!("{what} {relay}: noticed by a companion: {own_s}; alarm: {shown:.1?} s");
-            let is_soon = shown.is_some_and(|shown| own.is_none_or(|own| shown <= own + SOON_S));
+            // The neighbours give a lost relay up later than the station misses its reports.
+            let most_s = if *alarm == LOST {
+                LOST_S
+            } else {
+                MOST.as_secs_f64()
+            };
+            let noticed_s = own.unwrap_or(most_s).min(most_s);
+            let is_soon = shown.is_some_and(|shown| shown <= noticed_s + SOON_S);
             if !is_soon {
                 failures.push(format!(
                     "{what} {relay}: {shown:.1?}, noticed after {own_s}"
