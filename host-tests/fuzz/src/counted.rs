@@ -47,6 +47,7 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
         views,
         stale,
         samples_rejected,
+        endurance_unknown,
     } = *stats;
     [
         ("sent", sent),
@@ -72,6 +73,7 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
         ("views", views),
         ("stale", stale),
         ("samples_rejected", samples_rejected),
+        ("endurance_unknown", endurance_unknown),
     ]
 }
 
