@@ -21,7 +21,7 @@ pub const fn intact(stats: &Stats, key: bool) -> u32 {
 }
 
 /// Returns every counter of a relay with its name, in the order of [`Stats`].
-pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
+pub const fn named(stats: &Stats) -> [(&'static str, u32); 24] {
     // Without a rest, so that the compiler asks for a new counter here.
     let Stats {
         sent,
@@ -78,6 +78,6 @@ pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
 }
 
 /// Returns every counter of a relay, in the order of [`Stats`].
-pub fn all(stats: &Stats) -> [u32; 23] {
+pub fn all(stats: &Stats) -> [u32; 24] {
     named(stats).map(|(_, count)| count)
 }
