@@ -136,6 +136,20 @@ fn pymavlink_reads_every_field_of_our_messages() {
                     [id as f32, interval_us as f32, 0.0, 0.0, 0.0, 0.0, 0.0]
                 );
             }
+            Outgoing::ReturnToLaunch => {
+                assert_eq!(kind, "COMMAND_LONG");
+                let said = [
+                    "command",
+                    "target_system",
+                    "target_component",
+                    "confirmation",
+                ]
+                .map(integer);
+                assert_eq!(said, [20, 7, 1, 0]);
+                for i in 1..=7 {
+                    assert_eq!(float(&format!("param{i}")), 0.0);
+                }
+            }
             Outgoing::CommandAck {
                 command,
                 result,
