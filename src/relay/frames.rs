@@ -203,7 +203,8 @@ fn schedule_handshake(node: &Node, session: &mut Session, to: u16, message: &Mes
 }
 
 /// Tests of the end of the frame counter's range, which sending frames would not reach in a test.
-#[cfg(all(test, feature = "auth"))]
+#[cfg(test)]
+#[cfg(feature = "auth")]
 mod tests {
     use crate::Relay;
     use crate::mission::tests::paper;

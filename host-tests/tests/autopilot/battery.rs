@@ -100,7 +100,7 @@ fn an_invalid_percentage_without_a_time_is_unknown() {
 fn discharge(
     vehicle: &mut Vehicle,
     span_s: u16,
-    send: fn(&mut Vehicle, i8),
+    send: impl Fn(&mut Vehicle, i8),
     percent: impl Fn(f32) -> f32,
 ) -> Vec<Option<[f32; 3]>> {
     let second = |s: u16| {
@@ -116,13 +116,11 @@ fn discharge(
 /// ArduCopter reports it in BATTERY_STATUS, with the time 0, and PX4 in SYS_STATUS.
 #[test]
 fn the_slope_of_the_percentage_gives_the_endurance() {
-    let sends: [(Kind, fn(&mut Vehicle, i8)); 2] = [
-        (Kind::ArduCopter, |vehicle, percent| {
-            vehicle.battery(0, percent, 0)
-        }),
-        (Kind::Px4, Vehicle::sys_status),
-    ];
-    for (kind, send) in sends {
+    for kind in [Kind::ArduCopter, Kind::Px4] {
+        let send = |vehicle: &mut Vehicle, percent: i8| match kind {
+            Kind::ArduCopter => vehicle.battery(0, percent, 0),
+            Kind::Px4 => vehicle.sys_status(percent),
+        };
         let mut vehicle = Vehicle::flying(kind);
         let all = discharge(&mut vehicle, 600, send, |s| 90.9 - s / 13.0);
         let first = all.iter().position(Option::is_some).unwrap();

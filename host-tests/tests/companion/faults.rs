@@ -94,6 +94,29 @@ const SCRIPT: [&[Fault]; 14] = [
     &[("no quorum", 0, "critical no quorum", "no quorum  ")],
 ];
 
+/// Prints the times of faults: until a companion notices them, and until their alarm, s. Returns texts of late alarms.
+fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
+    let mut failures = Vec::new();
+    for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(times) {
+        let own_s = own.map_or("not before the alarm".to_owned(), |it| format!("{it:.1} s"));
+        println!("{what} {relay}: noticed by a companion: {own_s}; alarm: {shown:.1?} s");
+        // The neighbours give a lost relay up later than the station misses its reports.
+        let most_s = if *alarm == LOST {
+            LOST_S
+        } else {
+            MOST.as_secs_f64()
+        };
+        let noticed_s = own.unwrap_or(most_s).min(most_s);
+        let is_soon = shown.is_some_and(|shown| shown <= noticed_s + SOON_S);
+        if !is_soon {
+            failures.push(format!(
+                "{what} {relay}: {shown:.1?}, noticed after {own_s}"
+            ));
+        }
+    }
+    failures
+}
+
 /// Test setup: the relays of a chain with their drones, and the web page of the ground station.
 pub(crate) struct Stage {
     pub(crate) chain: Chain,
@@ -178,23 +201,7 @@ impl Stage {
                 ));
             }
         }
-        for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(&times) {
-            let own_s = own.map_or("not before the alarm".to_owned(), |it| format!("{it:.1} s"));
-            println!("{what} {relay}: noticed by a companion: {own_s}; alarm: {shown:.1?} s");
-            // The neighbours give a lost relay up later than the station misses its reports.
-            let most_s = if *alarm == LOST {
-                LOST_S
-            } else {
-                MOST.as_secs_f64()
-            };
-            let noticed_s = own.unwrap_or(most_s).min(most_s);
-            let is_soon = shown.is_some_and(|shown| shown <= noticed_s + SOON_S);
-            if !is_soon {
-                failures.push(format!(
-                    "{what} {relay}: {shown:.1?}, noticed after {own_s}"
-                ));
-            }
-        }
+        failures.extend(late(group, &times));
         if std::env::var("STORY").is_ok() {
             println!("{story:#?}");
         }
