@@ -104,6 +104,11 @@ impl Drone {
         })
     }
 
+    /// Returns true once the autopilot has reported that it is disarmed, and not in the air. Before, nothing is sent.
+    pub(super) fn is_disarmed(&self) -> bool {
+        self.heard.is_some() && !self.is_armed()
+    }
+
     /// Returns true if the autopilot is armed or in the air: then nothing is sent to the neighbours.
     pub(super) fn is_armed(&self) -> bool {
         self.is_in_air || self.heard.is_some_and(|heard| heard.is_armed)

@@ -149,10 +149,13 @@ fn watch(
         let mut may_send = true;
         match &mut drone {
             None => lines.push(("autopilot", Ok("none: the drone is not checked".to_owned()))),
-            Some(Err(why)) => lines.push(("autopilot", Err(why.clone()))),
+            Some(Err(why)) => {
+                may_send = false;
+                lines.push(("autopilot", Err(why.clone())));
+            }
             Some(Ok(drone)) => {
                 drone.exchange(time);
-                may_send = !drone.is_armed();
+                may_send = drone.is_disarmed();
                 lines.extend(drone.lines(time));
             }
         }

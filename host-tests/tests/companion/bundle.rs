@@ -106,7 +106,7 @@ impl Bench {
         let path = self.path(&format!("{folder}/70-uav-relay.rules"));
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.contains(&format!(
-            "ATTRS{{serial}}==\"{before}\", SYMLINK+=\"uav-relay-shared\""
+            "ENV{{ID_SERIAL_SHORT}}==\"{before}\", SYMLINK+=\"uav-relay-shared\""
         )));
         let text = text.replace(&format!("\"{before}\""), &format!("\"{after}\""));
         std::fs::write(path, text).unwrap();

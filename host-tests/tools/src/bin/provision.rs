@@ -551,10 +551,10 @@ struct FolderOptions {
     /// It has a folder for each drone with its configuration, key, unit, udev rules, autopilot parameters and a page to print, and one for
     /// the ground station. Without a key file a new key is made. With --index only that drone's folder and the ground station's. An existing
     /// folder is never overwritten
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "out_dir", "force", "epoch", "samples", "speed", "in_range", "wires", "rounds", "explore_m"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "out_dir", "force", "epoch", "samples", "speed", "in_range", "wires", "rounds", "explore_m", "baud", "probe_after_ms"])]
     bundle: Option<PathBuf>,
     /// Overwrite blocks that are in that folder
-    #[arg(long, requires = "all")]
+    #[arg(long, requires = "out_dir")]
     force: bool,
 }
 

@@ -171,7 +171,7 @@ impl Bundle<'_> {
                 _ = writeln!(ardupilot, "{name},{value}");
             }
         }
-        let rules = rules(section, &ports);
+        let rules = rules(section, &ports)?;
         let mut files = vec![
             ("drone.toml", 0o644, file.to_string()),
             ("uav-relay.service", 0o644, unit),
@@ -211,7 +211,7 @@ impl Bundle<'_> {
                 "linux_ground --config /etc/uav-relay/ground.toml --stand",
             )
             .replace("uav-relay@%i", "uav-relay-ground");
-        let rules = rules(section, &["tty"]);
+        let rules = rules(section, &["tty"])?;
         let mut page = self.heading("ground station");
         page.push_str(
             "Before flight, while the relays run:\n\
@@ -400,22 +400,32 @@ fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
 }
 
 /// Returns the udev rules for the ports `ports`; those with another name need none.
-fn rules(section: &dyn TableLike, ports: &[&str]) -> String {
+///
+/// # Errors
+/// A name of a port has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.
+fn rules(section: &dyn TableLike, ports: &[&str]) -> Result<String, String> {
     let paths = ports.iter().filter_map(|port| section.get(port)?.as_str());
     let links: Vec<&str> = paths
         .filter_map(|path| path.strip_prefix("/dev/"))
         .collect();
     let mut rules = format!(
         "# Names of the adapters. Replace {FILL_IN}; this command prints it, for the adapter at /dev/ttyUSB0:\n\
-         # udevadm info --attribute-walk /dev/ttyUSB0 | grep --max-count 1 serial\n"
+         # udevadm info --query=property --name=/dev/ttyUSB0 | grep ID_SERIAL_SHORT\n\
+         # Adapters without a serial number of their own: match ENV{{ID_PATH}}, the USB socket, in its place.\n"
     );
     for link in links.iter().filter(|link| link.starts_with(LINK)) {
+        let is_name = |byte: u8| byte.is_ascii_alphanumeric() || b"._-".contains(&byte);
+        if !link.bytes().all(is_name) {
+            return Err(format!(
+                "port /dev/{link}: allowed are letters, digits, '.', '_' and '-'"
+            ));
+        }
         _ = writeln!(
             rules,
-            "SUBSYSTEM==\"tty\", ATTRS{{serial}}==\"{FILL_IN}\", SYMLINK+=\"{link}\""
+            "SUBSYSTEM==\"tty\", ENV{{ID_SERIAL_SHORT}}==\"{FILL_IN}\", SYMLINK+=\"{link}\""
         );
     }
-    rules
+    Ok(rules)
 }
 
 /// Returns the script that installs `program`, its `config` and its unit on the computer.
