@@ -301,7 +301,7 @@ fn a_check_names_planted_faults_of_the_computer() {
     bench.rules("relay2", "A50285BI", FILL_IN);
     statics(
         "",
-        &["70-uav-relay.rules:3: FILL-IN-SERIAL-NUMBER is not replaced"],
+        &["70-uav-relay.rules:4: FILL-IN-SERIAL-NUMBER is not replaced"],
     );
     bench.rules("relay2", FILL_IN, "A50285BI");
     statics("", &[]);
@@ -335,10 +335,23 @@ fn a_check_names_planted_faults_of_the_autopilot() {
             bench.drones[1].order(order);
         }
     };
-    with(&["mute"], &["autopilot   --autopilot"], &["speak"], "");
+    // Nothing is sent to the neighbours before the autopilot says that the drone is disarmed.
+    let [upstream, downstream] =
+        [1, 3].map(|node| format!("relay {node} is received, but sends nothing"));
+    let (upstream, downstream) = (upstream.as_str(), downstream.as_str());
+    with(
+        &["mute"],
+        &["autopilot   --autopilot", upstream, downstream],
+        &["speak"],
+        "",
+    );
     with(
         &["stranger"],
-        &["no frame is from a PX4 or an ArduCopter"],
+        &[
+            "no frame is from a PX4 or an ArduCopter",
+            upstream,
+            downstream,
+        ],
         &["vehicle"],
         "",
     );
