@@ -230,6 +230,8 @@ impl Reporting {
                 return Some((side, to, Message::Report(report)));
             }
         }
+        // What is due without a destination waits for the next event.
+        self.checked = now;
         None
     }
 
