@@ -546,6 +546,18 @@ const AREA: &str = "[geometry]\naltitude_m = 60\naltitude_max_m = 100\nmin_separ
 const FLAT: &str = "[geometry]\ndistance_m = 2000\naltitude_m = 60\n[power]\ntx_w = 5\nuav_w = 1\n\
     [[interferer]]\npower_w = 1\nx_m = 1300\ny_m = 700\n";
 
+/// Runs `cargo provision` for all three relays of `file` in `folder`. Returns true if it succeeds, and its errors.
+fn provision(folder: &Path, file: &str) -> (bool, String) {
+    let options = format!("--scenario {file} --uavs 3 --all --out-dir blocks");
+    let out = Command::new(env!("CARGO_BIN_EXE_provision"))
+        .current_dir(folder)
+        .args(options.split(' '))
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&out.stderr).into_owned();
+    (out.status.success(), errors)
+}
+
 #[test]
 fn the_command_reports_the_area_and_draws_its_map() {
     let folder = tempfile::tempdir().unwrap();
@@ -619,22 +631,9 @@ fn the_command_reports_the_area_and_draws_its_map() {
         );
     }
     // Relays know one position: other tools refuse the file by name.
-    let out = Command::new(env!("CARGO_BIN_EXE_provision"))
-        .current_dir(folder)
-        .args([
-            "--scenario",
-            "area.toml",
-            "--uavs",
-            "3",
-            "--all",
-            "--out-dir",
-            "blocks",
-        ])
-        .output()
-        .unwrap();
-    let line = String::from_utf8_lossy(&out.stderr);
+    let (succeeds, line) = provision(folder, "area.toml");
     assert!(
-        !out.status.success() && line.contains("interferer[0].area") && line.contains("1300.0"),
+        !succeeds && line.contains("interferer[0].area") && line.contains("1300.0"),
         "{line}"
     );
 }
@@ -706,22 +705,9 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         "{text}"
     );
     assert!(!folder.join("out.toml").exists());
-    let out = Command::new(env!("CARGO_BIN_EXE_provision"))
-        .current_dir(folder)
-        .args([
-            "--scenario",
-            "flight.toml",
-            "--uavs",
-            "3",
-            "--all",
-            "--out-dir",
-            "blocks",
-        ])
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&out.stderr);
+    let (succeeds, text) = provision(folder, "flight.toml");
     assert!(
-        !out.status.success() && text.contains("relay 2 is") && text.contains("inside no_fly[0]"),
+        !succeeds && text.contains("relay 2 is") && text.contains("inside no_fly[0]"),
         "{text}"
     );
     // With room beside the line or above the area no way crosses it.
