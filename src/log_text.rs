@@ -169,10 +169,10 @@ mod autopilot {
 
     texts!(Mistrust {
         Mistrust::NoKey => "signs its frames and ignores unsigned ones: give this relay the autopilot's key",
-        Mistrust::SignsOnly => "signs its frames but answers unsigned ones: this relay controls it without a key",
+        Mistrust::SignsOnly => "signs its frames and accepts unsigned ones, too: this relay controls it without a key",
         Mistrust::Unsigned => "does not sign its frames, which are ignored: give it the key, or take the autopilot's key from this relay",
         Mistrust::OtherKey => "signs with another key than this relay has for it, so its frames are ignored: give both the same key",
-        Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check its clock",
+        Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check the autopilot's clock",
     });
 
     impl defmt::Format for AutopilotEvent {

@@ -131,7 +131,7 @@ impl MonotonicClock {
         }
     }
 
-    /// Advances to the caller's time, and returns the internal time.
+    /// Advances the clock to the caller's time, and returns the internal time, which never runs back.
     pub(crate) fn advance(&mut self, now: Instant) -> Instant {
         if now >= self.latest {
             self.internal = self.internal + now.since(self.latest).min(LONGEST);

@@ -285,7 +285,7 @@ impl Companion {
                 tty.baud()
             ),
             (Received::Noise, port) => format!(
-                "the bytes received at {} are not MAVLink 2: {}, and is its protocol there MAVLink 2?",
+                "the bytes received at {} are not MAVLink 2: {}, and does it send MAVLink 2 there?",
                 self.plan.port,
                 match port {
                     Port::Udp(_) => "is that the autopilot's port".to_owned(),
@@ -469,7 +469,7 @@ const fn mistrusted(why: Mistrust) -> &'static str {
     match why {
         Mistrust::NoKey => "signs its frames and ignores unsigned ones: give --autopilot-key-file",
         Mistrust::SignsOnly => {
-            "signs its frames but answers unsigned ones: it is controlled without --autopilot-key-file"
+            "signs its frames and accepts unsigned ones, too: it is controlled without --autopilot-key-file"
         }
         Mistrust::Unsigned => {
             "does not sign its frames, which are ignored: give it the key of --autopilot-key-file, or leave out that option"
@@ -477,7 +477,9 @@ const fn mistrusted(why: Mistrust) -> &'static str {
         Mistrust::OtherKey => {
             "signs with another key than that of --autopilot-key-file, so its frames are ignored: give both the same key"
         }
-        Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check its clock",
+        Mistrust::Old => {
+            "signs with an old timestamp, so its frames are ignored: check the autopilot's clock"
+        }
         _ => "is not trusted",
     }
 }

@@ -41,7 +41,7 @@ const FRACTION: u32 = 31;
 /// estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
-/// Running sums of the interference powers measured at one position; samples are not stored.
+/// Estimator of the mean interference power at one position; samples are summed, not stored.
 ///
 /// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, their effective
 /// number is smaller, and the standard error larger than stated.

@@ -234,7 +234,7 @@ const BEGUN_S: u32 = 60;
 /// The interferer moves. The first minute of a run does not count.
 #[derive(Clone, Debug, Default)]
 pub struct MovingShares {
-    /// Mean ratios of chains that track the interferer, one for each experiment.
+    /// Mean ratios of chains that follow the moving interferer, one for each experiment.
     pub followed: Vec<f64>,
     /// Mean ratios of chains that do not move, one for each experiment. They keep the positions that were best after
     /// the first minute.

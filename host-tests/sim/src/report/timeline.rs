@@ -307,7 +307,7 @@ impl Group {
             }
             "converged" if one.sir.is_none() => {
                 format!(
-                    "spread evenly to measure the interference: {}",
+                    "{} spread evenly to measure the interference",
                     count(self.relays.len())
                 )
             }

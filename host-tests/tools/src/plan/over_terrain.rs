@@ -405,7 +405,7 @@ impl<'a> Search<'a> {
         Some((chain, sir))
     }
 
-    /// Returns the best worst hop of a chain that ends at `to`, and the hop's other end.
+    /// Returns the largest worst-hop SIR of the chains that end at `to`, and the index of the place before.
     fn reached(
         &mut self,
         node: usize,

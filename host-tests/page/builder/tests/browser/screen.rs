@@ -590,7 +590,7 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
         ("button", "Acknowledge all"),
         ("region", "Table of the relays"),
         ("rowheader", "7"),
-        ("columnheader", "SIR in, dB"),
+        ("columnheader", "SIR toward Rx, dB"),
     ] {
         let is_there = nodes.iter().any(|node| {
             node["role"]["value"] == role && node["name"]["value"].as_str() == Some(name)
