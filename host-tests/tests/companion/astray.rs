@@ -90,7 +90,7 @@ fn is_off_a_swapped_line(kind: &str) {
     assert!((1..=3).contains(&texts), "{texts} texts");
     // The drone cannot be engaged: the relay has no position, and no targets are streamed.
     // The log gives the reason, and never reports the drone as ready.
-    let reason = "autopilot: cannot be engaged: the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line";
+    let reason = "autopilot: setpoint control cannot be engaged: the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly the drone nearer to the line";
     apart.relay.wait_for(reason);
     apart.drone.order("mode companion");
     let heard = apart.drone.receive_for(Duration::from_secs(3));

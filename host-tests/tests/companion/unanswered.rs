@@ -22,7 +22,7 @@ impl Unanswered {
         let files = Files::new();
         let socket = files.text("status");
         let mut relay = relay(autopilot, &format!("--status-socket {socket}"));
-        relay.line("autopilot: connected by --autopilot");
+        relay.line("autopilot: opened --autopilot");
         Self { relay, files }
     }
 
