@@ -109,8 +109,12 @@ fn text(event: Event) -> defmt::Str {
             "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
         ),
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
-        Event::MayLeaveTold { .. } => defmt::intern!("may fly away; when it has left, report it as landed (clear-lost)"),
-        Event::MayLeave => defmt::intern!("the chain works without this relay now: this drone may fly away"),
+        Event::MayLeaveTold { .. } => {
+            defmt::intern!("may fly away; when it has left, report to this relay that it is gone")
+        }
+        Event::MayLeave => {
+            defmt::intern!("the chain works without this relay now: this drone may fly away")
+        }
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }
@@ -184,8 +188,12 @@ mod autopilot {
                     "rebooted; setpoint control begins when the pilot chooses OFFBOARD or GUIDED again in the air"
                 ),
                 Self::State(state) => defmt::write!(f, "{}", state),
-                Self::Released(release) => defmt::write!(f, "setpoint control released: {}", release),
-                Self::Waits(reason) => defmt::write!(f, "setpoint control cannot be engaged: {}", reason),
+                Self::Released(release) => {
+                    defmt::write!(f, "setpoint control released: {}", release)
+                }
+                Self::Waits(reason) => {
+                    defmt::write!(f, "setpoint control cannot be engaged: {}", reason)
+                }
                 Self::Ready => defmt::write!(f, "ready: the pilot may choose OFFBOARD or GUIDED"),
                 Self::Refused => defmt::write!(
                     f,

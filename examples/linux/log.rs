@@ -127,9 +127,8 @@ impl Log {
 
     /// Logs that frames are signed, and the epoch, a number that rises at every start.
     pub fn signed(&self, epoch: u32) {
-        let what = format_args!(
-            "frames are signed; epoch {epoch} (start counter, larger at every start)"
-        );
+        let what =
+            format_args!("frames are signed; epoch {epoch} (start counter, larger at every start)");
         self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 

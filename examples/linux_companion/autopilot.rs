@@ -289,8 +289,7 @@ impl Companion {
                 self.plan.port,
                 match port {
                     Port::Udp(_) => "this is the address of the autopilot, which".to_owned(),
-                    Port::Tty(tty) =>
-                        format!("the autopilot's port has {} bit/s", tty.baud()),
+                    Port::Tty(tty) => format!("the autopilot's port has {} bit/s", tty.baud()),
                 }
             ),
             (Received::Others, _) => format!(
@@ -467,7 +466,9 @@ const fn word(state: State) -> &'static str {
 
 const fn mistrusted(why: Mistrust) -> &'static str {
     match why {
-        Mistrust::NoKey => "signs its frames and ignores unsigned frames: give its key with --autopilot-key-file",
+        Mistrust::NoKey => {
+            "signs its frames and ignores unsigned frames: give its key with --autopilot-key-file"
+        }
         Mistrust::SignsOnly => {
             "signs its frames, but accepts unsigned frames: the relay controls it without a key, because there is no --autopilot-key-file"
         }

@@ -57,7 +57,9 @@ impl HoldReasonLog {
             let whom = node.map_or_else(|| "its neighbour".to_owned(), &name);
             let fields = json!({ "node": node, "reason": reason.map(word) });
             let text = match reason {
-                Some(reason) => format!("this drone holds its position: {}", describe(reason, &whom)),
+                Some(reason) => {
+                    format!("this drone holds its position: {}", describe(reason, &whom))
+                }
                 None => format!("this drone no longer waits for {whom}"),
             };
             log.event(now, "waits", fields, text);

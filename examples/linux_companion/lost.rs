@@ -110,7 +110,9 @@ impl Lost {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
             let most = self.relays;
-            return Err(format!("relay {word}: the number of a relay must be within 1 to {most}"));
+            return Err(format!(
+                "relay {word}: the number of a relay must be within 1 to {most}"
+            ));
         };
         if number == self.index {
             return Err(format!(

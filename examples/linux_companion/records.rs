@@ -64,7 +64,9 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
         log.line(
             Instant::ZERO,
             "file",
-            format_args!("{why}; the relay ignores the file and starts with the mission of its options"),
+            format_args!(
+                "{why}; the relay ignores the file and starts with the mission of its options"
+            ),
         );
         false
     })

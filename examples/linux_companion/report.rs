@@ -220,7 +220,9 @@ impl Report {
             }
             Event::MayLeaveTold { .. } => say(
                 "told",
-                format_args!("{name} {toward} may fly away; when it has left, report it as landed (clear-lost)"),
+                format_args!(
+                    "{name} {toward} may fly away; when it has left, send the command `clear-lost` with its number"
+                ),
             ),
             Event::NotHeard { .. } => say(
                 "not heard",

@@ -101,7 +101,9 @@ impl Measurements {
             log.line(
                 now,
                 "measurement",
-                format_args!("no valid measurement of the interference from {name} for {seconds} s"),
+                format_args!(
+                    "no valid measurement of the interference from {name} for {seconds} s"
+                ),
             );
         }
         let newest_w = self.newest_w.take_if(|_| self.next_at <= now)?;

@@ -129,7 +129,7 @@ fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     let said = format!("the drone is {:.0} km from", away_m / 1e3);
     assert!(line.contains(&said), "{said} is not in {line}");
     assert!(
-        line.contains("are these the sites (Tx and Rx) of this flight"),
+        line.contains("check the mission's sites (positions of Tx and Rx)"),
         "{line}"
     );
     assert_eq!(apart.position()["sites_look_swapped"], false);

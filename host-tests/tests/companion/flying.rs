@@ -227,9 +227,9 @@ fn an_arducopter(key: Option<&str>) {
 
     // The cable is loose for seconds: the mode is the same, but no pilot has chosen it since.
     falls_silent(&mut flight);
-    flight
-        .relay
-        .line("autopilot: setpoint control cannot be engaged: the autopilot was in OFFBOARD or GUIDED");
+    flight.relay.line(
+        "autopilot: setpoint control cannot be engaged: the autopilot was in OFFBOARD or GUIDED",
+    );
     assert!(flight.targets_for(MOMENT).is_empty(), "it was not chosen");
     flight.drone.order("sticks 0 0");
     flight.drone.order("mode pilot");

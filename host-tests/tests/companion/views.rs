@@ -124,8 +124,8 @@ fn a_useless_view_file_is_named_and_prevents_the_flight() {
         (Vec::new(), is_damaged),
         (
             other,
-            "the record of votes was written by a relay that was loaded with another mission: for a new flight remove the file, and start again; in the same \
-             flight start the relay with the mission that it had",
+            "the record of votes was written by a relay that was loaded with another mission. Before a new flight, delete this file and start again. In the same \
+             flight, start the relay with the mission that it had before",
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();
