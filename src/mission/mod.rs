@@ -148,7 +148,7 @@ pub enum MissionError {
 }
 
 error_texts!(MissionError {
-    Relays => "relays must be within 1 to 1000",
+    Relays => "the number of relays must be within 1 to 1000",
     Distance => "distance_m must be within 1 to 1e6",
     Separation => "min_separation_m must be within 0 to 1e5",
     TooManyForDistance => "(relays - 1) x min_separation_m must be at most distance_m",

@@ -119,7 +119,7 @@ impl fmt::Display for Problem {
             Self::OtherBandwidth => "contradicts noise.bandwidth_hz",
             Self::ContainsSite => "contains a site",
             Self::NeedsArea => "needs an area",
-            Self::NoArea => "is not an area",
+            Self::NoArea => "is not a valid area",
             Self::Unsorted => "is not in increasing order",
         })
     }

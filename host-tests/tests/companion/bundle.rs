@@ -296,7 +296,7 @@ fn a_check_names_planted_faults_of_the_computer() {
     let upload = bench.files.write("upload", "damaged");
     statics(
         &format!("--upload-file {upload}"),
-        &["is damaged, or not an uploaded mission"],
+        &["the file is damaged, or not an uploaded mission"],
     );
     bench.rules("relay2", "A50285BI", FILL_IN);
     statics(

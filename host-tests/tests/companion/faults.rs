@@ -57,7 +57,7 @@ const SCRIPT: [&[Fault]; 14] = [
             "refuse",
             5,
             "warning relay # does not fly to its setpoint",
-            "flies to another target",
+            "flies to a target other than the setpoint",
         ),
     ],
     &[

@@ -20,7 +20,7 @@ use crate::log::{self, Line};
 /// First log lines of every image. They report that the emulated chip has no reset cause and no PLL.
 pub(crate) const OF_THE_CHIP: [&str; 2] = [
     "started, cause of the reset: unknown",
-    "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be off by 8 %",
+    "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be wrong by 8 %",
 ];
 
 /// Timeout of any step of a test with emulated drones. Each drone adds `PATIENCE_A_DRONE`.

@@ -169,7 +169,7 @@ fn best(
         }
         None if relays > MOST_SEARCHED => {
             return Err(NoPlan::Wrong(format!(
-                "--uavs {relays}: with interferer.area or [[no_fly]] the search is for 1 to {MOST_SEARCHED} relays, except for relays at one altitude, one direction and no no-fly areas"
+                "--uavs {relays}: must be within 1 to {MOST_SEARCHED} with interferer.area or [[no_fly]]; more relays are possible only at one common altitude, with traffic in one direction and without [[no_fly]]"
             )));
         }
         None => {

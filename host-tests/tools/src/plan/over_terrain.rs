@@ -454,7 +454,7 @@ pub fn best(
 ) -> Result<Plan, NoPlan> {
     if relays > MOST_RELAYS {
         return Err(NoPlan::Wrong(format!(
-            "--altitude terrain: must be with --uavs 1 to {MOST_RELAYS}, not {relays}"
+            "--altitude terrain: needs --uavs within 1 to {MOST_RELAYS}, not {relays}"
         )));
     }
     let scene = Scene::new(scenario, relays).ok_or_else(|| {
