@@ -839,7 +839,8 @@ impl PendingReports {
         self.measurements == 0
     }
 
-    /// Schedules the last report again for the relay at `distance`, which may have restarted and lost it.
+    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. That relay may have restarted, and
+    /// has then lost the report.
     pub(super) fn schedule(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.pending |= bit(distance);

@@ -48,8 +48,8 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the claim was certainly sent after this relay's start. It then names this relay's claim number, or is
-    /// signed.
+    /// True if the other node certainly sent the claim after this relay's start. The proof is this relay's own claim number in the message,
+    /// or a signature.
     pub(crate) is_current: bool,
 }
 

@@ -59,7 +59,7 @@ fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     assert_eq!(at, 1.0, "{what}: {slots:?}");
 }
 
-/// Checks the lengths of the slots against the times of the hops by the true SINRs.
+/// Checks that each time slot is as long as its hop needs. The time that a hop needs for its data follows from its true SINR.
 fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
     let places: Vec<Placement> = solved.iter().map(|(at, _)| *at).collect();
     let time = case.time(&places);

@@ -322,8 +322,8 @@ pub enum AutopilotEvent {
         /// MAVLink address of the sender of the command.
         from: Address,
     },
-    /// Denied command of the operator, which reports lost relays as landed. It does not name exactly the lost relays
-    /// of one side.
+    /// The link denied an operator's command that reports lost relays as landed. The reason: the command does not name exactly all lost
+    /// relays of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: [u16; MOST],

@@ -434,7 +434,8 @@ impl Default for Echo {
 }
 
 impl Echo {
-    /// Derives the tag of this link's TIMESYNC requests from `seed`.
+    /// Sets the number that marks this link's TIMESYNC requests, derived from `seed`. By this number the link recognises the replies to its
+    /// own requests.
     pub(super) const fn seed(&mut self, seed: u32) {
         self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
     }

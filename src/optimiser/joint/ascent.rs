@@ -155,7 +155,7 @@ impl Ascent {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the spare length at Rx.
+    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the chain's slack (see there).
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
@@ -290,8 +290,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the action after a trial that did not improve the chain. It is a smaller fraction of the moves, or a
-    /// smaller limit of them.
+    /// Returns the next action after a trial that did not improve the chain. The next trial makes a smaller fraction of the computed moves.
+    /// After the smallest fraction the moves are computed anew, with a lower maximum length of each move.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();

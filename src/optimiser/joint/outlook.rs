@@ -164,8 +164,8 @@ pub(crate) struct Policy {
     pub(super) rising: bool,
     /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
-    /// Additional move of the relay in each free coordinate per metre of the sending relay's move. That is in x, y
-    /// and h.
+    /// Change of the relay's move in each of its free coordinates, per metre of the sender's move. The three numbers of a triple belong to
+    /// the sending relay's move along x, y and h.
     pub(super) follow: [Triple; 2],
 }
 

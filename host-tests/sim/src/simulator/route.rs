@@ -324,7 +324,8 @@ pub struct Route {
     /// Periods with a constant view, state of the chain and promised data rate, in order of time. A view is a
     /// membership of the chain. At least one.
     pub periods: Vec<Period>,
-    /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
+    /// Data rates that the planner's formula gives at the first agreed positions, bit/s. First the rate from Tx to Rx; second, for data
+    /// both ways, the rate from Rx to Tx.
     pub promised_bps: Vec<f64>,
 }
 
@@ -586,7 +587,8 @@ pub fn route(
 }
 
 impl Route {
-    /// Adds `stage`, with the hops between `members`, to the route, unless there is no agreement yet.
+    /// Adds `stage`, a period in which no hop changes, to the route. The stage gets the hops between the relays `members`. Does nothing
+    /// before the first agreement on positions.
     fn add(
         &mut self,
         mut stage: Stage,

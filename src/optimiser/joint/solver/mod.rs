@@ -121,9 +121,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for the best chain's
-    /// highest target starts there, so that the improvement is not repeated. `None` if a repetition would give
-    /// another chain.
+    /// Target, as ln(SIR), at which the improvement of the best chain ended. The last search starts from this target and need not improve
+    /// the chain again. `None` if the improvement was stopped early, because the target is then not final.
     best_judged: Option<f32>,
     /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
     /// before the end, and if the improvement was cut short.
