@@ -118,8 +118,8 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends a relay's index to the message: mostly that of a relay in a short chain, 0 to 5, else any.
-    /// Appends the end of a lease renewal: `in_place`, and the nodes that leave and join unless both are 0.
+    /// Appends the last part of a lease renewal to the message. That part is the flag `in_place` and, in half of the messages, the nodes
+    /// that leave and join, not both 0.
     pub(super) fn renewal_nodes(&mut self) {
         self.small(0, 1);
         if self.small(0, 1) == 1 {

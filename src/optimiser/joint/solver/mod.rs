@@ -82,7 +82,7 @@ enum Purpose {
     Start,
     /// The search raises the target as far as the current chain meets it without moves of its relays.
     Raise,
-    /// The work computes the chain's spare length at Rx again, after the cap on this length was lowered.
+    /// The chain's slack is computed again, after the cap on the slack was lowered.
     Tighten,
     /// The search finds the highest target of an improved chain, with the improvement's margins. It does not compute
     /// hops as the relays do.
