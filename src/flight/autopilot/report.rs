@@ -302,9 +302,9 @@ pub enum AutopilotEvent {
     Waits(WaitReason),
     /// The pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,
-    /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
+    /// The autopilot refuses the target: for 3 s it has reported another target than the sent one.
     ///
-    /// The sent position is outside the autopilot's own fence, or another companion sends targets to it.
+    /// The sent position is outside the autopilot's own fence, or another companion sends targets to the same autopilot.
     Refused,
     /// Report of the autopilot that the drone is outside of the autopilot's fence.
     FenceBreached,
@@ -312,8 +312,8 @@ pub enum AutopilotEvent {
     /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
     /// s in the air.
     OffLine(OffLine),
-    /// Accepted command of the operator that clears the lost relays of one side, because they have landed. It came
-    /// over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
+    /// The link accepted an operator's command that reports the lost relays of one side as landed. The command came over MAVLink.
+    /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
     LostCleared {
         /// Side of this relay whose lost relays have landed.
         side: Side,

@@ -24,7 +24,7 @@ pub struct RelayState {
     ///
     /// Each relay draws a random number for the session with its neighbour.
     pub association: u16,
-    /// Number in the tested relay's last hello, which a mission offer has to repeat; 0 for none.
+    /// Number in the last hello of the tested relay; 0 for none. A mission offer to this relay must repeat the number.
     pub offer_number: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
@@ -212,10 +212,8 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission.
-    ///
-    /// It is the newest mission that the tested relay has stored, the one loaded into the relay before flight, or
-    /// another one, which is newer, older or arbitrary.
+    /// Returns version and digest of a mission: the tested relay's newest stored mission, the mission loaded into that relay before flight,
+    /// or another mission. The other mission has a newer, an older or an arbitrary version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {

@@ -41,7 +41,7 @@ pub const SECOND: f64 = 1e12;
 /// Longest time that a hop may take for one packet, ps: 1000 s. A slower hop counts as broken.
 const SLOWEST: f64 = 1e15;
 
-/// Distance, m, that a drone has to move before its new position is recorded.
+/// Distance, m, by which a drone must have moved before its new position is recorded.
 const MOVED_M: f64 = 0.1;
 
 /// Distance of a drone from its agreed position, m, below which it has arrived.
@@ -95,7 +95,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Records the state of relay `relay` (from 0) at time `at`, unless it is like the last recorded one.
+    /// Records the state of relay `relay` (from 0) at time `at`, if it differs from the relay's last recorded state.
     pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
         let known = self.latest.get(&relay);
         if known.is_none_or(|known| !known.is_like(&state)) {
@@ -441,7 +441,7 @@ pub struct DataLink {
 }
 
 impl DataLink {
-    /// Returns the time of one packet on a hop of this data rate; `None` if the hop carries no data.
+    /// Returns the transmission time of one packet on a hop with the data rate `rate_bps`, ps. `None` if the hop carries no data.
     fn packet(&self, rate_bps: f64) -> Option<Ps> {
         let time = self.packet_bits / rate_bps * SECOND;
         #[expect(
