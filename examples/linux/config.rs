@@ -22,7 +22,7 @@ const TOLERANCE: f64 = 1e-4;
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Parameters of the channel (path loss) in the file; `None` for the default channel, that of the paper.
+    /// Path-loss parameters of the channel in the file; `None` for the default channel, that of the paper.
     pub channel: Option<Channel>,
     /// Distribution of the interference along x given by the file, if any.
     pub field: Option<Interference>,

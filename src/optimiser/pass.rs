@@ -57,7 +57,7 @@ impl Behind {
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
-    /// Relay from which the pass arrives; `None` for the first relay, which is next to Tx or Rx.
+    /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
     pub index: u16,
@@ -306,8 +306,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the one before it on the pass. That relay
-    /// may be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x, m, up to `most_m`, at which this relay receives the previous relay of the pass. The previous relay may be
+    /// anywhere up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -433,8 +433,8 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// to Rx. It is below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the target that the relays commit to. They then take their positions
-    /// for it. `None` if the search goes on.
+    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
+    /// goes on.
     pub commit: Option<u8>,
     /// Slack of the chain for each target that every hop can meet, m. It is 0 or more if the chain meets the target.
     pub slacks: PerTarget,

@@ -350,7 +350,7 @@ struct StandTrials {
     /// Highest target that all relays accepted, with the list of targets (ladder) that proposes it again. `None`
     /// before the first.
     best: Option<(f32, Ladder)>,
-    /// True once the bisection has ended, and its best target is the one to keep.
+    /// True once the bisection has ended. The best target found is then the result.
     over: bool,
 }
 

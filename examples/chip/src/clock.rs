@@ -303,7 +303,7 @@ mod tests {
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
     }
 
-    /// Returns the clock frequencies that [`start`] should reach on this hardware with the simulated `faults`.
+    /// Returns the clock frequencies that [`start`] should reach on `hardware` with the simulated `faults`.
     fn expected(hardware: &ClockHardware, faults: Faults) -> Clocks {
         let is_crystal =
             !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;

@@ -609,7 +609,7 @@ fn a_withheld_offer_is_refused_and_the_new_one_flown() {
     }
 }
 
-/// Checks that a relay accepts a mission offer that an attacker has delayed for less than the time limit.
+/// Checks that a relay accepts a mission offer if an attacker delays it by less than the time limit.
 #[test]
 fn an_offer_without_delay_is_accepted() {
     let base = mission(4);

@@ -27,7 +27,7 @@ fn golden() -> Vec<Frame> {
     Vectors::load().unwrap().frames
 }
 
-/// Returns corpus inputs for the target `deframe`: the test vectors, and three vectors with noise between them.
+/// Returns corpus inputs for the target `deframe`: test vectors, with and without noise between them.
 ///
 /// Each input begins with two lengths, bytes. The rest of the input is cut into pieces of these two lengths in turn.
 fn deframe() -> Vec<Vec<u8>> {

@@ -10,8 +10,8 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// Initial limit of a relay's move in one iteration of the joint method. It is a fraction of the relay's distance
-/// from the interferer. The same number limits the change of ln(target SIR).
+/// First limit of a relay's move in one iteration of the joint method. The unit is the relay's distance from the interferer. The same
+/// number limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
 /// Minimum limit of a relay's move at which the final target SIR of a chain's improvement is predicted. A smaller

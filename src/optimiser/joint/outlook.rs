@@ -279,7 +279,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// Compressed [`Policy`] (a relay's move). Three digits of each derivative are stored, which is sufficient.
+/// Compressed [`Policy`] (a relay's move). Each derivative is stored with three decimal digits, which is accurate enough.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,

@@ -212,8 +212,8 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission: the tested relay's newest stored mission, the mission loaded into that relay before flight,
-    /// or another mission. The other mission has a newer, an older or an arbitrary version.
+    /// Returns version and digest of a mission. The mission is the newest one stored by the tested relay, the one loaded into that relay
+    /// before flight, or another one with a newer, older or arbitrary version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {

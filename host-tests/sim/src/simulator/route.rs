@@ -95,7 +95,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Records the state of relay `relay` (from 0) at time `at`, if it differs from the relay's last recorded state.
+    /// Records the state of relay `relay` (from 0) at time `at`. Does nothing if the state equals the relay's last recorded state.
     pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
         let known = self.latest.get(&relay);
         if known.is_none_or(|known| !known.is_like(&state)) {

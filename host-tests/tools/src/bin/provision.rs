@@ -514,7 +514,7 @@ struct Options {
     /// as lost. By default those of the scenario's section `network`, or 5000. Larger values let a slow channel carry more relays
     #[arg(long, value_name = "MS", value_parser = whole(1, MAX_PROBE_AFTER_MS))]
     probe_after_ms: Option<u32>,
-    /// Number of relays on the channel that receive each other, 1 to 1000; by default all relays
+    /// Number of relays within range of each other on the channel, 1 to 1000; by default all of them
     #[arg(long, value_name = "K", value_parser = whole::<u16>(1, 1000))]
     in_range: Option<u16>,
     /// Neighbours are connected by wires, without a shared channel
@@ -527,8 +527,7 @@ struct Options {
     /// key the messages between the two are not signed
     #[arg(long, value_name = "FILE")]
     autopilot_key_file: Option<PathBuf>,
-    /// Accept positions planned for one hypothetical interferer in place of several real ones. Without this option, positions that lose
-    /// more than 1 % of the best SIR are refused
+    /// Accept that relays plan with one hypothetical interferer instead of several real ones. Without this option a loss of more than 1 % of the best SIR is refused
     #[arg(long)]
     stand_in: bool,
     /// File to write the block to

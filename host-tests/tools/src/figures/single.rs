@@ -211,7 +211,7 @@ fn gains(
         .collect())
 }
 
-/// Returns the mean of a quantity (`reading`: SIR, dB or rate) for four positions of the relay at one altitude.
+/// Returns a mean value (`reading`: SIR, dB or rate) for four positions of the relay at one altitude.
 ///
 /// The positions are the best one, a random one, the best one without interference, and the middle of the line.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {

@@ -70,7 +70,7 @@ struct Search<'a> {
     grid: Vec<f64>,
     /// Width of a cell of the line, m.
     width: f64,
-    /// Upper limit on the time that a chain may need for one bit, in s Hz: the time in s for a bandwidth of 1 Hz.
+    /// Upper limit on a chain's time for one bit, s Hz: the time in s for a bandwidth of 1 Hz.
     below: f64,
 }
 
@@ -398,7 +398,7 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the start, m, of the interval of x that ends at `point` and contains no better position than `point`.
+    /// Returns the start, m, of the interval of x that ends at `point` without a better position.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

@@ -127,11 +127,10 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
     /// before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was cut short. It is if the chain is not expected to become the
-    /// best. If true, a repetition gives the same chain, so it can be omitted.
+    /// True if the current chain's improvement ran to its end. False if it was stopped early, because the chain was not expected to become
+    /// the best one.
     is_whole: bool,
-    /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
-    /// relays try other positions.
+    /// True in the last phase, which improves the best chain: a finer search for its highest target, and other positions of single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
