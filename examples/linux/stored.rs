@@ -225,7 +225,7 @@ impl StoredFile {
         self.ended.as_fd()
     }
 
-    /// Returns the number of successful writes of the record file.
+    /// Passes the newest record of votes to the writer thread. Does nothing while that thread is writing.
     pub const fn writes(&self) -> u64 {
         self.writes
     }

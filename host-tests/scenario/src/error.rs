@@ -76,7 +76,7 @@ pub enum Problem {
     DuplicateRelay,
     /// A `[[relay]]` table is useless: it gives the relay neither an altitude nor a power of its own.
     NothingDiffers,
-    /// The given distance between Tx and Rx contradicts the one computed from their geographic positions.
+    /// The distance from Tx to Rx in the file differs from the distance between their geographic positions.
     OtherDistance,
     /// The values of a list are not in increasing order.
     Unsorted,

@@ -84,7 +84,7 @@ fn f32_bits(value: &Value) -> u32 {
     (value.as_f64().unwrap() as f32).to_bits()
 }
 
-/// Starts two relays on one channel with a station at Tx (tty 2), and room for one at Rx (tty 3).
+/// Starts two relays and the ground station at Tx (tty 2) on one radio channel. The channel has a free tty (3) for a station at Rx.
 fn chain_with_page() -> (Chain, Relay, Page) {
     let mut chain = Chain::on_channel(2, Medium::new(4, QUIET));
     for index in [1, 2] {

@@ -10,7 +10,7 @@ use crate::process::Relay;
 /// Part of the companion's log line about a drone far from its line: the suggested cause.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
-/// Test scene: a drone, and its relay, which has positions of Tx and Rx far from the drone.
+/// Test scene: a drone, and its relay. The positions of Tx and Rx in the relay's settings are far from the drone.
 struct Apart {
     drone: Peer,
     relay: Relay,

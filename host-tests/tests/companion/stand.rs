@@ -16,7 +16,7 @@ use crate::files::{Files, status_of, until, write};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
 
-/// Returns the options of relay or ground station `tty`. Three relays and two stations are on one channel.
+/// Returns the command-line options of the relay or ground station at `tty`. Three relays and two stations share one channel.
 fn common(field: &Chain, tty: usize) -> String {
     let socket = field.files.text(&format!("status{tty}"));
     let signed = field.files.signed("key", &format!("epoch{tty}"));

@@ -12,7 +12,7 @@ use crate::chain::{Chain, QUICK, simulated};
 use crate::medium::{Medium, QUIET};
 use crate::process::Relay;
 
-/// Returns a chain of three relays on one channel that notices the loss of a relay quickly.
+/// Returns a chain of three relays on one channel, with short timeouts. The loss of a relay is therefore noticed soon.
 fn channel() -> Chain {
     Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK)
 }

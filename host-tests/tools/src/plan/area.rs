@@ -44,7 +44,7 @@ const ROUNDS: u32 = 8;
 /// Factor on the SIR of a hop whose way crosses a no-fly area: other chains come first.
 const CROSSING: f64 = 1e-30;
 
-/// Depth in a no-fly area, and length of a way in it, that is rounding, m.
+/// Tolerance for rounding, m: depth in a no-fly area, or length of a path in it, that does not count.
 const ROUNDING_M: f64 = 0.01;
 
 /// Number of x, y and altitudes of the first grid, where they are free.
