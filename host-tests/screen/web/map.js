@@ -42,6 +42,14 @@ const GRIP = 22;
 /** Age from which the map shows it beside a relay, s. */
 const SHOWN_AGE = 2;
 
+/** Age from which a place is marked, because the relay may be elsewhere by now, s. */
+const BEHIND = 10;
+
+/** Returns the age of a relay's place that may be behind, s; null if it is newer. It has grown by `silence` seconds. */
+function behindFor({ position, age_s: age }, silence) {
+  return position && typeof age === "number" && age + silence >= BEHIND ? age + silence : null;
+}
+
 /** Returns the largest of 1, 2 or 5 times a power of ten that is at most `most`. */
 function round125(most) {
   const power = 10 ** Math.floor(Math.log10(most));
@@ -483,13 +491,18 @@ class ChainMap {
     this.write(name, x, y - 18, "site", true);
   }
 
-  relay({ condition }, [x, y], crowded) {
+  relay(relay, [x, y], crowded) {
     const { pen } = this;
+    const { condition } = relay;
     const [lost, fault] = [condition === "lost", condition === "fault"];
     const radius = crowded ? 4 : 10;
     pen.beginPath();
     if (fault) pen.rect(x - radius, y - radius, 2 * radius, 2 * radius);
     else pen.arc(x, y, radius, 0, 2 * Math.PI);
+    // No hop is seen through a faded symbol.
+    pen.fillStyle = this.colours.paper;
+    pen.fill();
+    if (behindFor(relay, this.silence) !== null) pen.globalAlpha = 0.4;
     pen.fillStyle = this.colours[condition === "normal" ? "relay" : fault ? "poor" : "paper"];
     pen.fill();
     pen.strokeStyle = this.colours[lost || fault ? "poor" : "relay"];
@@ -497,27 +510,30 @@ class ChainMap {
     pen.setLineDash(lost ? [3, 2] : []);
     pen.stroke();
     pen.setLineDash([]);
+    pen.globalAlpha = 1;
     this.taken.push([x, y, radius, radius - 2]);
   }
 
-  label({ number, condition, age_s: age }, [x, y], crowded) {
+  label(relay, [x, y], crowded) {
     const { pen } = this;
+    const { number, condition, age_s: age } = relay;
+    const isBehind = behindFor(relay, this.silence) !== null;
     const bad = condition === "lost" || condition === "fault";
     const colour = bad ? "poor" : "relay";
     const old = typeof age === "number" && age + this.silence >= SHOWN_AGE ? `${(age + this.silence).toFixed(0)} s ago` : "";
-    const words = [bad ? condition : "", bad || !crowded ? old : ""].filter(Boolean).join(", ");
+    const words = [bad ? condition : "", bad || isBehind || !crowded ? old : ""].filter(Boolean).join(", ");
     if (!crowded) {
       pen.font = "600 11px system-ui, sans-serif";
       pen.textAlign = "center";
       pen.textBaseline = "middle";
-      pen.fillStyle = this.colours[condition === "normal" || condition === "fault" ? "paper" : colour];
+      pen.fillStyle = this.colours[isBehind ? "ink" : condition === "normal" || condition === "fault" ? "paper" : colour];
       pen.fillText(String(number), x, y + 0.5);
       pen.font = "12px system-ui, sans-serif";
     }
     const text = crowded ? `${number} ${words}`.trim() : words;
     if (!text) return;
     // The text is moved up until there is room for it: that of a fault more than others, and none among many relays.
-    const steps = bad ? 4 : this.snapshot.relays.length > FEW ? 1 : 3;
+    const steps = bad || isBehind ? 4 : this.snapshot.relays.length > FEW ? 1 : 3;
     const free = [0, 15, 30, 45].slice(0, steps).some((up) => this.write(text, x, y - (crowded ? 14 : 20) - up, colour));
     if (bad && !free) this.write(text, x, y - 14, colour, true);
   }

@@ -38,13 +38,14 @@ function off({ position, agreed }) {
 function row(relay, hop, silence) {
   const place = relay.position || {};
   const lost = relay.lost_neighbours.map((it) => `does not receive relay ${it}`);
-  const remarks = [relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
+  const behind = behindFor(relay, silence);
+  const remarks = [behind === null ? "" : `position may be behind: ${behind.toFixed(0)} s old`, relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
   const db = hop ? hopDb(hop) : null;
   const age = typeof relay.age_s === "number" ? relay.age_s + silence : null;
   return {
     kind: relay.condition || "",
     cells: [String(relay.number), relay.control || "–", relay.phase || "–", sirText(hop?.sir_db, hop?.measured_db), sirText(hop?.sir_back_db, hop?.measured_back_db), number(off(relay), 1), number(place.x_m, 1), number(place.y_m, 1), number(place.altitude_m, 1), number(age, 1), remarks],
-    kinds: { 3: sirClass(db), 4: sirClass(hop ? backDb(hop) : null), 9: age >= OLD ? "old" : "" },
+    kinds: { 3: sirClass(db), 4: sirClass(hop ? backDb(hop) : null), ...(behind === null ? {} : { 6: "behind", 7: "behind", 8: "behind" }), 9: age >= OLD ? "old" : "" },
   };
 }
 

@@ -250,6 +250,71 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
+/// JavaScript that returns the opacity of a relay's symbol as drawn: that of the colours near its upper edge, from 0 to 1.
+const OPACITY: &str = "(number) => { map.draw(); const { position } = map.snapshot.relays.find((it) => it.number === number); \
+    const [x, y] = map.pixels(position.x_m, position.y_m); const part = (colour) => parseInt(colour.slice(1, 3), 16); \
+    const red = map.pen.getImageData(Math.round(x), Math.round(y) - 7, 1, 1).data[0]; \
+    return (255 - red) / (255 - part(map.colours.relay)); }";
+
+#[test]
+fn a_position_older_than_ten_seconds_is_marked_in_the_table_and_faded_on_the_map() {
+    let shown = Shown::begin(|| {
+        let mut snapshot = full(5, 0.0);
+        snapshot.relays[0].age_s = Some(9.4);
+        snapshot.relays[1].age_s = Some(12.3);
+        snapshot.relays[1].hold_reason = Some("relay 1 has not made room yet".to_owned());
+        snapshot.relays[2].age_s = Some(40.0);
+        snapshot.relays[2].position = None;
+        snapshot
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(6));
+    let remarks = |browser: &mut Browser, at: u8| {
+        browser.text(&format!(
+            "byId('rows').children[{at}].lastChild.textContent"
+        ))
+    };
+    assert_eq!(
+        [0, 1, 2].map(|at| remarks(&mut browser, at)),
+        [
+            "",
+            "position may be behind: 12 s old; waits: relay 1 has not made room yet",
+            ""
+        ]
+    );
+    let marked = "[...document.querySelectorAll('td.behind')].map((it) => it.textContent).join()";
+    let own = "[6, 7, 8].map((at) => byId('rows').children[1].children[at].textContent).join()";
+    let [marked, own] = [marked, own].map(|it| browser.text(it));
+    assert_eq!(marked, own);
+    let texts = written(&mut browser);
+    assert!(
+        texts.contains("12 s ago") && !texts.contains("40 s ago"),
+        "{texts}"
+    );
+    save("behind", &browser.screenshot());
+    let opacity = |browser: &mut Browser, relay| number(browser, &format!("({OPACITY})({relay})"));
+    let [new, behind] = [1, 2].map(|relay| opacity(&mut browser, relay));
+    assert!(
+        new > 0.95 && (0.3..0.5).contains(&behind),
+        "{new}, {behind}"
+    );
+    // An age grows while no snapshot arrives.
+    drop(shown);
+    browser.until("byId('connection').className === 'broken'");
+    assert!(remarks(&mut browser, 0).starts_with("position may be behind: 1"));
+    assert!(opacity(&mut browser, 1) < 0.5);
+    // Among a hundred relays without room for numbers, the age is beside the symbol, too.
+    let many = Shown::begin(|| {
+        let mut snapshot = full(100, 0.0);
+        snapshot.relays[49].age_s = Some(15.0);
+        snapshot
+    });
+    let mut browser = many.opened(1280, 900);
+    browser.until(&shows(101));
+    assert!(written(&mut browser).contains("50 15 s ago"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
 #[test]
 fn only_alarms_that_last_sound_and_are_in_the_title() {
     let alarm = |number, urgency, cleared_s| Alarm {
