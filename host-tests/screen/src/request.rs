@@ -9,7 +9,9 @@
 //! (CORS) that no answer gives.
 
 use std::fmt;
+use std::hash::{BuildHasher as _, RandomState};
 use std::net::{IpAddr, SocketAddr};
+use std::sync::LazyLock;
 
 /// Largest size of a request, bytes.
 pub(crate) const MAX_REQUEST: usize = 8 * 1024;
@@ -20,9 +22,25 @@ const MAX_BODY: usize = 4 * 1024;
 /// Largest number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// Content security policy of the page: its own files, and nothing else.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
-                      form-action 'none'; frame-ancestors 'none'";
+/// Content security policy of the page: its own files, the style inside of it, and nothing else.
+static POLICY: LazyLock<String> = LazyLock::new(|| {
+    format!(
+        "default-src 'none'; script-src 'self'; style-src 'nonce-{}'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
+         form-action 'none'; frame-ancestors 'none'",
+        *NONCE
+    )
+});
+
+/// Random text that marks the page's own style.
+static NONCE: LazyLock<String> =
+    LazyLock::new(|| format!("{:016x}", RandomState::new().hash_one(0)));
+
+/// Page with its style inside, so that the first paint does not wait for another request.
+static PAGE: LazyLock<String> = LazyLock::new(|| {
+    let [(_, _, page), (_, _, style), ..] = FILES;
+    let style = format!("<style nonce=\"{}\">\n{style}</style>", *NONCE);
+    page.replacen("<link rel=\"stylesheet\" href=\"/screen.css\">", &style, 1)
+});
 
 /// Files of the page: path, media type and content. The path of the page itself is `/`.
 pub const FILES: [(&str, &str, &str); 7] = [
@@ -222,9 +240,13 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access
         return Answer::Events;
     }
     let file = FILES.iter().find(|(name, ..)| *name == path);
-    file.map_or(Answer::Refused(404, "Not Found"), |(_, media, content)| {
-        Answer::File(media, content)
-    })
+    file.map_or(
+        Answer::Refused(404, "Not Found"),
+        |(path, media, content)| {
+            let content = if *path == "/" { &**PAGE } else { content };
+            Answer::File(media, content)
+        },
+    )
 }
 
 /// Returns true if an `Authorization` header has the password, with any user name.
@@ -312,8 +334,9 @@ fn written(status: u16, reason: &str, media: &str, length: Option<usize>) -> Str
     };
     format!(
         "HTTP/1.1 {status} {reason}\r\nContent-Type: {media}\r\n{length}{more}Connection: close\r\nCache-Control: no-store\r\n\
-         Content-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
-         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n"
+         Content-Security-Policy: {}\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
+         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n",
+        *POLICY
     )
 }
 

@@ -169,6 +169,10 @@ byId("farther").addEventListener("click", () => map.zoom(1 / 1.4));
 byId("fit").addEventListener("click", () => map.fit());
 if (!isRecorded) {
   setInterval(connection, 500);
-  // All scripts have run then.
-  document.addEventListener("DOMContentLoaded", connect);
+  // The first snapshot is drawn after the first paint of the page. A hidden page is not painted.
+  const begin = () => received.source || connect();
+  document.addEventListener("DOMContentLoaded", () => {
+    requestAnimationFrame(() => setTimeout(begin));
+    setTimeout(begin, 500);
+  });
 }

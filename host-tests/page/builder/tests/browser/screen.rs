@@ -603,24 +603,39 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
     println!("pictures took {:?}", start.elapsed());
 }
 
+/// Returns the times of the first paint, ms, of `loads` loads of `url` in a browser that is already running.
+fn first_paints(browser: &mut Browser, url: &str, loads: usize) -> Vec<f64> {
+    let paint =
+        "performance.getEntriesByType('paint').find((it) => it.name === 'first-contentful-paint')";
+    let paints = (0..loads).map(|_| {
+        browser.open("about:blank");
+        browser.open(url);
+        browser.until(&format!("location.protocol === 'http:' && {paint}"));
+        number(browser, &format!("{paint}.startTime"))
+    });
+    let mut paints: Vec<f64> = paints.collect();
+    paints.sort_by(f64::total_cmp);
+    paints
+}
+
+#[test]
+fn the_first_paint_comes_within_a_tenth_of_a_second() {
+    let shown = shown_full(100);
+    let mut browser = Browser::start("about:blank", 1920, 1080);
+    // The first load of a browser starts its processes.
+    first_paints(&mut browser, &shown.screen.url(), 1);
+    let bare = first_paints(&mut browser, &format!("{}none", shown.screen.url()), 15);
+    let paints = first_paints(&mut browser, &shown.screen.url(), 15);
+    println!("first paints of a line of text: {bare:.0?} ms; of the page: {paints:.0?} ms");
+    // On a busy machine a line of text alone takes long: then the page may take four times as long.
+    let limit = f64::max(100.0, 4.0 * bare[0]);
+    assert!(paints[0] < limit, "{paints:?}, a line of text: {bare:?}");
+}
+
 #[test]
 fn a_hundred_relays_are_drawn_ten_times_a_second() {
     let shown = shown_full(100);
-    let mut browser = Browser::start("about:blank", 1920, 1080);
-    thread::sleep(Duration::from_secs(1));
-    let mut paints: Vec<f64> = (0..7)
-        .map(|_| {
-            browser.open("about:blank");
-            browser.open(&shown.screen.url());
-            let paint = "performance.getEntriesByName('first-contentful-paint')[0]";
-            browser.until(&format!("location.protocol === 'http:' && {paint}"));
-            number(&mut browser, &format!("{paint}.startTime"))
-        })
-        .collect();
-    println!("first paints of {} loads: {paints:.0?} ms", paints.len());
-    paints.sort_by(f64::total_cmp);
-    // The first one of a browser starts its processes. An idle machine takes less than 100 ms; this one may be busy.
-    assert!(paints[0] < 500.0, "{paints:?}");
+    let mut browser = shown.opened(1920, 1080);
     browser.until(&shows(100));
     // Ways of full length.
     browser.run(
