@@ -18,6 +18,7 @@ const OLD = 5;
 const isRecorded = byId("flight") !== null;
 
 const map = new ChainMap(byId("canvas"));
+const profile = new Profile(byId("profile"), map);
 /** `at` is the time when the server wrote the last snapshot, and `age` how long before it was sent; both in ms. */
 const received = { snapshots: 0, first: 0, last: null, at: 0, age: 0, source: null, tried: 0 };
 
@@ -103,9 +104,11 @@ function show(snapshot) {
   say("clock", typeof snapshot.time_s === "number" ? clock(snapshot.time_s) : "");
   const words = summary(snapshot);
   say("summary", words);
+  say("attribution", (snapshot.tiles?.attribution && `Map: ${snapshot.tiles.attribution}`) || "");
   const label = `Map of the chain: ${words}`;
   if (byId("canvas").getAttribute("aria-label") !== label) byId("canvas").setAttribute("aria-label", label);
   map.take(snapshot);
+  profile.take(snapshot);
   table(snapshot);
   alarms.take(snapshot.alarms);
   takeDesk(snapshot);
@@ -141,6 +144,7 @@ function connection() {
   if (silence !== map.silence) {
     map.silence = silence;
     map.request();
+    profile.request();
     table(received.last, silence);
   }
   if (received.last) alarms.silent(broken, received.last.time_s);
