@@ -663,6 +663,7 @@ fn map_tiles_are_drawn_where_they_belong_by_day_and_by_night() {
         let mut most: f64 = 0.0;
         for corner in corners.as_array().unwrap() {
             let [at, metres, back, tile, index] = [0, 1, 2, 3, 4].map(|part| pair(&corner[part]));
+            #[expect(clippy::cast_possible_truncation, reason = "at most 1.8e9")]
             let [lat_e7, lon_e7] = at.map(|it| (it * 1e7).round() as i32);
             let amsl_mm = 420_000;
             let point = Geodetic {
