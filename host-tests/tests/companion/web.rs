@@ -148,7 +148,7 @@ fn a_station_serves_the_map_tiles_of_a_file() {
     let shown = snapshots(&address).next().unwrap();
     assert_eq!(
         shown["tiles"].to_string(),
-        r#"{"zooms":[0,3],"attribution":"Somebody"}"#
+        r#"{"attribution":"Somebody","zooms":[0,3]}"#
     );
     // A file that is removed from the disk in flight, or cut off, ends neither the page nor the station.
     std::fs::File::options()
