@@ -11,7 +11,7 @@ use uav_relay::{Channel, Instant, Interference, Placement, Profile};
 use uav_relay_scenario::deployment::Deployment;
 use uav_relay_scenario::endpoint::FORM;
 use uav_relay_scenario::mission;
-use uav_relay_scenario::{PlannedPlace, Scenario};
+use uav_relay_scenario::{PlannedPlace, Scenario, TerrainSpec};
 
 use crate::log::Log;
 use crate::mission::Method;
@@ -32,6 +32,8 @@ pub struct FileOnlySettings {
     pub held: Vec<u16>,
     /// Positions of the relays in the file's plan; empty without one.
     pub places: Vec<Placement>,
+    /// Elevation model below the line from Tx to Rx, if the file has one.
+    pub terrain: Option<TerrainSpec>,
     /// Options of the command line that override the file.
     pub overrides: Vec<Override>,
 }
@@ -392,6 +394,7 @@ fn mission_options(
             .flat_map(|plan| &plan.places)
             .map(place)
             .collect(),
+        terrain: scenario.terrain.clone(),
         overrides: Vec::new(),
     })
 }

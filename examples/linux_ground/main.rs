@@ -35,6 +35,8 @@
 //! | `report.rs` | log lines |
 //! | `screen.rs` | page that shows the chain in a browser |
 //! | `desk.rs` | previews and uploads of the page |
+//! | `terrain.rs` | ground below the chain, for the page |
+//! | `tiles.rs` | map pictures of the page |
 //!
 //! It shares a library with the relay, `examples/linux`.
 #![cfg_attr(unix, forbid(unsafe_code))]
@@ -61,6 +63,10 @@ mod report;
 mod screen;
 #[cfg(unix)]
 mod station;
+#[cfg(unix)]
+mod terrain;
+#[cfg(unix)]
+mod tiles;
 #[cfg(unix)]
 mod uploading;
 

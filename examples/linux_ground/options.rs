@@ -14,7 +14,7 @@ use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{Method, MissionOptions, mission};
 use uav_relay_linux::site::SiteOptions;
 use uav_relay_scenario::deployment::{Deployment, NETWORK};
-use uav_relay_scenario::key;
+use uav_relay_scenario::{TerrainSpec, key};
 
 use crate::forecast::Loaded;
 use crate::new::NewOptions;
@@ -113,6 +113,9 @@ pub(crate) struct Options {
     /// File with the password of the page, 8 to 200 characters. The browser asks for it; any user name will do
     #[arg(long, value_name = "FILE", requires = "web", help_heading = "Standing")]
     web_password: Option<PathBuf>,
+    /// PMTiles archive with pictures (PNG, JPEG or WebP) of a map, which the page shows below the chain. The mission needs sites
+    #[arg(long, value_name = "FILE", requires = "web", help_heading = "Standing")]
+    pub(crate) tiles: Option<PathBuf>,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     pub(crate) status_socket: Option<PathBuf>,
@@ -140,6 +143,8 @@ pub(crate) struct Plan {
     pub(crate) key: [u8; 32],
     pub(crate) web_password: Option<String>,
     pub(crate) overrides: Vec<Override>,
+    /// Elevation model of the configuration file.
+    pub(crate) terrain: Option<TerrainSpec>,
 }
 
 impl Plan {
@@ -184,6 +189,7 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.path_or_udp("--measurements", own.measurements.as_ref());
     given.value("--web", own.web.as_ref());
     given.path("--web-password", own.web_password.as_ref());
+    given.path("--tiles", own.tiles.as_ref());
     given.flag("--json", own.json);
     given.path("--log-file", own.log_file.as_ref());
     given.path("--status-socket", own.status_socket.as_ref());
@@ -239,6 +245,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         },
         key,
         overrides: file_only.overrides,
+        terrain: file_only.terrain,
         options,
     })
 }

@@ -13,6 +13,8 @@ use uav_relay_screen::{Post, Screen};
 
 use crate::desk::state;
 use crate::options::Plan;
+use crate::terrain::Elevation;
+use crate::tiles;
 use crate::uploading::{Uploading, name_of};
 
 /// Time between two snapshots.
@@ -22,12 +24,13 @@ const PERIOD: Duration = Duration::from_millis(200);
 const ASK_AGAIN: Duration = Duration::from_millis(10_000);
 
 /// Screen of a station, and its view of the chain.
-#[derive(Debug)]
 pub(crate) struct Web {
     screen: Screen,
     view: StationView,
     /// Uploaded mission that the chain flies, if known.
     flown: Option<Upload>,
+    /// Elevation model below the chain, if the configuration file has one that can be read.
+    elevation: Option<Elevation>,
     next_at: Instant,
     ask_at: Instant,
 }
@@ -44,7 +47,8 @@ impl Web {
         plan: &Plan,
         ground: &mut Ground,
     ) -> Result<(Self, Receiver<Post>), String> {
-        let (screen, posts) = Screen::start_acting(address, plan.web_password.clone())
+        let tiles = plan.options.tiles.as_deref().map(tiles::open).transpose()?;
+        let (screen, posts) = Screen::start_acting(address, plan.web_password.clone(), tiles)
             .map_err(|error| format!("--web {address}: {error}"))?;
         let who = match (plan.web_password.is_some(), screen.is_public()) {
             (true, false) => "; the page asks for the password",
@@ -57,10 +61,16 @@ impl Web {
         let what = format_args!("open {url} in a browser{who}");
         log.event(now, "screen", json!({ "url": url }), what);
         ground.watch(now, true);
+        let elevation = plan.terrain.as_ref().and_then(|spec| {
+            let loaded = Elevation::load(spec);
+            let why = |error| log.line(now, "terrain", format!("not shown: {error}"));
+            loaded.map_err(why).ok()
+        });
         let web = Self {
             screen,
             view: StationView::default(),
             flown: None,
+            elevation,
             next_at: now,
             ask_at: now,
         };
@@ -71,6 +81,7 @@ impl Web {
     pub(crate) fn turn(
         &mut self,
         now: Instant,
+        log: &Log,
         plan: &Plan,
         ground: &mut Ground,
         uploading: Option<&Uploading>,
@@ -121,6 +132,13 @@ impl Web {
         let reports: Vec<_> = ground.reports().collect();
         let mut snapshot = self.view.snapshot(now, &chain, &reports, frames);
         let shown = is_known.then(|| name_of(version, upload.as_ref()));
+        if let (Some(elevation), Some(sites)) = (&mut self.elevation, sites) {
+            let along = elevation.along(sites).unwrap_or_else(|error| {
+                log.line(now, "terrain", format!("not shown: {error}"));
+                None
+            });
+            snapshot.ground = along;
+        }
         snapshot.desk = Some(state(plan, shown.as_deref(), &reports, uploading));
         self.screen.show(snapshot);
         self.next_at

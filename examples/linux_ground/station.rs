@@ -142,8 +142,9 @@ impl<'a> Station<'a> {
         };
         self.desk.turn(time, &self.service.log, parts);
         let (ground, uploading) = (&mut self.ground, self.uploading.as_ref());
+        let log = &self.service.log;
         let web = self.web.as_mut();
-        let shown = web.map(|web| web.turn(time, self.plan, ground, uploading));
+        let shown = web.map(|web| web.turn(time, log, self.plan, ground, uploading));
         // An upload's next stage begins with a frame.
         self.send();
         let alive = self.serve_status(time);

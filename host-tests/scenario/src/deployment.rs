@@ -110,6 +110,8 @@ pub struct Ground {
     pub web: Option<String>,
     /// File with the password of the ground station's web page.
     pub web_password: Option<PathBuf>,
+    /// PMTiles archive with pictures of a map for the ground station's web page.
+    pub tiles: Option<PathBuf>,
     /// True to write log lines as JSON.
     pub json: Option<bool>,
     /// Log file of the ground station, in place of its standard output.

@@ -499,6 +499,7 @@ const GROUND: Keys = &[
     optional("measurements", Text),
     optional("web", Text),
     optional("web_password", Text),
+    optional("tiles", Text),
     optional("json", Rule::Flag),
     optional("log_file", Text),
     optional("status_socket", Text),

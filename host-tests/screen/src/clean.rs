@@ -3,6 +3,7 @@
 //! | value | sent instead |
 //! | --- | --- |
 //! | position with a part that is not finite or beyond [`FARTHEST_M`] | unknown; the interferer or the area is left out |
+//! | ground with a value that is not finite or beyond [`FARTHEST_M`] | unknown |
 //! | SIR that is not a number | unknown |
 //! | SIR beyond [`LIMIT_DB`], also an infinite one | the limit |
 //! | text | without control characters and direction marks, at most [`LONGEST_TEXT`] characters |
@@ -53,6 +54,10 @@ pub fn clean(snapshot: &mut Snapshot) {
     snapshot
         .no_fly
         .retain(|area| area.iter().flatten().copied().all(is_near));
+    snapshot.ground = snapshot.ground.take().filter(|it| {
+        let values = it.heights_m.iter().chain([&it.length_m, &it.mast_m]);
+        it.heights_m.len() > 1 && it.length_m > 0.0 && values.copied().all(is_near)
+    });
     for alarm in &mut snapshot.alarms {
         text(&mut alarm.text);
     }
@@ -89,7 +94,7 @@ fn known(place: &mut Option<Position>) {
 }
 
 /// Removes control characters and direction marks, and cuts a text at [`LONGEST_TEXT`] characters.
-fn text(text: &mut String) {
+pub(crate) fn text(text: &mut String) {
     let is_unseen = |it: char| {
         it.is_control()
             || matches!(it, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')

@@ -58,10 +58,10 @@ use std::net::SocketAddr;
 pub use alarms::{list, named};
 pub use clean::clean;
 pub use request::{FILES, Task};
-pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, MAX_STREAMS, Post, Screen};
+pub use server::{MAX_CONNECTIONS, MAX_PER_ADDRESS, MAX_STREAMS, Post, Screen, TileReader, Tiles};
 pub use snapshot::{
-    Alarm, Condition, Fence, Frame, Hop, InterfererSnapshot, LogLine, Node, Position,
-    RelaySnapshot, Snapshot, Urgency,
+    Alarm, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine, Node,
+    Position, RelaySnapshot, Snapshot, Urgency,
 };
 
 /// Reason why a screen cannot be served.

@@ -9,7 +9,9 @@
 //! (CORS) that no answer gives.
 
 use std::fmt;
+use std::hash::{BuildHasher as _, RandomState};
 use std::net::{IpAddr, SocketAddr};
+use std::sync::LazyLock;
 
 /// Largest size of a request, bytes.
 pub(crate) const MAX_REQUEST: usize = 8 * 1024;
@@ -20,12 +22,28 @@ const MAX_BODY: usize = 4 * 1024;
 /// Largest number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// Content security policy of the page: its own files, and nothing else.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
-                      form-action 'none'; frame-ancestors 'none'";
+/// Content security policy of the page: its own files, the style inside of it, and nothing else.
+static POLICY: LazyLock<String> = LazyLock::new(|| {
+    format!(
+        "default-src 'none'; script-src 'self'; style-src 'nonce-{}'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
+         form-action 'none'; frame-ancestors 'none'",
+        *NONCE
+    )
+});
+
+/// Random text that marks the page's own style.
+static NONCE: LazyLock<String> =
+    LazyLock::new(|| format!("{:016x}", RandomState::new().hash_one(0)));
+
+/// Page with its style inside, so that the first paint does not wait for another request.
+static PAGE: LazyLock<String> = LazyLock::new(|| {
+    let [(_, _, page), (_, _, style), ..] = FILES;
+    let style = format!("<style nonce=\"{}\">\n{style}</style>", *NONCE);
+    page.replacen("<link rel=\"stylesheet\" href=\"/screen.css\">", &style, 1)
+});
 
 /// Files of the page: path, media type and content. The path of the page itself is `/`.
-pub const FILES: [(&str, &str, &str); 7] = [
+pub const FILES: [(&str, &str, &str); 8] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -40,6 +58,11 @@ pub const FILES: [(&str, &str, &str); 7] = [
         "/map.js",
         "text/javascript; charset=utf-8",
         include_str!("../web/map.js"),
+    ),
+    (
+        "/profile.js",
+        "text/javascript; charset=utf-8",
+        include_str!("../web/profile.js"),
     ),
     (
         "/alarms.js",
@@ -65,6 +88,12 @@ pub const FILES: [(&str, &str, &str); 7] = [
 
 /// Path of the stream of snapshots.
 const EVENTS: &str = "/events";
+
+/// Begin of the path of a map tile; the rest is `ZOOM/X/Y`.
+const TILES: &str = "/tiles/";
+
+/// Largest zoom level of a map tile.
+const MAX_ZOOM: u8 = 24;
 
 /// Path of a POST, by its task.
 const TASKS: [(&str, Task); 2] = [("/preview", Task::Preview), ("/upload", Task::Upload)];
@@ -100,6 +129,8 @@ pub(crate) enum Answer {
     File(&'static str, &'static str),
     /// Stream of snapshots, which lasts until the browser leaves.
     Events,
+    /// Map tile: zoom level, column and row.
+    Tile(u8, u32, u32),
     /// Task with a body of this many bytes, which the program answers.
     Post(Task, usize),
     /// Refusal: status and reason phrase.
@@ -221,10 +252,31 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access
     if path == EVENTS {
         return Answer::Events;
     }
+    if let Some((zoom, x, y)) = path.strip_prefix(TILES).and_then(tile) {
+        return Answer::Tile(zoom, x, y);
+    }
     let file = FILES.iter().find(|(name, ..)| *name == path);
-    file.map_or(Answer::Refused(404, "Not Found"), |(_, media, content)| {
-        Answer::File(media, content)
-    })
+    file.map_or(
+        Answer::Refused(404, "Not Found"),
+        |(path, media, content)| {
+            let content = if *path == "/" { &**PAGE } else { content };
+            Answer::File(media, content)
+        },
+    )
+}
+
+/// Parses `ZOOM/X/Y`; `None` if there is no such tile.
+fn tile(path: &str) -> Option<(u8, u32, u32)> {
+    let whole = |part: &str| {
+        let is_plain = part.bytes().all(|it| it.is_ascii_digit()) && part.len() <= 8;
+        part.parse::<u32>().ok().filter(|_| is_plain)
+    };
+    let parts: Option<Vec<u32>> = path.split('/').map(whole).collect();
+    let &[zoom, x, y] = parts.as_deref()? else {
+        return None;
+    };
+    let zoom = u8::try_from(zoom).ok().filter(|it| *it <= MAX_ZOOM)?;
+    (x.max(y) < 1 << zoom).then_some((zoom, x, y))
 }
 
 /// Returns true if an `Authorization` header has the password, with any user name.
@@ -285,9 +337,22 @@ fn is_own(host: &str, own: SocketAddr) -> bool {
 pub(crate) fn head(answer: Answer) -> String {
     match answer {
         Answer::File(media, content) => written(200, "OK", media, Some(content.len())),
-        Answer::Events | Answer::Post(..) => written(200, "OK", "text/event-stream", None),
+        Answer::Events | Answer::Tile(..) | Answer::Post(..) => {
+            written(200, "OK", "text/event-stream", None)
+        }
         Answer::Refused(status, reason) => written(status, reason, PLAIN, Some(reason.len() + 1)),
     }
+}
+
+/// Returns the response with a map tile: status 204 if there is none, which no browser logs as an error.
+pub(crate) fn picture(tile: Option<(&str, Vec<u8>)>) -> Vec<u8> {
+    let (status, reason, media, content) = match tile {
+        Some((media, content)) => (200, "OK", media, content),
+        None => (204, "No Content", PLAIN, Vec::new()),
+    };
+    let mut response = written(status, reason, media, Some(content.len())).into_bytes();
+    response.extend(content);
+    response
 }
 
 /// Returns the response with the program's answer to a task: an error if it does not do it.
@@ -312,8 +377,9 @@ fn written(status: u16, reason: &str, media: &str, length: Option<usize>) -> Str
     };
     format!(
         "HTTP/1.1 {status} {reason}\r\nContent-Type: {media}\r\n{length}{more}Connection: close\r\nCache-Control: no-store\r\n\
-         Content-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
-         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n"
+         Content-Security-Policy: {}\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
+         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n",
+        *POLICY
     )
 }
 
@@ -321,7 +387,7 @@ fn written(status: u16, reason: &str, media: &str, length: Option<usize>) -> Str
 pub(crate) fn body(answer: Answer) -> String {
     match answer {
         Answer::File(_, content) => content.to_owned(),
-        Answer::Events | Answer::Post(..) => String::new(),
+        Answer::Events | Answer::Tile(..) | Answer::Post(..) => String::new(),
         Answer::Refused(_, reason) => format!("{reason}\n"),
     }
 }
@@ -508,6 +574,41 @@ mod tests {
         ] {
             let lines = format!("GET {path} HTTP/1.1\nHost: 127.0.0.1:8080\n{headers}");
             assert_eq!(status(&lines), expected, "{lines}");
+        }
+    }
+
+    #[test]
+    fn a_tile_has_a_zoom_level_a_column_and_a_row() {
+        let own = "127.0.0.1:80";
+        let asked = |path: &str| {
+            asked(
+                &format!("GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"),
+                own,
+            )
+        };
+        assert_eq!(
+            asked("/tiles/14/8622/5744"),
+            Some(Answer::Tile(14, 8_622, 5_744))
+        );
+        assert_eq!(asked("/tiles/0/0/0"), Some(Answer::Tile(0, 0, 0)));
+        for path in [
+            "/tiles/14/16384/0",
+            "/tiles/0/0/1",
+            "/tiles/25/0/0",
+            "/tiles/280/0/0",
+            "/tiles/1/1",
+            "/tiles/1/1/1/1",
+            "/tiles/1/1/1.png",
+            "/tiles/1/+1/1",
+            "/tiles/1//1",
+            "/tiles/../../etc/passwd",
+            "/tiles/3/4294967297/0",
+        ] {
+            assert_eq!(
+                asked(path),
+                Some(Answer::Refused(404, "Not Found")),
+                "{path}"
+            );
         }
     }
 

@@ -5,6 +5,7 @@
 //! be skipped: each connection sends the lines that it has not sent yet, of the last [`LINES`].
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -17,10 +18,10 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::ScreenError;
-use crate::clean::{clean, clean_line};
+use crate::clean::{clean, clean_line, text};
 use crate::request::{
     Access, Answer, FULL, MAX_REQUEST, TOO_LARGE, TOO_MANY, TOO_SLOW, Task, WRONG_PASSWORD, answer,
-    body, head, replied,
+    body, head, picture, replied,
 };
 use crate::snapshot::{LogLine, Snapshot};
 
@@ -80,8 +81,29 @@ const MAX_TRIES: usize = 5;
 /// Beyond it all other computers are refused.
 const MAX_ALL_TRIES: usize = 100;
 
-/// Stack size of a connection's thread, bytes.
-const STACK: usize = 256 * 1024;
+/// Stack size of a connection's thread, bytes. A tile may have to be decompressed, and an overflow would end the program.
+const STACK: usize = 1024 * 1024;
+
+/// Pictures of the map below the chain, from a file of the program: tiles of the Web Mercator projection.
+pub struct Tiles {
+    /// Smallest and largest zoom level.
+    pub zooms: [u8; 2],
+    /// Text that names the source of the pictures, which the page shows. Empty without one.
+    pub attribution: String,
+    /// Returns the media type and the bytes of the tile with this zoom level, column and row; `None` if there is none.
+    ///
+    /// Threads of several browsers call it at the same time.
+    pub read: Box<TileReader>,
+}
+
+/// Function that reads a map tile.
+pub type TileReader = dyn Fn(u8, u32, u32) -> Option<(&'static str, Vec<u8>)> + Send + Sync;
+
+impl fmt::Debug for Tiles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Tiles").finish_non_exhaustive()
+    }
+}
 
 /// Server of the page that shows a chain. It ends when it is dropped.
 #[derive(Debug)]
@@ -100,6 +122,7 @@ struct Shared {
     outbox: Mutex<Outbox>,
     is_written: Condvar,
     access: Access,
+    tiles: Option<Tiles>,
     /// Program that does tasks of the page; `None` if the page only shows.
     tasks: Option<SyncSender<Post>>,
     /// Addresses and times of wrong passwords in the last [`TRIES_TIME`].
@@ -146,8 +169,17 @@ struct Sent<'a> {
     run: &'a str,
     /// Token of the page's tasks; `None` if the page only shows.
     token: Option<&'a str>,
+    /// Map tiles of the page, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tiles: Option<SentTiles<'a>>,
     #[serde(flatten)]
     snapshot: &'a Snapshot,
+}
+
+#[derive(Serialize)]
+struct SentTiles<'a> {
+    zooms: [u8; 2],
+    attribution: &'a str,
 }
 
 /// Task of a page, which the program has to [answer](Self::reply).
@@ -185,16 +217,19 @@ impl Screen {
     /// # Errors
     /// [`ScreenError`] if the address cannot be bound.
     pub fn start(address: SocketAddr) -> Result<Self, ScreenError> {
-        Self::serve(address, Access::default(), None)
+        Self::serve(address, Access::default(), None, None)
     }
 
     /// Starts a screen whose page can also give [tasks](Post) to the program. With a password, every request needs it.
+    ///
+    /// With `tiles` the page shows a map of their pictures below the chain.
     ///
     /// # Errors
     /// [`ScreenError`] if the address cannot be bound.
     pub fn start_acting(
         address: SocketAddr,
         password: Option<String>,
+        mut tiles: Option<Tiles>,
     ) -> Result<(Self, Receiver<Post>), ScreenError> {
         // The keys of a `RandomState` come from the system's random numbers.
         let random = RandomState::new();
@@ -203,14 +238,18 @@ impl Screen {
             password,
             token: Some(token),
         };
+        if let Some(tiles) = &mut tiles {
+            text(&mut tiles.attribution);
+        }
         let (tasks, posts) = sync_channel(TASKS);
-        Ok((Self::serve(address, access, Some(tasks))?, posts))
+        Ok((Self::serve(address, access, Some(tasks), tiles)?, posts))
     }
 
     fn serve(
         address: SocketAddr,
         access: Access,
         tasks: Option<SyncSender<Post>>,
+        tiles: Option<Tiles>,
     ) -> Result<Self, ScreenError> {
         let failed = |error| ScreenError::Bind(address, error);
         let listener = TcpListener::bind(address).map_err(failed)?;
@@ -219,6 +258,7 @@ impl Screen {
                 run: format!("{:016x}", RandomState::new().hash_one(0)),
                 access,
                 tasks,
+                tiles,
                 ..Shared::default()
             }),
             address: listener.local_addr().map_err(failed)?,
@@ -320,6 +360,10 @@ impl Shared {
             let sent = Sent {
                 run: &self.run,
                 token: self.access.token.as_deref(),
+                tiles: self.tiles.as_ref().map(|it| SentTiles {
+                    zooms: it.zooms,
+                    attribution: &it.attribution,
+                }),
                 snapshot: &snapshot,
             };
             let text = serde_json::to_string(&sent).unwrap_or_default();
@@ -562,10 +606,14 @@ fn serve(mut stream: TcpStream, counted: &mut Counted) -> io::Result<()> {
         answer = FULL;
     }
     let response = match answer {
-        Answer::Post(task, _) => shared.perform(task, content, peer),
-        _ => format!("{}{}", head(answer), body(answer)),
+        Answer::Post(task, _) => shared.perform(task, content, peer).into_bytes(),
+        Answer::Tile(zoom, x, y) => {
+            let tiles = shared.tiles.as_ref();
+            picture(tiles.and_then(|it| (it.read)(zoom, x, y)))
+        }
+        _ => format!("{}{}", head(answer), body(answer)).into_bytes(),
     };
-    write_all(&mut stream, response.as_bytes())?;
+    write_all(&mut stream, &response)?;
     if answer == Answer::Events {
         _ = stream.set_nodelay(true);
         return shared.stream(&mut stream);

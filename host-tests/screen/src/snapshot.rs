@@ -33,6 +33,9 @@ pub struct Snapshot {
     pub geofence: Option<Fence>,
     /// No-fly areas: corners of each, x and y in m.
     pub no_fly: Vec<Vec<[f64; 2]>>,
+    /// Ground below the line from Tx to Rx.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground: Option<GroundProfile>,
     /// Alarms that last, and those that have ended, each with a number of its own.
     pub alarms: Vec<Alarm>,
     /// State of the program's tasks, for a page that can act: `desk.js` and the program define it.
@@ -192,6 +195,17 @@ pub struct Fence {
     pub y_m: [f64; 2],
     /// Lowest and highest altitude, m.
     pub altitude_m: Option<[f64; 2]>,
+}
+
+/// Ground below the line from Tx to Rx. Its heights are on the scale of the relays' altitudes.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct GroundProfile {
+    /// Distance from Tx to Rx, m.
+    pub length_m: f64,
+    /// Height of the antennas of Tx and Rx above the ground, m.
+    pub mast_m: f64,
+    /// Heights of the ground at equal distances from Tx to Rx, at least two, m.
+    pub heights_m: Vec<f64>,
 }
 
 /// Urgency of an alarm. The page lists the most urgent alarms first.

@@ -455,7 +455,8 @@ fn post(screen: &Screen, path: &str, token: &str, body: &str) -> Vec<u8> {
 #[test]
 fn wrong_passwords_are_limited_and_a_page_without_one_is_refused() {
     let own = "127.0.0.1:0".parse().unwrap();
-    let (screen, posts) = Screen::start_acting(own, Some("correct horse".to_owned())).unwrap();
+    let (screen, posts) =
+        Screen::start_acting(own, Some("correct horse".to_owned()), None).unwrap();
     let with = |header: &str| {
         let own = screen.address();
         asked(
@@ -508,7 +509,7 @@ fn wrong_passwords_are_limited_and_a_page_without_one_is_refused() {
 
 #[test]
 fn only_tasks_with_the_token_reach_the_program_and_nobody_waits_for_it() {
-    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None).unwrap();
+    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None, None).unwrap();
     let screen = Arc::new(screen);
     screen.show(snapshot(1, 0.0));
     let token = until(&mut events(&screen), 0.0)["token"]

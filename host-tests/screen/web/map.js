@@ -42,6 +42,68 @@ const GRIP = 22;
 /** Age from which the map shows it beside a relay, s. */
 const SHOWN_AGE = 2;
 
+/** Age from which a place is marked, because the relay may be elsewhere by now, s. */
+const BEHIND = 10;
+
+/** Returns the age of a relay's place that may be behind, s; null if it is newer. It has grown by `silence` seconds. */
+function behindFor({ position, age_s: age }, silence) {
+  return position && typeof age === "number" && age + silence >= BEHIND ? age + silence : null;
+}
+
+/** Largest number of map tiles that are drawn, and of those that are kept. */
+const MOST_TILES = 80;
+const KEPT_TILES = 320;
+
+/** Width of a tile on the screen from which those of the next zoom level are used, px. */
+const TILE_WIDE = 360;
+
+/** Opacity of the map tiles on a light and on a dark page, on which all else has to be read. */
+const TILES_OPACITY = { light: 0.65, dark: 0.35 };
+
+/** Conversion between latitude and longitude, degrees (WGS 84), and the metres of a chain, near its origin. */
+class Earth {
+  constructor([lat, lon], azimuth) {
+    const turn = (azimuth * Math.PI) / 180;
+    Object.assign(this, { lat, lon, sin: Math.sin(turn), cos: Math.cos(turn) });
+  }
+
+  /** Returns metres for a degree to the north and to the east, between the origin and a latitude. */
+  scales(lat) {
+    const middle = (((lat + this.lat) / 2) * Math.PI) / 180;
+    const flat = 1 - 0.00669437999 * Math.sin(middle) ** 2;
+    const degree = (6378137 * Math.PI) / 180 / Math.sqrt(flat);
+    return [(degree * (1 - 0.00669437999)) / flat, degree * Math.cos(middle)];
+  }
+
+  metres([lat, lon]) {
+    const [forNorth, forEast] = this.scales(lat);
+    const [up, right] = [(lat - this.lat) * forNorth, (lon - this.lon) * forEast];
+    // Half of the angle between north at the origin and north at the position.
+    const angle = ((lon - this.lon) * Math.PI * Math.sin((lat * Math.PI) / 180)) / 360;
+    const [north, east] = [up + right * angle, right - up * angle];
+    return [east * this.sin + north * this.cos, east * this.cos - north * this.sin];
+  }
+
+  degrees([x, y]) {
+    const near = this.near([x, y]);
+    const [nearX, nearY] = this.metres(near);
+    return this.near([2 * x - nearX, 2 * y - nearY]);
+  }
+
+  near([x, y]) {
+    const [north, east] = [x * this.cos - y * this.sin, x * this.sin + y * this.cos];
+    const lat = this.lat + north / this.scales(this.lat)[0];
+    return [lat, this.lon + east / this.scales(lat)[1]];
+  }
+}
+
+/** Column and row of a position among 2^zoom tiles, as fractions, and the position of a column and a row. */
+function tileAt([lat, lon], count) {
+  const angle = (lat * Math.PI) / 180;
+  return [(lon / 360 + 0.5) * count, (0.5 - Math.asinh(Math.tan(angle)) / (2 * Math.PI)) * count];
+}
+const tileCorner = (x, y, count) => [(Math.atan(Math.sinh(Math.PI * (1 - (2 * y) / count))) * 180) / Math.PI, (x / count - 0.5) * 360];
+
 /** Returns the largest of 1, 2 or 5 times a power of ten that is at most `most`. */
 function round125(most) {
   const power = 10 ** Math.floor(Math.log10(most));
@@ -60,12 +122,17 @@ class ChainMap {
     this.trail = document.createElement("canvas").getContext("2d");
     this.newParts = [];
     this.drawnFor = "";
+    /** Pictures of map tiles by their paths, and the picture of all of them together; `tilesFor` is the area that it shows. */
+    this.tiles = new Map();
+    this.ground = document.createElement("canvas").getContext("2d");
+    this.tilesFor = "";
     /** Displayed area: centre in metres, and pixels per metre. While `fitted`, it contains everything. */
     this.view = { x: 500, y: 0, scale: 1 };
     this.fitted = true;
     this.bounds = null;
     this.pending = 0;
     this.frames = 0;
+    this.hasTiles = false;
     this.fingers = new Map();
     /** Positions to which a preview would move the relays, x and y in m. */
     this.targets = [];
@@ -84,6 +151,7 @@ class ChainMap {
     const style = getComputedStyle(document.documentElement);
     for (const name of ["ink", "paper", "soft", "line", "grid", "relay", "good", "fair", "poor", "site", "interferer"]) this.colours[name] = style.getPropertyValue(`--${name}`).trim();
     this.colours.unknown = this.colours.soft;
+    this.tilesFor = "";
     this.request();
   }
 
@@ -247,6 +315,7 @@ class ChainMap {
     this.taken = [];
     if (!snapshot || this.width === 0) return;
     if (this.fitted) this.adjust();
+    this.drawTiles();
     this.grid();
     this.areas();
     this.drawWays();
@@ -286,6 +355,80 @@ class ChainMap {
     return true;
   }
 
+  /** Draws the map tiles, if the program has any. Their picture is kept while the map shows the same area. */
+  drawTiles() {
+    const { canvas, ground, pen, view } = this;
+    const { tiles, frame } = this.snapshot;
+    this.hasTiles = Boolean(tiles && frame?.origin_deg && typeof frame.azimuth_deg === "number");
+    if (!this.hasTiles) return;
+    const area = [canvas.width, canvas.height, view.x, view.y, view.scale, frame.origin_deg, frame.azimuth_deg].join();
+    if (area !== this.tilesFor) {
+      this.tilesFor = area;
+      Object.assign(ground.canvas, { width: canvas.width, height: canvas.height });
+      const earth = new Earth(frame.origin_deg, frame.azimuth_deg);
+      for (const [path, zoom, x, y] of this.seenTiles(earth, tiles.zooms)) {
+        const picture = this.tile(path);
+        if (picture.complete && picture.naturalWidth) this.drawTile(earth, picture, 2 ** zoom, x, y);
+      }
+    }
+    pen.globalAlpha = TILES_OPACITY[matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"];
+    pen.drawImage(ground.canvas, 0, 0, this.width, this.height);
+    pen.globalAlpha = 1;
+  }
+
+  /** Returns path, zoom level, column and row of the tiles in the displayed area; none if there are too many. */
+  seenTiles(earth, [least, most]) {
+    const corners = [[0, 0], [this.width, 0], [0, this.height], [this.width, this.height]].map((at) => earth.degrees(this.metres(at)));
+    const round = 40075017 * Math.cos((earth.lat * Math.PI) / 180);
+    const zoom = Math.min(most, Math.max(least, Math.ceil(Math.log2((round * this.view.scale) / TILE_WIDE))));
+    const count = 2 ** zoom;
+    const at = corners.map((corner) => tileAt(corner, count));
+    const [first, last] = [Math.min, Math.max].map((edge) => [0, 1].map((axis) => Math.min(count - 1, Math.max(0, Math.floor(edge(...at.map((it) => it[axis])))))));
+    const [wide, high] = [0, 1].map((axis) => last[axis] - first[axis] + 1);
+    if (!(wide * high <= MOST_TILES)) return [];
+    return Array.from({ length: wide * high }, (_, index) => {
+      const [x, y] = [first[0] + (index % wide), first[1] + Math.floor(index / wide)];
+      return [`/tiles/${zoom}/${x}/${y}`, zoom, x, y];
+    });
+  }
+
+  /** Returns the picture of a tile, which may still have to arrive. */
+  tile(path) {
+    const known = this.tiles.get(path);
+    if (known) return known;
+    if (this.tiles.size >= KEPT_TILES) this.tiles.delete(this.tiles.keys().next().value);
+    const picture = new Image();
+    this.tiles.set(path, picture);
+    picture.addEventListener("load", () => {
+      this.tilesFor = "";
+      this.request();
+    });
+    picture.src = location.origin + path;
+    return picture;
+  }
+
+  drawTile(earth, picture, count, x, y) {
+    const { pen, ground } = this;
+    const [[x0, y0], [x1, y1], [x2, y2]] = [[0, 0], [1, 0], [0, 1]].map(([dx, dy]) => this.pixels(...earth.metres(tileCorner(x + dx, y + dy, count))));
+    const [wide, high] = [picture.naturalWidth, picture.naturalHeight];
+    ground.setTransform(pen.getTransform());
+    ground.transform((x1 - x0) / wide, (y1 - y0) / wide, (x2 - x0) / high, (y2 - y0) / high, x0, y0);
+    // Half a pixel more hides the seams.
+    const more = (0.5 * wide) / Math.hypot(x1 - x0, y1 - y0);
+    ground.drawImage(picture, 0, 0, wide + more, high + more);
+  }
+
+  /** Writes a number of the grid, with an outline on map tiles. */
+  gridNumber(text, x, y) {
+    const { pen } = this;
+    if (this.hasTiles) {
+      pen.lineWidth = 3;
+      pen.strokeStyle = this.colours.paper;
+      pen.strokeText(text, x, y);
+    }
+    pen.fillText(text, x, y);
+  }
+
   grid() {
     const { pen, view } = this;
     const step = round125(Math.max(90 / view.scale, 1e-3));
@@ -302,13 +445,13 @@ class ChainMap {
       this.trace([[x, top], [x, bottom]], "grid", 1);
       const [px] = this.pixels(x, 0);
       pen.textAlign = "center";
-      if (px > 40 && px < this.width - 20) pen.fillText(String(Math.round(x)), px, 9);
+      if (px > 40 && px < this.width - 20) this.gridNumber(String(Math.round(x)), px, 9);
     }
     for (const y of lines(top, bottom)) {
       this.trace([[left, y], [right, y]], "grid", 1);
       const [, py] = this.pixels(0, y);
       pen.textAlign = "left";
-      if (py > 22 && py < this.height - 34) pen.fillText(String(Math.round(y) || 0), 4, py);
+      if (py > 22 && py < this.height - 34) this.gridNumber(String(Math.round(y) || 0), 4, py);
     }
     // Scale bar.
     const [px, py] = [12, this.height - 12];
@@ -483,13 +626,18 @@ class ChainMap {
     this.write(name, x, y - 18, "site", true);
   }
 
-  relay({ condition }, [x, y], crowded) {
+  relay(relay, [x, y], crowded) {
     const { pen } = this;
+    const { condition } = relay;
     const [lost, fault] = [condition === "lost", condition === "fault"];
     const radius = crowded ? 4 : 10;
     pen.beginPath();
     if (fault) pen.rect(x - radius, y - radius, 2 * radius, 2 * radius);
     else pen.arc(x, y, radius, 0, 2 * Math.PI);
+    // No hop is seen through a faded symbol.
+    pen.fillStyle = this.colours.paper;
+    pen.fill();
+    if (behindFor(relay, this.silence) !== null) pen.globalAlpha = 0.4;
     pen.fillStyle = this.colours[condition === "normal" ? "relay" : fault ? "poor" : "paper"];
     pen.fill();
     pen.strokeStyle = this.colours[lost || fault ? "poor" : "relay"];
@@ -497,27 +645,30 @@ class ChainMap {
     pen.setLineDash(lost ? [3, 2] : []);
     pen.stroke();
     pen.setLineDash([]);
+    pen.globalAlpha = 1;
     this.taken.push([x, y, radius, radius - 2]);
   }
 
-  label({ number, condition, age_s: age }, [x, y], crowded) {
+  label(relay, [x, y], crowded) {
     const { pen } = this;
+    const { number, condition, age_s: age } = relay;
+    const isBehind = behindFor(relay, this.silence) !== null;
     const bad = condition === "lost" || condition === "fault";
     const colour = bad ? "poor" : "relay";
     const old = typeof age === "number" && age + this.silence >= SHOWN_AGE ? `${(age + this.silence).toFixed(0)} s ago` : "";
-    const words = [bad ? condition : "", bad || !crowded ? old : ""].filter(Boolean).join(", ");
+    const words = [bad ? condition : "", bad || isBehind || !crowded ? old : ""].filter(Boolean).join(", ");
     if (!crowded) {
       pen.font = "600 11px system-ui, sans-serif";
       pen.textAlign = "center";
       pen.textBaseline = "middle";
-      pen.fillStyle = this.colours[condition === "normal" || condition === "fault" ? "paper" : colour];
+      pen.fillStyle = this.colours[isBehind ? "ink" : condition === "normal" || condition === "fault" ? "paper" : colour];
       pen.fillText(String(number), x, y + 0.5);
       pen.font = "12px system-ui, sans-serif";
     }
     const text = crowded ? `${number} ${words}`.trim() : words;
     if (!text) return;
     // The text is moved up until there is room for it: that of a fault more than others, and none among many relays.
-    const steps = bad ? 4 : this.snapshot.relays.length > FEW ? 1 : 3;
+    const steps = bad || isBehind ? 4 : this.snapshot.relays.length > FEW ? 1 : 3;
     const free = [0, 15, 30, 45].slice(0, steps).some((up) => this.write(text, x, y - (crowded ? 14 : 20) - up, colour));
     if (bad && !free) this.write(text, x, y - 14, colour, true);
   }

@@ -18,6 +18,7 @@ const OLD = 5;
 const isRecorded = byId("flight") !== null;
 
 const map = new ChainMap(byId("canvas"));
+const profile = new Profile(byId("profile"), map);
 /** `at` is the time when the server wrote the last snapshot, and `age` how long before it was sent; both in ms. */
 const received = { snapshots: 0, first: 0, last: null, at: 0, age: 0, source: null, tried: 0 };
 
@@ -38,13 +39,14 @@ function off({ position, agreed }) {
 function row(relay, hop, silence) {
   const place = relay.position || {};
   const lost = relay.lost_neighbours.map((it) => `does not receive relay ${it}`);
-  const remarks = [relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
+  const behind = behindFor(relay, silence);
+  const remarks = [behind === null ? "" : `position may be behind: ${behind.toFixed(0)} s old`, relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
   const db = hop ? hopDb(hop) : null;
   const age = typeof relay.age_s === "number" ? relay.age_s + silence : null;
   return {
     kind: relay.condition || "",
     cells: [String(relay.number), relay.control || "–", relay.phase || "–", sirText(hop?.sir_db, hop?.measured_db), sirText(hop?.sir_back_db, hop?.measured_back_db), number(off(relay), 1), number(place.x_m, 1), number(place.y_m, 1), number(place.altitude_m, 1), number(age, 1), remarks],
-    kinds: { 3: sirClass(db), 4: sirClass(hop ? backDb(hop) : null), 9: age >= OLD ? "old" : "" },
+    kinds: { 3: sirClass(db), 4: sirClass(hop ? backDb(hop) : null), ...(behind === null ? {} : { 6: "behind", 7: "behind", 8: "behind" }), 9: age >= OLD ? "old" : "" },
   };
 }
 
@@ -102,9 +104,11 @@ function show(snapshot) {
   say("clock", typeof snapshot.time_s === "number" ? clock(snapshot.time_s) : "");
   const words = summary(snapshot);
   say("summary", words);
+  say("attribution", (snapshot.tiles?.attribution && `Map: ${snapshot.tiles.attribution}`) || "");
   const label = `Map of the chain: ${words}`;
   if (byId("canvas").getAttribute("aria-label") !== label) byId("canvas").setAttribute("aria-label", label);
   map.take(snapshot);
+  profile.take(snapshot);
   table(snapshot);
   alarms.take(snapshot.alarms);
   takeDesk(snapshot);
@@ -140,6 +144,7 @@ function connection() {
   if (silence !== map.silence) {
     map.silence = silence;
     map.request();
+    profile.request();
     table(received.last, silence);
   }
   if (received.last) alarms.silent(broken, received.last.time_s);
@@ -168,6 +173,10 @@ byId("farther").addEventListener("click", () => map.zoom(1 / 1.4));
 byId("fit").addEventListener("click", () => map.fit());
 if (!isRecorded) {
   setInterval(connection, 500);
-  // All scripts have run then.
-  document.addEventListener("DOMContentLoaded", connect);
+  // The first snapshot is drawn after the first paint of the page. A hidden page is not painted.
+  const begin = () => received.source || connect();
+  document.addEventListener("DOMContentLoaded", () => {
+    requestAnimationFrame(() => setTimeout(begin));
+    setTimeout(begin, 500);
+  });
 }

@@ -93,6 +93,75 @@ fn a_station_without_a_chain_has_a_page_with_snapshots() {
     assert!(last.contains("stopped"), "{last}");
 }
 
+/// Returns a PMTiles archive with one picture, that of the whole earth.
+fn archive(picture: &[u8]) -> Vec<u8> {
+    let metadata = br#"{"attribution":"<b>Somebody</b>"}"#;
+    // One entry: tile 0, one tile long, with the length and the offset (plus one) of its picture.
+    let directory = [1, 0, 1, picture.len() as u8, 1];
+    let [root, about] = [127, 127 + directory.len() as u64];
+    let data = about + metadata.len() as u64;
+    let mut file = b"PMTiles\x03".to_vec();
+    for (offset, len) in [
+        (root, directory.len()),
+        (about, metadata.len()),
+        (0, 0),
+        (data, picture.len()),
+    ] {
+        file.extend(offset.to_le_bytes());
+        file.extend((len as u64).to_le_bytes());
+    }
+    file.extend([1_u64; 3].map(u64::to_le_bytes).concat());
+    // Clustered, nothing compressed, PNG, zoom levels 0 to 3.
+    file.extend([1, 1, 1, 2, 0, 3]);
+    file.extend([0; 25]);
+    [&file[..], &directory, metadata, picture].concat()
+}
+
+#[test]
+fn a_station_serves_the_map_tiles_of_a_file() {
+    let (files, tty) = (Files::new(), Pty::new());
+    let signed = files.signed("key", "epoch");
+    let path = tty.path().display();
+    let file = files.text("map.pmtiles");
+    std::fs::write(&file, archive(b"a picture")).unwrap();
+    let stand =
+        format!("--of 3 --end tx --stand --web 127.0.0.1:0 --tty {path} {signed} --tiles {file}");
+    let mut station = Relay::ground(&stand);
+    let address = address(&mut station);
+    let answer = |path: &str| {
+        let mut answer = String::new();
+        get(&address, path).read_to_string(&mut answer).unwrap();
+        answer
+    };
+    let tile = answer("/tiles/0/0/0");
+    assert!(
+        tile.starts_with("HTTP/1.1 200 OK\r\nContent-Type: image/png\r\n")
+            && tile.ends_with("\r\n\r\na picture"),
+        "{tile}"
+    );
+    let none = answer("/tiles/1/1/1");
+    assert!(
+        none.starts_with("HTTP/1.1 204 No Content\r\n") && none.ends_with("\r\n\r\n"),
+        "{none}"
+    );
+    assert!(answer("/tiles/1/2/1").starts_with("HTTP/1.1 404 "));
+    let shown = snapshots(&address).next().unwrap();
+    assert_eq!(
+        shown["tiles"].to_string(),
+        r#"{"attribution":"Somebody","zooms":[0,3]}"#
+    );
+    // A file that is removed from the disk in flight, or cut off, ends neither the page nor the station.
+    std::fs::File::options()
+        .write(true)
+        .open(&file)
+        .unwrap()
+        .set_len(140)
+        .unwrap();
+    assert!(answer("/tiles/0/0/0").starts_with("HTTP/1.1 204 "));
+    assert!(snapshots(&address).next().is_some());
+    station.stopped();
+}
+
 #[test]
 fn no_request_disturbs_the_serial_loop() {
     let chain = Chain::with_ground(1, QUIET);

@@ -1,5 +1,6 @@
 //! Screen of a flight in a browser: relays, alarms, layout and speed. A running simulation fills it.
 
+use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,11 +8,15 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser as _;
+use flate2::write::ZlibEncoder;
+use flate2::{Compression, Crc};
 use serde_json::Value;
+use uav_relay::flight::axis::Axis;
+use uav_relay::{Geodetic, Placement, Sites};
 use uav_relay_scenario::Scenario;
 use uav_relay_screen::{
-    Alarm, Condition, Fence, Hop, InterfererSnapshot, LogLine, Node, Position, RelaySnapshot,
-    Screen, Snapshot, Task, Urgency,
+    Alarm, Condition, Fence, Frame, GroundProfile, Hop, InterfererSnapshot, LogLine, Node,
+    Position, RelaySnapshot, Screen, Snapshot, Task, Tiles, Urgency,
 };
 use uav_relay_sim::cli::{Options, Prepared};
 use uav_relay_sim::live::LiveView;
@@ -250,6 +255,71 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
+/// JavaScript that returns the opacity of a relay's symbol as drawn: that of the colours near its upper edge, from 0 to 1.
+const OPACITY: &str = "(number) => { map.draw(); const { position } = map.snapshot.relays.find((it) => it.number === number); \
+    const [x, y] = map.pixels(position.x_m, position.y_m); const part = (colour) => parseInt(colour.slice(1, 3), 16); \
+    const red = map.pen.getImageData(Math.round(x), Math.round(y) - 7, 1, 1).data[0]; \
+    return (255 - red) / (255 - part(map.colours.relay)); }";
+
+#[test]
+fn a_position_older_than_ten_seconds_is_marked_in_the_table_and_faded_on_the_map() {
+    let shown = Shown::begin(|| {
+        let mut snapshot = full(5, 0.0);
+        snapshot.relays[0].age_s = Some(9.4);
+        snapshot.relays[1].age_s = Some(12.3);
+        snapshot.relays[1].hold_reason = Some("relay 1 has not made room yet".to_owned());
+        snapshot.relays[2].age_s = Some(40.0);
+        snapshot.relays[2].position = None;
+        snapshot
+    });
+    let mut browser = shown.opened(1280, 900);
+    browser.until(&shows(6));
+    let remarks = |browser: &mut Browser, at: u8| {
+        browser.text(&format!(
+            "byId('rows').children[{at}].lastChild.textContent"
+        ))
+    };
+    assert_eq!(
+        [0, 1, 2].map(|at| remarks(&mut browser, at)),
+        [
+            "",
+            "position may be behind: 12 s old; waits: relay 1 has not made room yet",
+            ""
+        ]
+    );
+    let marked = "[...document.querySelectorAll('td.behind')].map((it) => it.textContent).join()";
+    let own = "[6, 7, 8].map((at) => byId('rows').children[1].children[at].textContent).join()";
+    let [marked, own] = [marked, own].map(|it| browser.text(it));
+    assert_eq!(marked, own);
+    let texts = written(&mut browser);
+    assert!(
+        texts.contains("12 s ago") && !texts.contains("40 s ago"),
+        "{texts}"
+    );
+    save("behind", &browser.screenshot());
+    let opacity = |browser: &mut Browser, relay| number(browser, &format!("({OPACITY})({relay})"));
+    let [new, behind] = [1, 2].map(|relay| opacity(&mut browser, relay));
+    assert!(
+        new > 0.95 && (0.3..0.5).contains(&behind),
+        "{new}, {behind}"
+    );
+    // An age grows while no snapshot arrives.
+    drop(shown);
+    browser.until("byId('connection').className === 'broken'");
+    assert!(remarks(&mut browser, 0).starts_with("position may be behind: 1"));
+    assert!(opacity(&mut browser, 1) < 0.5);
+    // Among a hundred relays without room for numbers, the age is beside the symbol, too.
+    let many = Shown::begin(|| {
+        let mut snapshot = full(100, 0.0);
+        snapshot.relays[49].age_s = Some(15.0);
+        snapshot
+    });
+    let mut browser = many.opened(1280, 900);
+    browser.until(&shows(101));
+    assert!(written(&mut browser).contains("50 15 s ago"));
+    assert_eq!(browser.errors(), Vec::<String>::new());
+}
+
 #[test]
 fn only_alarms_that_last_sound_and_are_in_the_title() {
     let alarm = |number, urgency, cleared_s| Alarm {
@@ -292,7 +362,7 @@ fn ready() -> Value {
 #[test]
 fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     let (own, password) = ("127.0.0.1:0".parse().unwrap(), "secret-7".to_owned());
-    let (screen, posts) = Screen::start_acting(own, Some(password)).unwrap();
+    let (screen, posts) = Screen::start_acting(own, Some(password), None).unwrap();
     let url = screen.url().replace("//", "//operator:secret-7@");
     let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
     let desk = ready();
@@ -388,7 +458,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
 #[test]
 fn a_preview_of_other_values_or_of_an_earlier_start_cannot_be_uploaded() {
     let own = "127.0.0.1:0".parse().unwrap();
-    let (screen, posts) = Screen::start_acting(own, None).unwrap();
+    let (screen, posts) = Screen::start_acting(own, None, None).unwrap();
     let next = || posts.recv_timeout(Duration::from_secs(20)).unwrap();
     let shown = Shown::on(screen, || Snapshot {
         desk: Some(ready()),
@@ -494,6 +564,249 @@ fn shown_full(relays: u16) -> Shown {
     Shown::begin(move || full(relays, begun.elapsed().as_secs_f64()))
 }
 
+/// Returns a PNG of 256 x 256 pixels of one colour, with a margin and a diagonal that are darker.
+fn png([red, green, blue]: [u8; 3]) -> Vec<u8> {
+    let mut rows = Vec::new();
+    for y in 0..256_usize {
+        rows.push(0);
+        for x in 0..256_usize {
+            let is_dark = x < 2 || y < 2 || x.abs_diff(y) < 6;
+            let share = if is_dark { 2 } else { 1 };
+            rows.extend([red / share, green / share, blue / share]);
+        }
+    }
+    let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
+    packed.write_all(&rows).unwrap();
+    let header = [0, 0, 1, 0, 0, 0, 1, 0, 8, 2, 0, 0, 0];
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    for (kind, content) in [
+        (b"IHDR", header.to_vec()),
+        (b"IDAT", packed.finish().unwrap()),
+        (b"IEND", Vec::new()),
+    ] {
+        let mut crc = Crc::new();
+        crc.update(kind);
+        crc.update(&content);
+        file.extend(u32::try_from(content.len()).unwrap().to_be_bytes());
+        file.extend(kind);
+        file.extend(content);
+        file.extend(crc.sum().to_be_bytes());
+    }
+    file
+}
+
+/// Colours of the map tiles in turn.
+const TILE_COLOURS: [[u8; 3]; 2] = [[200, 220, 170], [235, 215, 190]];
+
+/// Returns the line of a chain on earth of 2 km, to the north-east.
+fn line() -> Axis {
+    let site = |lat_e7, lon_e7| Geodetic {
+        lat_e7,
+        lon_e7,
+        amsl_mm: 420_000,
+    };
+    let (tx, rx) = (site(474_000_000, 85_400_000), site(474_123_000, 85_592_000));
+    Axis::between(Sites { tx, rx }).unwrap()
+}
+
+/// Returns a screen with map tiles of the zoom levels 8 to 17. Those of even columns in even rows are missing.
+fn tiled() -> Screen {
+    let pictures = TILE_COLOURS.map(png);
+    let tiles = Tiles {
+        zooms: [8, 17],
+        attribution: "\u{202e}\u{a9} Somebody".to_owned(),
+        read: Box::new(move |_, x, y| {
+            let is_there = x % 2 == 1 || y % 2 == 1;
+            let picture = &pictures[usize::from((x + y) % 2 == 1)];
+            is_there.then(|| ("image/png", picture.clone()))
+        }),
+    };
+    let own = "127.0.0.1:0".parse().unwrap();
+    Screen::start_acting(own, None, Some(tiles)).unwrap().0
+}
+
+fn on_earth(relays: u16, time_s: f64) -> Snapshot {
+    let axis = line();
+    let tx = axis.point(Placement::on_line(0.0, 0.0)).unwrap();
+    let azimuth_deg = f64::from(axis.azimuth_rad(0.0)).to_degrees();
+    Snapshot {
+        frame: Some(Frame {
+            origin_deg: Some([tx.lat_e7, tx.lon_e7].map(|it| f64::from(it) * 1e-7)),
+            azimuth_deg: Some(azimuth_deg),
+        }),
+        ..full(relays, time_s)
+    }
+}
+
+#[test]
+fn map_tiles_are_drawn_where_they_belong_by_day_and_by_night() {
+    let begun = Instant::now();
+    let shown = Shown::on(tiled(), move || {
+        on_earth(100, begun.elapsed().as_secs_f64())
+    });
+    for scheme in ["light", "dark"] {
+        let mut browser = shown.opened(1280, 900);
+        if scheme == "dark" {
+            browser.prefer_dark();
+        }
+        browser.until(&shows(101));
+        browser.until("map.tiles.size > 4 && [...map.tiles.values()].every((it) => it.complete)");
+        let words = browser.text("byId('attribution').textContent");
+        assert_eq!(words, "Map: \u{a9} Somebody");
+        // The page knows the corners of tiles within 5 km by the same formulas as the relays, to half a metre.
+        let corners = browser.value(
+            "(() => { const { origin_deg, azimuth_deg } = map.snapshot.frame; const earth = new Earth(origin_deg, azimuth_deg); const all = []; \
+             for (let x = 34318; x < 34334; x += 3) for (let y = 22934; y < 22952; y += 3) { const corner = tileCorner(x, y, 65536); all.push([corner, earth.metres(corner), earth.degrees(earth.metres(corner)), tileAt(corner, 65536), [x, y]]); } \
+             return all; })()",
+        );
+        let pair = |it: &Value| [0, 1].map(|at| it[at].as_f64().unwrap());
+        let mut most: f64 = 0.0;
+        for corner in corners.as_array().unwrap() {
+            let [at, metres, back, tile, index] = [0, 1, 2, 3, 4].map(|part| pair(&corner[part]));
+            #[expect(clippy::cast_possible_truncation, reason = "at most 1.8e9")]
+            let [lat_e7, lon_e7] = at.map(|it| (it * 1e7).round() as i32);
+            let amsl_mm = 420_000;
+            let point = Geodetic {
+                lat_e7,
+                lon_e7,
+                amsl_mm,
+            };
+            let place = line().place(point).unwrap();
+            let apart = (f64::from(place.x_m) - metres[0]).hypot(f64::from(place.y_m) - metres[1]);
+            most = most.max(apart);
+            assert!((at[0] - back[0]).hypot(at[1] - back[1]) < 1e-6, "{corner}");
+            assert!(
+                (tile[0] - index[0]).hypot(tile[1] - index[1]) < 1e-6,
+                "{corner}"
+            );
+        }
+        println!("corners of tiles: {most:.2} m from their places");
+        assert!(most < 0.5, "{most} m");
+        // The picture of the tiles has the colour of each tile, or none where a tile is missing.
+        let colours = browser.value(
+            "(() => { const { origin_deg, azimuth_deg } = map.snapshot.frame; const earth = new Earth(origin_deg, azimuth_deg); map.draw(); \
+             return map.seenTiles(earth, map.snapshot.tiles?.zooms ?? [8, 17]).map(([, zoom, x, y]) => { const at = map.pixels(...earth.metres(tileCorner(x + 0.7, y + 0.3, 2 ** zoom))); \
+               return [x, y, ...at, ...map.ground.getImageData(Math.round(at[0]), Math.round(at[1]), 1, 1).data]; }).filter(([, , px, py]) => px > 2 && py > 2 && px < map.width - 2 && py < map.height - 2); })()",
+        );
+        let colours = colours.as_array().unwrap();
+        assert!(colours.len() >= 6, "{colours:?}");
+        for of in colours {
+            let [x, y] = [0, 1].map(|at| of[at].as_u64().unwrap());
+            let drawn = [4, 5, 6, 7].map(|at| of[at].as_u64().unwrap());
+            let [red, green, blue] = TILE_COLOURS[usize::from((x + y) % 2 == 1)].map(u64::from);
+            let is_there = x % 2 == 1 || y % 2 == 1;
+            let expected = if is_there {
+                [red, green, blue, 255]
+            } else {
+                [0; 4]
+            };
+            assert_eq!(drawn, expected, "tile {x}, {y}");
+        }
+        let took = number(
+            &mut browser,
+            "(() => { const from = performance.now(); for (let at = 0; at < 20; at += 1) { map.draw(); map.pen.getImageData(0, 0, 1, 1); } return (performance.now() - from) / 20; })()",
+        );
+        println!("100 relays on map tiles: a drawing takes {took:.1} ms");
+        assert!(took < 100.0, "{took} ms");
+        save(&format!("tiles-100-{scheme}"), &browser.seen());
+        // Zooming in asks for the tiles there, and far out there are none.
+        browser.run("for (let at = 0; at < 8; at += 1) map.zoom(1.4)");
+        browser.until("[...map.tiles.keys()].some((it) => it.startsWith('/tiles/17/'))");
+        browser.until("[...map.tiles.values()].every((it) => it.complete) && map.pending === 0");
+        save(&format!("tiles-near-{scheme}"), &browser.seen());
+        browser.run("map.view.scale = 1e-4; map.draw()");
+        assert!(number(&mut browser, "map.tiles.size") <= 320.0);
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
+    // A page of another program shows no tiles, and asks for none.
+    let plain = Shown::begin(|| on_earth(8, 0.0));
+    let mut browser = plain.opened(1280, 900);
+    browser.until(&shows(9));
+    assert_eq!(
+        browser.value("[map.hasTiles, map.tiles.size]").to_string(),
+        "[false,0]"
+    );
+}
+
+#[test]
+fn the_ground_below_the_chain_is_drawn_with_relays_at_their_heights() {
+    let snapshot = |relays| {
+        let hill = |at: u16| 90.0 * (-((f64::from(at) - 80.0) / 25.0).powi(2)).exp();
+        let mut snapshot = full(relays, 0.0);
+        snapshot.ground = Some(GroundProfile {
+            length_m: 2_000.0,
+            mast_m: 10.0,
+            heights_m: (0..=240).map(hill).collect(),
+        });
+        for relay in &mut snapshot.relays {
+            let position = relay.position.as_mut().unwrap();
+            position.altitude_m = Some(60.0 + f64::from(relay.number % 10) * 8.0);
+        }
+        snapshot.relays[1].age_s = Some(12.0);
+        snapshot.relays[2].position.as_mut().unwrap().altitude_m = None;
+        snapshot
+    };
+    let shown = Shown::begin(move || snapshot(8));
+    for scheme in ["light", "dark"] {
+        let mut browser = shown.opened(1280, 900);
+        if scheme == "dark" {
+            browser.prefer_dark();
+        }
+        browser.until(&shows(9));
+        browser.until("!byId('profile').hidden && profile.pending === 0");
+        // The hill has its summit at 667 m, where relay 3 has no height.
+        let label = browser.text("byId('profile').getAttribute('aria-label')");
+        assert!(
+            label.starts_with("Ground below the chain: relay 1 ") && !label.contains("relay 3"),
+            "{label}"
+        );
+        let above = |browser: &mut Browser, x_m: f64, h_m: f64| {
+            browser.text(&format!("profile.aboveText({{ x: {x_m}, h: {h_m} }})"))
+        };
+        assert_eq!(
+            above(&mut browser, 2_000.0 / 3.0, 100.0),
+            "10 m above ground"
+        );
+        assert_eq!(above(&mut browser, 2_000.0, 50.0), "50 m above ground");
+        assert_eq!(above(&mut browser, 2_001.0, 50.0), "beyond the line");
+        // The ground is drawn from the bottom up to its height, and the hill is higher than the plain.
+        let tops = browser.value(
+            "(() => { profile.draw(); const { width, height } = profile.canvas; \
+             const top = (x) => { for (let y = 0; y < height; y += 1) { const [r, g, , a] = profile.pen.getImageData(x, y, 1, 1).data; if (a > 30 && a < 120 && g > r + 40) return y; } return height; }; \
+             const at = (x_m) => Math.round(60 + (x_m / 2000) * (width - 80)); return [top(at(640)), top(at(1900)), height]; })()",
+        );
+        let [hill, plain, bottom] = [0, 1, 2].map(|at| tops[at].as_f64().unwrap());
+        assert!(hill + 30.0 < plain && plain < bottom, "{tops}");
+        let room = number(
+            &mut browser,
+            "byId('relays').getBoundingClientRect().top - document.querySelector('.legend').getBoundingClientRect().bottom",
+        );
+        assert!(room >= 0.0, "the legend is {room} px above the table");
+        save(&format!("profile-{scheme}"), &browser.seen());
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
+    let phone = shown.opened(390, 844);
+    let many = Shown::begin(move || snapshot(100));
+    for (name, mut browser) in [("phone", phone), ("100", many.opened(1920, 1080))] {
+        browser.until("map.frames > 0 && !byId('profile').hidden && profile.pending === 0");
+        let over = "document.documentElement.scrollWidth - window.innerWidth";
+        assert!(number(&mut browser, over) <= 0.0);
+        save(&format!("profile-{name}"), &browser.screenshot());
+        let took = number(
+            &mut browser,
+            "(() => { const from = performance.now(); for (let at = 0; at < 20; at += 1) { profile.draw(); profile.pen.getImageData(0, 0, 1, 1); } return (performance.now() - from) / 20; })()",
+        );
+        println!("{name}: a drawing of the profile takes {took:.1} ms");
+        assert!(took < 50.0, "{took} ms");
+        assert_eq!(browser.errors(), Vec::<String>::new());
+    }
+    // Without terrain there is no profile.
+    let plain = shown_full(8);
+    let mut browser = plain.opened(1280, 900);
+    browser.until(&shows(9));
+    assert_eq!(browser.value("byId('profile').checkVisibility()"), false);
+}
+
 fn save(name: &str, picture: &[u8]) {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("screen-{name}.png"));
     std::fs::write(&file, picture).unwrap();
@@ -538,24 +851,39 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
     println!("pictures took {:?}", start.elapsed());
 }
 
+/// Returns the times of the first paint, ms, of `loads` loads of `url` in a browser that is already running.
+fn first_paints(browser: &mut Browser, url: &str, loads: usize) -> Vec<f64> {
+    let paint =
+        "performance.getEntriesByType('paint').find((it) => it.name === 'first-contentful-paint')";
+    let paints = (0..loads).map(|_| {
+        browser.open("about:blank");
+        browser.open(url);
+        browser.until(&format!("location.protocol === 'http:' && {paint}"));
+        number(browser, &format!("{paint}.startTime"))
+    });
+    let mut paints: Vec<f64> = paints.collect();
+    paints.sort_by(f64::total_cmp);
+    paints
+}
+
+#[test]
+fn the_first_paint_comes_within_a_tenth_of_a_second() {
+    let shown = shown_full(100);
+    let mut browser = Browser::start("about:blank", 1920, 1080);
+    // The first load of a browser starts its processes.
+    first_paints(&mut browser, &shown.screen.url(), 1);
+    let bare = first_paints(&mut browser, &format!("{}none", shown.screen.url()), 15);
+    let paints = first_paints(&mut browser, &shown.screen.url(), 15);
+    println!("first paints of a line of text: {bare:.0?} ms; of the page: {paints:.0?} ms");
+    // On a busy machine a line of text alone takes long: then the page may take four times as long.
+    let limit = f64::max(100.0, 4.0 * bare[0]);
+    assert!(paints[0] < limit, "{paints:?}, a line of text: {bare:?}");
+}
+
 #[test]
 fn a_hundred_relays_are_drawn_ten_times_a_second() {
     let shown = shown_full(100);
-    let mut browser = Browser::start("about:blank", 1920, 1080);
-    thread::sleep(Duration::from_secs(1));
-    let mut paints: Vec<f64> = (0..7)
-        .map(|_| {
-            browser.open("about:blank");
-            browser.open(&shown.screen.url());
-            let paint = "performance.getEntriesByName('first-contentful-paint')[0]";
-            browser.until(&format!("location.protocol === 'http:' && {paint}"));
-            number(&mut browser, &format!("{paint}.startTime"))
-        })
-        .collect();
-    println!("first paints of {} loads: {paints:.0?} ms", paints.len());
-    paints.sort_by(f64::total_cmp);
-    // The first one of a browser starts its processes. An idle machine takes less than 100 ms; this one may be busy.
-    assert!(paints[0] < 500.0, "{paints:?}");
+    let mut browser = shown.opened(1920, 1080);
     browser.until(&shows(100));
     // Ways of full length.
     browser.run(

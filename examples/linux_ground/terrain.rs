@@ -1,0 +1,135 @@
+//! Ground below the line from Tx to Rx, for the page.
+
+use uav_relay::flight::axis::Axis;
+use uav_relay::{Placement, Sites};
+use uav_relay_scenario::TerrainSpec;
+use uav_relay_screen::GroundProfile;
+use uav_relay_terrain::grid::Terrain;
+use uav_relay_terrain::profile::Ground;
+
+/// Number of parts of a profile. Each has the height of its highest ground.
+const PARTS: u16 = 240;
+
+/// Largest number of points of the elevation model that a part has.
+const MOST_POINTS: u16 = 32;
+
+/// Elevation model of the configuration file, and the profile of the line that is flown.
+pub(crate) struct Elevation {
+    terrain: Terrain,
+    mast_m: f64,
+    /// Line of the profile; `None` before the first one.
+    line: Option<Sites>,
+    profile: Option<GroundProfile>,
+}
+
+impl Elevation {
+    /// Reads the elevation files of the configuration file.
+    ///
+    /// # Errors
+    /// One line that names the file and the fault.
+    pub(crate) fn load(spec: &TerrainSpec) -> Result<Self, String> {
+        Ok(Self {
+            terrain: Terrain::load(&spec.files)?,
+            mast_m: spec.mast_m,
+            line: None,
+            profile: None,
+        })
+    }
+
+    /// Returns the profile of a line; `None` if the elevation files do not have all of it.
+    ///
+    /// # Errors
+    /// One line with the reason, once for each line.
+    pub(crate) fn along(&mut self, line: Sites) -> Result<Option<GroundProfile>, String> {
+        if self.line != Some(line) {
+            (self.line, self.profile) = (Some(line), None);
+            self.profile = Some(profile(&self.terrain, self.mast_m, line)?);
+        }
+        Ok(self.profile.clone())
+    }
+}
+
+fn profile(terrain: &Terrain, mast_m: f64, line: Sites) -> Result<GroundProfile, String> {
+    let axis = Axis::between(line).map_err(|error| error.to_string())?;
+    let ground = Ground::new(terrain, axis, [line.tx, line.rx], mast_m)?;
+    let length_m = axis.distance_m();
+    let part_m = length_m / f64::from(PARTS);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 32"
+    )]
+    let points = (part_m / ground.step_m())
+        .ceil()
+        .clamp(1.0, f64::from(MOST_POINTS)) as u16;
+    let height_m = |x_m: f64| {
+        // Altitudes of the chain count from the straight line between the sites.
+        let datum_m = ground.relay(Placement::on_line(narrow(x_m), 0.0))?.amsl_m;
+        Ok(ground.height_m(x_m, 0.0)? - datum_m)
+    };
+    let highest_m = |part: u16| {
+        let around = (0..=points).map(|point| {
+            let share = f64::from(point) / f64::from(points) - 0.5;
+            height_m((part_m * (f64::from(part) + share)).clamp(0.0, length_m))
+        });
+        let heights = around.collect::<Result<Vec<f64>, String>>()?;
+        let highest_m: f64 = heights.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        Ok((10.0 * highest_m).round() / 10.0)
+    };
+    Ok(GroundProfile {
+        length_m,
+        mast_m,
+        heights_m: (0..=PARTS).map(highest_m).collect::<Result<_, String>>()?,
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "metres of a mission")]
+const fn narrow(metres: f64) -> f32 {
+    metres as f32
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by it")]
+
+    use std::path::Path;
+
+    use uav_relay::Sites;
+    use uav_relay_scenario::TerrainSpec;
+
+    use super::Elevation;
+
+    #[test]
+    fn a_profile_has_the_highest_ground_of_each_part_above_the_line_of_the_sites() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hills.tif");
+        let mut elevation = Elevation::load(&TerrainSpec::of(vec![file])).unwrap();
+        let site = |text| uav_relay_linux::site::site(text).unwrap();
+        let line = Sites {
+            tx: site("47.20,8.510,482"),
+            rx: site("47.20,8.576,500"),
+        };
+        let profile = elevation.along(line).unwrap().unwrap();
+        assert_eq!((profile.heights_m.len(), profile.mast_m), (241, 2.0));
+        assert!((4_990.0..5_010.0).contains(&profile.length_m));
+        let sites = [0, 240].map(|at: usize| *profile.heights_m.get(at).unwrap());
+        assert!(sites.iter().all(|it| it.abs() < 15.0), "{sites:?}");
+        // The formula of the made-up hills, at its summits, less the line from 482 to 500 m.
+        for (part, height_m) in (0_u16..).zip(&profile.heights_m) {
+            let x_m = profile.length_m * f64::from(part) / 240.0;
+            let datum_m = 482.0 + 18.0 * x_m / profile.length_m;
+            let lon_deg = 8.510 + 0.066 * x_m / profile.length_m;
+            let model_m = elevation.terrain.height_m(47.20, lon_deg).unwrap();
+            let above_m = height_m + datum_m - model_m;
+            assert!((-0.3..8.0).contains(&above_m), "{x_m} m: {above_m} m");
+        }
+        // Another line outside of the files is refused once, and then has no profile.
+        let away = Sites {
+            rx: site("47.90,8.576,500"),
+            ..line
+        };
+        let error = elevation.along(away).unwrap_err();
+        assert!(error.contains("site.rx"), "{error}");
+        assert_eq!(elevation.along(away), Ok(None));
+        assert!(elevation.along(line).unwrap().is_some());
+    }
+}
