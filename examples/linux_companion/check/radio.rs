@@ -10,7 +10,7 @@
 //! | heard from a relay | the relay |
 //! | --- | --- |
 //! | fence without the flag `LEFT`; report of a drone in the air; position that has moved by 5 m | flies |
-//! | pass or lease renewal, and no fence of a relay that is not flown | may fly |
+//! | lease renewal, and no fence of a relay that is not flown | may fly |
 //! | fence of a relay that is not flown | is on the ground |
 
 use std::collections::{BTreeMap, VecDeque};
@@ -21,7 +21,7 @@ use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{Header, open};
 use uav_relay::wire::message::Message;
 use uav_relay::{
-    Auth, Duration, Event, Instant, MAX_FRAME, Placement, Port, Relay, Settings, Stats,
+    Auth, Departure, Duration, Event, Instant, MAX_FRAME, Placement, Port, Relay, Settings, Stats,
 };
 use uav_relay_linux::tty::Tty;
 
@@ -58,7 +58,7 @@ struct Heard {
     hears: Option<Instant>,
     /// True if its drone flies.
     flies: bool,
-    /// True after a message of a chain that has agreed on a view.
+    /// True after a lease renewal, so that its chain has agreed positions.
     takes_part: bool,
     /// First position of its drone that it reported while it was not flown.
     stands: Option<Placement>,
@@ -161,8 +161,11 @@ impl Radio {
             }
         }
         let may_send = may_send && now >= self.sends_from && self.flying().is_empty();
-        // It would come back inside when no view without it is agreed on.
-        self.relay.leave(now, None);
+        // It comes back inside when no view without it is agreed on.
+        if self.relay.departure(now) != Departure::Outside {
+            self.relay.stay(now);
+            self.relay.leave(now, None);
+        }
         self.relay.handle_timeout(now);
         while let Some(event) = self.relay.poll_event() {
             if let Event::DuplicateIndex { node } = event
@@ -255,7 +258,10 @@ impl Radio {
         self.relay.handle_bytes(now, port, frame);
         let after = self.relay.stats();
         let more = |of: fn(&Stats) -> u32| of(after).saturating_sub(of(&before));
-        heard.forged += more(|stats| stats.forged);
+        if !self.sent.is_empty() {
+            // Before, its frames are for an earlier start of this relay.
+            heard.forged += more(|stats| stats.forged);
+        }
         heard.replayed += more(|stats| stats.replayed);
         heard.unsigned += more(|stats| stats.unsigned) + more(|stats| stats.version);
         if more(|stats| stats.received) + more(|stats| stats.handshakes) == 0 {
@@ -371,9 +377,6 @@ impl Radio {
 impl Heard {
     /// Takes what a message says about the flight of its sender.
     fn observe(&mut self, content: &Content) {
-        use Message::{
-            Gather, Gathered, Moved, Pulse, Pulsed, Sense, Sensed, Sweep, Token, Verdict,
-        };
         let Content::Message(message) = content else {
             return;
         };
@@ -385,8 +388,7 @@ impl Heard {
                 let moved_m = (at.x_m - first.x_m).hypot(at.y_m - first.y_m);
                 self.flies |= moved_m.hypot(at.altitude_m - first.altitude_m) > STANDS_WITHIN_M;
             }
-            Sweep(_) | Verdict(_) | Gather(_) | Gathered(_) | Sense(_) | Sensed(_) | Token(_)
-            | Moved(_) | Pulse(_) | Pulsed(_) => self.takes_part = true,
+            Message::Pulse(_) | Message::Pulsed(_) => self.takes_part = true,
             _ => {}
         }
     }
