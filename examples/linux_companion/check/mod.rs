@@ -293,9 +293,12 @@ fn records(plan: &Plan) -> Vec<Line> {
         let name = format!("--view-file {}", file.display());
         lines.push((
             "votes",
-            votes.and_then(|(_, has_votes)| match has_votes {
-                true => Err(format!("{name}: has votes of an earlier flight; remove it")),
-                false => Ok(format!("{name}: has no votes")),
+            votes.and_then(|(_, has_votes)| {
+                if has_votes {
+                    Err(format!("{name}: has votes of an earlier flight; remove it"))
+                } else {
+                    Ok(format!("{name}: has no votes"))
+                }
             }),
         ));
     }
