@@ -2,6 +2,7 @@
 //!
 //! | module | content |
 //! | --- | --- |
+//! | [`check`] | colours, end and verdict of a check before flight |
 //! | [`command`] | command-line parsing and its error messages |
 //! | [`config`] | `--config` file, as options before those of the command line |
 //! | [`mission`], [`site`] | options of the mission, and of the line's place on earth |
@@ -18,6 +19,7 @@
 #![cfg(unix)]
 #![forbid(unsafe_code)]
 
+pub mod check;
 pub mod command;
 pub mod config;
 pub mod counters;

@@ -87,7 +87,7 @@ fn main() -> std::process::ExitCode {
         Err(code) => return code,
     };
     if let Some(seconds) = plan.options.check {
-        let is_green = check::run(&plan, std::time::Duration::from_secs(seconds));
+        let is_green = check::run(&plan, uav_relay::Duration::from_millis(1_000 * seconds));
         return ExitCode::from(u8::from(!is_green));
     }
     match relay::fly(&plan) {

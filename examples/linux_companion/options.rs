@@ -32,12 +32,21 @@ pub(crate) struct Options {
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Check before flight, for at most S seconds, 1 to 3600; 30 by default. Prints a line for each finding, green or red, and exits with
-    /// status 0 if all are green. It joins no chain and sends no targets
+    /// status 0 if all are green. It joins no chain and sends no targets. Before, it listens for a quarter of --dead-after-ms and two
+    /// seconds, and sends nothing to relays if one of them flies
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "30", require_equals = true, value_parser = whole::<u64>(1, 3_600), help_heading = "Check")]
     pub(crate) check: Option<u64>,
     /// Largest distance of the drone from its planned place, m, 1 to 1e6
     #[arg(long, value_name = "M", default_value_t = 500.0, requires = "check", allow_negative_numbers = true, value_parser = number([1.0, 1e6]), help_heading = "Check")]
     pub(crate) start_within: f32,
+    /// The drone is not to be checked. Without this option a check without --autopilot is red
+    #[arg(
+        long,
+        requires = "check",
+        conflicts_with = "autopilot",
+        help_heading = "Check"
+    )]
+    pub(crate) no_autopilot: bool,
     /// Number of this relay; 1 is next to the transmitter
     #[arg(long, value_name = "I", allow_negative_numbers = true, value_parser = whole::<u16>(1, 1000))]
     index: u16,

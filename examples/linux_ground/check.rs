@@ -2,6 +2,7 @@
 
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::{Duration, Ground, Instant, Phase, Report};
+use uav_relay_linux::check::{End, colour, verdict};
 use uav_relay_linux::log::Log;
 
 use crate::options::Plan;
@@ -16,8 +17,7 @@ const GREEN_FOR: Duration = Duration::from_millis(2_000);
 /// Check of a chain in progress.
 #[derive(Debug)]
 pub(crate) struct Check {
-    end: Instant,
-    green_since: Option<Instant>,
+    end: End,
 }
 
 impl Check {
@@ -25,8 +25,11 @@ impl Check {
     pub(crate) fn begin(now: Instant, seconds: u64, ground: &mut Ground) -> Self {
         ground.watch(now, true);
         Self {
-            end: now + Duration::from_millis(1_000 * seconds),
-            green_since: None,
+            end: End {
+                limit: now + Duration::from_millis(1_000 * seconds),
+                green_for: GREEN_FOR,
+                green_since: None,
+            },
         }
     }
 
@@ -51,13 +54,7 @@ impl Check {
             .iter()
             .filter(|(_, _, faults)| !faults.is_empty())
             .count();
-        let since = self.green_since.get_or_insert(now);
-        if red > 0 {
-            self.green_since = None;
-        } else if now.since(*since) >= GREEN_FOR {
-            self.end = now;
-        }
-        if now < self.end {
+        if !self.end.is_reached(now, red == 0) {
             return None;
         }
         log.line(
@@ -66,7 +63,7 @@ impl Check {
             "relay  colour  control   position             neighbours  mission  faults",
         );
         for (index, report, faults) in &rows {
-            let colour = if faults.is_empty() { "green" } else { "red" };
+            let colour = colour(faults.is_empty());
             let row = report.map(|it| {
                 let position = it.position.map_or_else(String::new, |at| {
                     format!("{:.0}, {:.0}, {:.0} m", at.x_m, at.y_m, at.altitude_m)
@@ -94,13 +91,12 @@ impl Check {
                 ),
             );
         }
-        Some(match red {
-            0 => Ok(()),
-            _ => Err(Fault {
-                line: format!("{red} of {relays} relays are red: do not fly"),
-                status: 1,
-            }),
-        })
+        let verdict = verdict(red, relays.into(), "relays");
+        Some(
+            verdict
+                .map(|_| ())
+                .map_err(|line| Fault { line, status: 1 }),
+        )
     }
 }
 

@@ -27,7 +27,10 @@ const EVERY: Duration = Duration::from_millis(1_000);
 /// Number of parameters that are requested at a time.
 const AT_A_TIME: usize = 6;
 
-/// Names of ArduCopter's parameters from 4.7 on, with the old names, and the old unit in the new one.
+/// Names of the parameter with the autopilot's own MAVLink system number.
+const SYSTEM: [&str; 2] = ["MAV_SYS_ID", "SYSID_THISMAV"];
+
+/// Names of ArduCopter's parameters up to 4.6 and from 4.7 on, and the old unit in the new one. An autopilot has one of the two.
 const NEW_NAMES: [(&str, &str, f64); 2] = [
     ("RTL_ALT", "RTL_ALT_M", 100.0),
     ("SYSID_THISMAV", "MAV_SYSID", 1.0),
@@ -323,12 +326,25 @@ impl Drone {
             "{}: {kind}, MAVLink system {}",
             self.name, heard.from.system
         );
-        let trust = if self.signs && self.signing.is_none() {
-            Err(format!(
+        let all = self.file.as_ref().and_then(|file| file.as_ref().ok());
+        let number = all.and_then(|(_, all)| {
+            all.iter()
+                .find(|it| SYSTEM.contains(&it.name.as_str()))
+                .filter(|it| differ(it.wanted, heard.from.system.into()))
+        });
+        let trust = match number {
+            _ if self.signs && self.signing.is_none() => Err(format!(
                 "{heard_text}: it signs its frames: give --autopilot-key-file"
-            ))
-        } else {
-            Ok(heard_text)
+            )),
+            Some(it) if it.found.is_some_and(|found| !differ(found, it.wanted)) => Err(format!(
+                "{heard_text}, but {} is {}: restart it, its parameters are stored but not active",
+                it.name, it.wanted
+            )),
+            Some(it) => Err(format!(
+                "{heard_text} instead of {}: is this the right drone?",
+                it.wanted
+            )),
+            None => Ok(heard_text),
         };
         vec![
             ("autopilot", trust),
@@ -413,10 +429,7 @@ impl Drone {
         let mut all: Vec<&Parameter> = all.iter().collect();
         all.sort_by(|one, other| one.name.cmp(&other.name));
         let name = file.display();
-        let differs = |it: &&&Parameter| {
-            it.found
-                .is_some_and(|found| (found - it.wanted).abs() > 1e-4 * it.wanted.abs().max(1.0))
-        };
+        let differs = |it: &&&Parameter| it.found.is_some_and(|found| differ(found, it.wanted));
         let wrong = all.iter().filter(differs).map(|it| {
             format!(
                 "{} is {} instead of {}",
@@ -436,6 +449,11 @@ impl Drone {
             Err(format!("{}; see {name}", faults.join(", ")))
         }
     }
+}
+
+/// Returns true if two values of a parameter differ by more than the rounding of an f32 and of a unit.
+fn differ(found: f64, wanted: f64) -> bool {
+    (found - wanted).abs() > 1e-4 * wanted.abs().max(1.0)
 }
 
 /// Returns the frame of PARAM_REQUEST_READ for the parameter `name`.
@@ -507,5 +525,8 @@ fn parameters(folder: Option<&Path>, kind: Kind) -> Result<(PathBuf, Vec<Paramet
             })
         })
         .collect();
-    Ok((file.clone(), all?))
+    let mut all = all?;
+    // The old name stands for both.
+    all.retain(|it| NEW_NAMES.iter().all(|(_, new, _)| *new != it.name));
+    Ok((file.clone(), all))
 }

@@ -6,7 +6,7 @@
 //! | `drone.rs` | autopilot: mode, position, parameters |
 //! | `radio.rs` | neighbours, without taking part in the chain |
 //!
-//! Nothing that the check sends moves a drone. To the autopilot it sends HEARTBEAT, message intervals and requests for parameters,
+//! Nothing that the check sends moves a drone. It first listens, and sends nothing to relays while a drone of theirs may fly. To the autopilot it sends HEARTBEAT, message intervals and requests for parameters,
 //! to other relays hellos, heartbeats and handshakes. It uses one epoch, because no epoch may be used twice.
 
 mod drone;
@@ -14,12 +14,14 @@ mod radio;
 
 use std::fs::{OpenOptions, remove_file};
 use std::io::Write as _;
-use std::os::unix::fs::FileTypeExt as _;
+use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant as Clock, SystemTime, UNIX_EPOCH};
+use std::time::{Duration as Span, Instant as Clock, SystemTime, UNIX_EPOCH};
 
 use rustix::fs::statvfs;
-use uav_relay::{Instant, Port, Relay};
+use rustix::process::geteuid;
+use uav_relay::{Duration, Instant, Port, Relay};
+use uav_relay_linux::check::{End, Finding, colour, verdict};
 use uav_relay_linux::tty::Tty;
 
 use crate::options::Plan;
@@ -29,13 +31,13 @@ use drone::Drone;
 use radio::Radio;
 
 /// Line of the check: its subject, and the finding. An `Err` is red.
-pub(crate) type Line = (&'static str, Result<String, String>);
+pub(crate) type Line = (&'static str, Finding);
 
 /// Time for which the check answers its neighbours after all lines are green. They may be checked, too.
-const LINGER: Duration = Duration::from_secs(5);
+const LINGER: Duration = Duration::from_millis(5_000);
 
 /// Pause between two turns of the main loop.
-const TURN: Duration = Duration::from_millis(20);
+const TURN: Span = Span::from_millis(20);
 
 /// Least free space of a disk for the files of a flight, bytes.
 const FREE: u64 = 64 << 20;
@@ -46,8 +48,8 @@ const YEAR_2024_S: u64 = 1_704_067_200;
 /// Files with the udev rules of a bundle: beside the configuration, or where they are installed.
 const RULES: &str = "70-uav-relay.rules";
 
-/// Checks this computer, the autopilot and the neighbours for at most `limit`. Prints all lines; returns true if all are
-/// green.
+/// Checks this computer, then the autopilot and the neighbours for at most `limit` after it has listened. Prints all lines; returns
+/// true if all are green.
 pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     let options = &plan.options;
     let (mut lines, ports) = ports(plan);
@@ -119,36 +121,40 @@ pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
         .autopilot
         .as_ref()
         .map(|autopilot| Drone::open(plan, autopilot));
-    let found = watch(now, limit, drone, radio);
+    let found = watch(plan, now, limit, drone, radio);
     found.iter().for_each(print);
     lines.extend(found);
     let red = lines.iter().filter(|(_, finding)| finding.is_err()).count();
-    let all = lines.len();
-    let _ = match red {
-        0 => writeln!(std::io::stdout(), "all {all} lines are green"),
-        _ => writeln!(
-            std::io::stdout(),
-            "{red} of {all} lines are red: do not fly"
-        ),
-    };
+    let (Ok(last) | Err(last)) = verdict(red, lines.len(), "lines");
+    let _ = writeln!(std::io::stdout(), "{last}");
     red == 0
 }
 
-/// Exchanges messages with the drone and the neighbours until all lines stay green, or until `limit`.
+/// Exchanges messages with the drone and the neighbours until all lines stay green, or for `limit` after it has listened.
 fn watch(
+    plan: &Plan,
     now: impl Fn() -> Instant,
     limit: Duration,
     mut drone: Option<Result<Drone, String>>,
     mut radio: Result<Radio, String>,
 ) -> Vec<Line> {
-    let (end, linger) = (Clock::now() + limit, LINGER.min(limit / 4));
-    let mut green_since = None;
+    let mut end = End {
+        limit: radio.as_ref().map_or_else(|_| now(), Radio::sends_from) + limit,
+        green_for: LINGER.min(Duration::from_micros(limit.as_micros() / 4)),
+        green_since: None,
+    };
     loop {
         let time = now();
         let mut lines = Vec::new();
         let mut may_send = true;
         match &mut drone {
-            None => lines.push(("autopilot", Ok("none: the drone is not checked".to_owned()))),
+            None if plan.options.no_autopilot => {
+                lines.push(("autopilot", Ok("none: the drone is not checked".to_owned())));
+            }
+            None => {
+                may_send = false;
+                lines.push(("autopilot", Err("no autopilot is configured: give --autopilot, or --no-autopilot if the drone is not to be checked".to_owned())));
+            }
             Some(Err(why)) => {
                 may_send = false;
                 lines.push(("autopilot", Err(why.clone())));
@@ -163,14 +169,10 @@ fn watch(
             Err(why) => lines.push(("neighbours", Err(why.clone()))),
             Ok(radio) => {
                 radio.exchange(time, may_send);
-                lines.extend(radio.lines());
+                lines.extend(radio.lines(time));
             }
         }
-        let is_green = lines.iter().all(|(_, finding)| finding.is_ok());
-        let since = green_since.filter(|_| is_green);
-        green_since = is_green.then(|| since.unwrap_or_else(Clock::now));
-        let has_lingered = green_since.is_some_and(|since| since.elapsed() >= linger);
-        if has_lingered || Clock::now() >= end {
+        if end.is_reached(time, lines.iter().all(|(_, finding)| finding.is_ok())) {
             return lines;
         }
         std::thread::sleep(TURN);
@@ -179,10 +181,8 @@ fn watch(
 
 /// Prints a line; a closed standard output is ignored.
 fn print((subject, finding): &Line) {
-    let (colour, text) = match finding {
-        Ok(text) => ("green", text),
-        Err(text) => ("red", text),
-    };
+    let colour = colour(finding.is_ok());
+    let (Ok(text) | Err(text)) = finding;
     let _ = writeln!(std::io::stdout(), "{colour:<6} {subject:<11} {text}");
 }
 
@@ -233,22 +233,30 @@ fn clock(now: SystemTime) -> Result<String, String> {
 /// Returns the free space for `file`, bytes, after bytes were written there.
 fn space(file: &Path) -> Result<u64, String> {
     let failed = |error: std::io::Error| format!("cannot be written: {error}");
-    let is_special = file.metadata().is_ok_and(|about| {
-        let kind = about.file_type();
-        kind.is_char_device() || kind.is_fifo() || kind.is_socket()
-    });
-    if is_special {
-        let mut open = OpenOptions::new();
-        open.append(true)
-            .open(file)
-            .and_then(|mut it| it.write_all(b"\n"))
-            .map_err(failed)?;
-        return Ok(FREE);
-    }
     let folder = file
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
+    if let Ok(about) = file.metadata() {
+        let kind = about.file_type();
+        let is_special = kind.is_char_device() || kind.is_fifo() || kind.is_socket();
+        let text: &[u8] = if is_special { b"\n" } else { b"" };
+        let mut open = OpenOptions::new();
+        open.append(true)
+            .open(file)
+            .and_then(|mut it| it.write_all(text))
+            .map_err(failed)?;
+        if is_special {
+            return Ok(FREE);
+        }
+    }
+    // Root may write everywhere, the unit's user may not.
+    let owner = folder.metadata().map_or(0, |about| about.uid());
+    if geteuid().is_root() && owner != 0 {
+        return Err(format!(
+            "its folder belongs to user {owner}: run the check as that user, not as root"
+        ));
+    }
     let trial = folder.join(format!(".uav-relay-check-{}", std::process::id()));
     let written = std::fs::write(&trial, [0; 4_096]);
     let _ = remove_file(&trial);
@@ -282,17 +290,16 @@ fn records(plan: &Plan) -> Vec<Line> {
                 let votes = records::resume_views(file, &mut relay, Instant::ZERO);
                 votes.map_err(|refusal| refusal.line)
             });
-        let text = |has_votes| {
-            if has_votes {
-                "has the votes of an earlier start with this mission; for a new flight remove it"
-            } else {
-                "has no votes"
-            }
-        };
         let name = format!("--view-file {}", file.display());
         lines.push((
             "votes",
-            votes.map(|(_, has_votes)| format!("{name}: {}", text(has_votes))),
+            votes.and_then(|(_, has_votes)| {
+                if has_votes {
+                    Err(format!("{name}: has votes of an earlier flight; remove it"))
+                } else {
+                    Ok(format!("{name}: has no votes"))
+                }
+            }),
         ));
     }
     if let Some(file) = &plan.options.upload_file {
@@ -300,12 +307,12 @@ fn records(plan: &Plan) -> Vec<Line> {
         let upload = records::load_upload(file, &plan.mission);
         lines.push((
             "upload",
-            upload.map(|upload| match upload {
-                Some(upload) => format!(
-                    "{name}: version {}, which this relay flies from its start",
+            upload.and_then(|upload| match upload {
+                Some(upload) => Err(format!(
+                    "{name}: has version {} of an earlier flight, which the relay would fly instead of the mission of its file; remove it",
                     upload.version()
-                ),
-                None => format!("{name}: has no mission"),
+                )),
+                None => Ok(format!("{name}: has no mission")),
             }),
         ));
     }

@@ -3,14 +3,26 @@
 //! A relay of the library answers the handshakes, but only hellos, claims, heartbeats and handshakes pass between it and the ports. So it
 //! receives no proposal and no vote, and sends none: it can not become a member of the chain. On a shared channel its hellos say, too,
 //! that it is outside.
+//!
+//! Relays of a flying chain would all the same take it for one that has restarted. So it sends nothing before it has listened for a
+//! period of the lease renewals, and then only while no relay flies:
+//!
+//! | heard from a relay | the relay |
+//! | --- | --- |
+//! | fence without the flag `LEFT`; report of a drone in the air; position that has moved by 5 m | flies |
+//! | lease renewal, and no fence of a relay that is not flown | may fly |
+//! | fence of a relay that is not flown | is on the ground |
 
 use std::collections::{BTreeMap, VecDeque};
 
+use uav_relay::guard::Fence;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{Header, open};
 use uav_relay::wire::message::Message;
-use uav_relay::{Auth, Duration, Event, Instant, MAX_FRAME, Port, Relay, Settings, Stats};
+use uav_relay::{
+    Auth, Departure, Duration, Event, Instant, MAX_FRAME, Placement, Port, Relay, Settings, Stats,
+};
 use uav_relay_linux::tty::Tty;
 
 use super::Line;
@@ -26,15 +38,30 @@ const REMEMBERED: usize = 64;
 /// Number of damaged frames from which on the data rate is suspected.
 const DAMAGED: u32 = 5;
 
+/// Age from which on what was heard of a neighbour does not count.
+const OLD: Duration = Duration::from_millis(10_000);
+
+/// Time added to the longest period of the lease renewals while the check only listens.
+const RESERVE: Duration = Duration::from_millis(2_000);
+
+/// Distance by which the reported position of a drone on the ground may change, m.
+const STANDS_WITHIN_M: f32 = 5.0;
+
 /// Neighbour, by the frames that bear its number.
 #[derive(Clone, Copy, Debug, Default)]
 struct Heard {
-    /// True after a frame with its number in this network, to any relay.
-    is_received: bool,
-    /// True after a frame to this relay with the right key.
-    is_verified: bool,
-    /// True if the neighbour's last message says that it receives this relay.
-    hears: bool,
+    /// Time of the last frame with its number in this network, to any relay.
+    received: Option<Instant>,
+    /// Time of the last frame to this relay with the right key.
+    verified: Option<Instant>,
+    /// Time of the neighbour's last message that says that it receives this relay.
+    hears: Option<Instant>,
+    /// True if its drone flies.
+    flies: bool,
+    /// True after a lease renewal, so that its chain has agreed positions.
+    takes_part: bool,
+    /// First position of its drone that it reported while it was not flown.
+    stands: Option<Placement>,
     /// Digest of its mission.
     mission: Option<u16>,
     /// Frames with another key, without a signature, of another network, of an old epoch.
@@ -66,6 +93,7 @@ pub(super) struct Radio {
     /// Number of frames of another node with this relay's number.
     twins: u32,
     damaged: u32,
+    sends_from: Instant,
 }
 
 impl Radio {
@@ -106,15 +134,37 @@ impl Radio {
             sent: VecDeque::new(),
             twins: 0,
             damaged: 0,
+            // The longest period of the lease renewals is a quarter of the time.
+            sends_from: now
+                + Duration::from_micros(plan.settings.dead_after.as_micros() / 4)
+                + RESERVE,
         })
     }
 
-    /// Exchanges frames with the neighbours; without `may_send` it only listens.
+    /// Returns the time before which the check only listens.
+    pub(super) const fn sends_from(&self) -> Instant {
+        self.sends_from
+    }
+
+    /// Returns the relays that fly, or take part in a chain without a report that their drones are on the ground.
+    fn flying(&self) -> Vec<String> {
+        let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
+        let flying = self.heard.iter().filter(|(_, heard)| flies(heard));
+        flying.map(|(node, _)| node.to_string()).collect()
+    }
+
+    /// Exchanges frames with the neighbours; without `may_send`, or while a relay may fly, it only listens.
     pub(super) fn exchange(&mut self, now: Instant, may_send: bool) {
         for at in 0..self.wires.len() {
             for (port, frame) in self.read(at) {
                 self.take(now, port, &frame);
             }
+        }
+        let may_send = may_send && now >= self.sends_from && self.flying().is_empty();
+        // It comes back inside when no view without it is agreed on.
+        if self.relay.departure(now) != Departure::Outside {
+            self.relay.stay(now);
+            self.relay.leave(now, None);
         }
         self.relay.handle_timeout(now);
         while let Some(event) = self.relay.poll_event() {
@@ -191,7 +241,16 @@ impl Radio {
             self.twins += 1;
             return;
         }
-        heard.is_received = true;
+        heard.received = Some(now);
+        if let Content::Message(Message::Report(reports)) = &content {
+            for entry in &reports.entries {
+                // Its drone is in the air: `Standby`, `Engaged` or `Blind`.
+                self.heard.entry(entry.relay()).or_default().flies |=
+                    entry.state() / 4_096 % 6 >= 3;
+            }
+            return;
+        }
+        heard.observe(&content);
         if !content.is_harmless() {
             return;
         }
@@ -199,37 +258,56 @@ impl Radio {
         self.relay.handle_bytes(now, port, frame);
         let after = self.relay.stats();
         let more = |of: fn(&Stats) -> u32| of(after).saturating_sub(of(&before));
-        heard.forged += more(|stats| stats.forged);
+        if !self.sent.is_empty() {
+            // Before, its frames are for an earlier start of this relay.
+            heard.forged += more(|stats| stats.forged);
+        }
         heard.replayed += more(|stats| stats.replayed);
         heard.unsigned += more(|stats| stats.unsigned) + more(|stats| stats.version);
         if more(|stats| stats.received) + more(|stats| stats.handshakes) == 0 {
             return;
         }
-        heard.is_verified = true;
-        match content {
-            Content::Handshake(epoch) => heard.hears |= self.epoch == Some(epoch),
+        heard.verified = Some(now);
+        let hears = match content {
+            Content::Handshake(epoch) => self.epoch == Some(epoch),
             Content::Message(Message::Hello(hello)) => {
                 let distance = header.sender.abs_diff(self.index);
                 heard.mission = Some(hello.mission);
-                heard.hears = (1..=4).contains(&distance) && hello.hears >> (distance - 1) & 1 == 1;
+                let hears = (1..=4).contains(&distance) && hello.hears >> (distance - 1) & 1 == 1;
+                heard.hears = heard.hears.filter(|_| hears);
+                hears
             }
             Content::Message(Message::Heartbeat { mission, reply, .. }) => {
                 heard.mission = Some(mission);
-                heard.hears |= reply != 0;
+                reply != 0
             }
-            Content::Message(_) => {}
+            Content::Message(_) => false,
+        };
+        if hears {
+            heard.hears = Some(now);
         }
     }
 
-    /// Returns the findings about the neighbours and this relay's number.
-    pub(super) fn lines(&self) -> Vec<Line> {
-        let mut lines = Vec::new();
+    /// Returns the findings about the chain, the neighbours and this relay's number.
+    pub(super) fn lines(&self, now: Instant) -> Vec<Line> {
+        let flying = self.flying();
+        let mut lines = vec![(
+            "chain",
+            if flying.is_empty() {
+                Ok("no relay was heard that flies".to_owned())
+            } else {
+                Err(format!(
+                    "the chain flies: relay {} was heard, and did not report that its drone is on the ground; check before flight only",
+                    flying.join(", ")
+                ))
+            },
+        )];
         let neighbours = [self.index.checked_sub(1), self.index.checked_add(1)];
         let neighbours = neighbours
             .into_iter()
             .flatten()
             .filter(|node| (1..=self.of).contains(node));
-        lines.extend(neighbours.map(|node| ("neighbour", self.neighbour(node))));
+        lines.extend(neighbours.map(|node| ("neighbour", self.neighbour(now, node))));
         lines.push(("number", match self.twins {
             0 => Ok(format!("no other relay {} is heard", self.index)),
             twins => Err(format!("another relay {} is on the channel ({twins} frames): two drones have the same number", self.index)),
@@ -237,19 +315,24 @@ impl Radio {
         lines
     }
 
-    fn neighbour(&self, node: u16) -> Result<String, String> {
+    fn neighbour(&self, now: Instant, node: u16) -> Result<String, String> {
         let heard = self.heard.get(&node).copied().unwrap_or_default();
         let digest = self.digest;
+        let is_recent = |at: Option<Instant>| at.is_some_and(|at| now.since(at) < OLD);
+        if heard.received.is_some() && !is_recent(heard.received) {
+            return Err(format!("relay {node}: nothing heard for 10 s"));
+        }
+        let is_verified = is_recent(heard.verified);
         if let Some(other) = heard
             .mission
-            .filter(|other| heard.is_verified && *other != digest)
+            .filter(|other| is_verified && *other != digest)
         {
             return Err(format!(
                 "relay {node} has another mission, 0x{other:04x} instead of 0x{digest:04x}"
             ));
         }
-        if heard.is_verified {
-            return match (heard.hears, heard.mission) {
+        if is_verified {
+            return match (is_recent(heard.hears), heard.mission) {
                 (true, Some(_)) => Ok(format!(
                     "relay {node}: heard both ways, mission 0x{digest:04x}"
                 )),
@@ -278,7 +361,7 @@ impl Radio {
                 format!("relay {node} signs, and this relay has no --key-file")
             }
             Heard {
-                is_received: true, ..
+                received: Some(_), ..
             } => format!(
                 "relay {node} is received, but sends nothing to this relay: it does not hear it, or has another key"
             ),
@@ -288,6 +371,26 @@ impl Radio {
             ),
             _ => format!("relay {node}: nothing heard"),
         })
+    }
+}
+
+impl Heard {
+    /// Takes what a message says about the flight of its sender.
+    fn observe(&mut self, content: &Content) {
+        let Content::Message(message) = content else {
+            return;
+        };
+        match message {
+            Message::Fence { fence, .. } if fence.flags & Fence::LEFT == 0 => self.flies = true,
+            Message::Fence { fence, .. } if fence.flags & Fence::UNPLACED != 0 => {
+                let at = fence.across.at(fence.x_m);
+                let first = *self.stands.get_or_insert(at);
+                let moved_m = (at.x_m - first.x_m).hypot(at.y_m - first.y_m);
+                self.flies |= moved_m.hypot(at.altitude_m - first.altitude_m) > STANDS_WITHIN_M;
+            }
+            Message::Pulse(_) | Message::Pulsed(_) => self.takes_part = true,
+            _ => {}
+        }
     }
 }
 

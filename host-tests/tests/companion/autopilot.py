@@ -17,7 +17,9 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     noise 150                    a SiK radio hears so much between frames
     clear 2                      a ground station clears relay 2: MAV_CMD_USER_1 to the companion, by way of this autopilot
     track                        from now on its place is an output line, too, 50 times a second, with this computer's time
-    params FILE                  its parameters, and with them its system number; in the format of its ground station
+    params FILE [4.7]            its parameters, and with them its system number; in the format of its ground station. An
+                                 ArduCopter knows the names up to 4.6, or those from 4.7 on
+    system 9                     another system number than that of its parameters
     param NAME [VALUE]           another value of one; without VALUE it does not know it
     unplug, plug                 the tty or the UDP port vanishes; another one is there
 """
@@ -45,6 +47,8 @@ ON_GROUND, IN_AIR, TAKEOFF = 1, 2, 3
 # SET_POSITION_TARGET_GLOBAL_INT: position is given, acceleration is not; above the mean sea level.
 POSITION, ACCELERATION, AMSL = 0b111, 0b1_1100_0000, 5
 DEGREE_M = 111_200.0
+# Of ArduCopter's parameters.
+OLD_NAMES, NEW_NAMES = ("SYSID_THISMAV", "RTL_ALT"), ("MAV_SYSID", "RTL_ALT_M")
 # Where stamps of signatures begin: 2015-01-01, Unix time.
 STAMPS_BEGIN = 1_420_070_400
 
@@ -194,9 +198,13 @@ class Drone:
                 self.noise(int(noise))
             case ["clear", *relays]:
                 self.forward(relays)
-            case ["params", file]:
+            case ["system", number]:
+                self.system = self.codec.srcSystem = int(number)
+            case ["params", file, *version]:
                 fields = [line.split("\t" if self.kind == "px4" else ",") for line in open(file) if line[0] != "#"]
                 self.parameters = {line[-3 if self.kind == "px4" else 0]: float(line[-2 if self.kind == "px4" else 1]) for line in fields}
+                for name in OLD_NAMES if version else NEW_NAMES:
+                    self.parameters.pop(name, None)
                 self.number()
             case ["param", name, *value]:
                 self.parameters.pop(name, None)
@@ -211,7 +219,8 @@ class Drone:
 
     def number(self):
         """It takes its own system number from its parameters."""
-        self.system = int(self.parameters.get("MAV_SYS_ID", self.parameters.get("SYSID_THISMAV", SYSTEM)))
+        names = ["MAV_SYS_ID", "MAV_SYSID", "SYSID_THISMAV"]
+        self.system = int(next((self.parameters[name] for name in names if name in self.parameters), SYSTEM))
         self.codec.srcSystem = self.system
 
     def value(self, message):

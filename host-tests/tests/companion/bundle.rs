@@ -13,7 +13,7 @@ use crate::binary::{companion, ground, plan, provision};
 use crate::chain::{Chain, QUICK, simulated};
 use crate::files::Files;
 use crate::medium::{Medium, Noise, QUIET};
-use crate::peer::{Peer, RX, distance_to_m};
+use crate::peer::{Peer, RX, ReceivedMessage, distance_to_m};
 use crate::process::{Relay, bits};
 
 /// Text in the udev rules of a new bundle.
@@ -231,6 +231,9 @@ fn a_bundle_is_green_and_its_relays_agree() {
         assert!(row.contains(fault), "{row}");
     }
 
+    let upload = "--version 1 --new-interferer 80,520,400 --yes";
+    Relay::ground(&format!("--config {} {upload}", ground.display())).succeeds();
+
     // A relay that is gone does not report.
     drop(relays);
     let (rows, _) = check(5).fails(1);
@@ -239,6 +242,70 @@ fn a_bundle_is_green_and_its_relays_agree() {
         3,
         "{rows:#?}"
     );
+    let reds = bench.reds("", 1);
+    for part in [
+        "has votes of an earlier flight; remove it",
+        "has version 1 of an earlier flight",
+    ] {
+        assert!(reds.iter().any(|it| it.contains(part)), "{part}: {reds:#?}");
+    }
+}
+
+/// Checks that a check beside a flying chain refuses, and that the chain does not notice it.
+#[test]
+fn a_check_does_not_disturb_a_chain_that_flies() {
+    let mut bench = Bench::new();
+    let mut relays = bench.neighbours();
+    for (relay, at) in relays.iter_mut().zip([0, 2]) {
+        let drone = &mut bench.drones[at];
+        relay.line("autopilot: on the ground, or not armed");
+        relay.line("converged: ");
+        drone.takes_off();
+        relay.line("autopilot: ready");
+        drone.receive(ReceivedMessage::is_target);
+    }
+    for (relay, at) in relays.iter_mut().zip([0, 2]) {
+        bench.drones[at].order("mode companion");
+        relay.line("autopilot: setpoint control engaged");
+    }
+    let refuses = |relays: &mut [Relay; 2]| {
+        let reds = bench.reds("", 8);
+        let part = "red    chain       the chain flies: relay 1, 3 was heard";
+        assert!(reds.iter().any(|it| it.starts_with(part)), "{reds:#?}");
+        for relay in relays {
+            let lines = relay.lines_with("");
+            let is_change = |line: &&String| {
+                ["view", "relay 2", "chain has", "converged"]
+                    .iter()
+                    .any(|part| line.contains(part))
+            };
+            assert!(!lines.iter().any(|line| is_change(&line)), "{lines:#?}");
+        }
+    };
+    // Their first positions under setpoint control count after some seconds. Then they are on their way, and later at their places.
+    for seconds in [6, 15] {
+        std::thread::sleep(Duration::from_secs(seconds));
+        for relay in &mut relays {
+            relay.lines_with("");
+        }
+        refuses(&mut relays);
+    }
+}
+
+/// Checks that a neighbour that falls silent in the course of a check is red.
+#[test]
+fn a_neighbour_that_falls_silent_is_red() {
+    let mut bench = Bench::new();
+    bench.drones[1].order("lose");
+    let [first, _third] = bench.neighbours();
+    let check = bench.companion(2, "--check=20");
+    // Both are heard by then.
+    std::thread::sleep(Duration::from_secs(9));
+    drop(first);
+    let lines = check.end().stdout;
+    println!("{}", lines.join("\n"));
+    let is = |part: &str| lines.iter().any(|it| it.contains(part));
+    assert!(is("relay 1: nothing heard for 10 s") && is("relay 3: heard both ways"));
 }
 
 #[test]
@@ -282,6 +349,16 @@ fn a_check_names_planted_faults_of_the_computer() {
         "--capture /proc/frames",
         &["disk        --capture /proc/frames: cannot be written"],
     );
+    let folder = bench.files.text("folder");
+    std::fs::create_dir(&folder).unwrap();
+    statics(&format!("--log-file {folder}"), &["disk        --log-file"]);
+    if rustix::process::geteuid().is_root() {
+        std::os::unix::fs::chown(&folder, Some(4_321), None).unwrap();
+        statics(
+            &format!("--log-file {folder}/log"),
+            &["belongs to user 4321: run the check as that user"],
+        );
+    }
     let views = bench.files.text("views-of-another-mission");
     let mut other = bench.companion(
         2,
@@ -326,6 +403,7 @@ fn a_check_names_planted_faults_of_the_autopilot() {
     let mut bench = Bench::new();
     let _relays = bench.neighbours();
     bench.finds("", &[]);
+    let parameters = bench.path("relay2/ardupilot.parm");
     let mut with = |orders: &[&str], parts: &[&str], back: &[&str], more: &str| {
         for order in orders {
             bench.drones[1].order(order);
@@ -364,6 +442,7 @@ fn a_check_names_planted_faults_of_the_autopilot() {
             "param SYSID_THISMAV 9",
         ],
         &[
+            "MAVLink system 9 instead of 2: is this the right drone?",
             "mode        OFFBOARD or GUIDED",
             "position    none from the autopilot",
             "parameters  FENCE_ACTION is 1 instead of 4, SYSID_THISMAV is 9 instead of 2, FENCE_TYPE is unanswered; see ",
@@ -377,6 +456,14 @@ fn a_check_names_planted_faults_of_the_autopilot() {
         ],
         "",
     );
+    with(
+        &["mode pilot", "system 9"],
+        &["MAVLink system 9, but SYSID_THISMAV is 2: restart it"],
+        &["system 2"],
+        "",
+    );
+    let file = parameters.display();
+    with(&[&format!("params {file} 4.7")], &[], &["mode rtl"], "");
     let far = "20 m from its planned place, more than 10 m";
     with(
         &[],
@@ -445,9 +532,10 @@ fn a_check_names_planted_faults_of_the_radio() {
     let twin = bench.companion(
         2,
         &format!(
-            "--shared {} --epoch-file {}",
+            "--shared {} --epoch-file {} --view-file {}",
             bench.channel.tty(5),
-            bench.files.text("twin")
+            bench.files.text("twin"),
+            bench.files.text("twin-views")
         ),
     );
     std::thread::sleep(Duration::from_secs(2));
@@ -483,7 +571,10 @@ fn a_relay_on_wires_is_checked() {
         chain.relay(index, &format!("{signed} {more}"))
     };
     let mut relays = [start(1, ""), start(3, "")];
-    let lines = start(2, "--check=20").succeeds();
+    let reds = start(2, "--check=1").end().stdout;
+    let part = "autopilot   no autopilot is configured: give --autopilot, or --no-autopilot";
+    assert!(reds.iter().any(|it| it.contains(part)), "{reds:#?}");
+    let lines = start(2, "--check=20 --no-autopilot").succeeds();
     println!("{}", lines.join("\n"));
     assert_eq!(
         lines
@@ -516,6 +607,19 @@ fn a_bundle_is_written_whole_or_not_at_all() {
         assert_eq!(about.permissions().mode() & 0o777, mode, "{file}");
     }
     assert!(!files.path("out/relay1").exists() && files.path("out/ground/page.txt").exists());
+    // Nothing is installed before the serial numbers are filled in.
+    let mut install = Command::new("sh");
+    let installed = install
+        .arg(files.path("out/relay2/install.sh"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8(installed.stdout).unwrap();
+    assert!(
+        !installed.status.success()
+            && said.contains(":4:SUBSYSTEM")
+            && said.contains("replace FILL-IN"),
+        "{said}"
+    );
     let refused = |text: &str, more: &str, part: &str| {
         let output = bundle(&files, text, more);
         let said = String::from_utf8(output.stderr).unwrap();
@@ -552,6 +656,17 @@ fn a_bundle_is_written_whole_or_not_at_all() {
         .unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("nowhere: No such file"), "{said}");
+    for (section, line) in [
+        ("companion", "log_file = \"/var/log/relay\""),
+        ("companion", "positions = \"fifo\""),
+        ("ground", "capture = \"/tmp/frames\""),
+        ("ground", "measurements = \"noise\""),
+    ] {
+        let text = format!("{}\n[{section}]\n{line}\n", scenario());
+        refused(&text, "", &format!("{section}.{line}: "));
+    }
+    let high = scenario().replace("altitude_m = 20.0", "altitude_m = 980.0");
+    refused(&high, "", "FENCE_ALT_MAX would be");
     let unsited = scenario().replace("[site]", "[geometry.site]");
     refused(&unsited, "", "site");
     let left: Vec<_> = std::fs::read_dir(files.path(""))

@@ -1,7 +1,7 @@
 //! Bundles of a flight on Linux computers: one folder for each drone, and one for the ground station.
 
 use std::fmt::Write as _;
-use std::fs::{OpenOptions, Permissions};
+use std::fs::{File, OpenOptions, Permissions};
 use std::io::Write as _;
 use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
@@ -18,6 +18,16 @@ pub const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
 const LINK: &str = "uav-relay-";
 
 const RELAY_UNIT: &str = include_str!("../../../../examples/linux_companion/uav-relay@.service");
+
+/// Folders in which the units may write.
+const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
+
+/// Largest MAVLink system number of a drone; ground stations have the next ones.
+const MAX_SYSTEM: u16 = 250;
+
+/// Largest radius and altitude of ArduCopter's fences, m.
+const FENCE_RADIUS_M: f64 = 10_000.0;
+const FENCE_ALT_M: f64 = 1_000.0;
 
 /// Type of an integer parameter in a PX4 parameter file, `MAV_PARAM_TYPE_INT32`.
 const INT: u8 = 6;
@@ -53,7 +63,7 @@ pub struct Bundle<'a> {
 }
 
 /// File of a bundle: name, mode, content.
-type File = (&'static str, u32, String);
+type Content = (&'static str, u32, String);
 
 /// Autopilot parameter: names and values in PX4 and in ArduCopter, where they exist, and PX4 type.
 type Parameter = (Option<(&'static str, u8, f64)>, Option<(&'static str, f64)>);
@@ -97,14 +107,17 @@ impl Bundle<'_> {
                 write(&folder.join(file), mode, &content)
                     .map_err(|error| named(&dir.join(&name).join(file), &error))?;
             }
+            sync(&folder).map_err(|error| named(&dir.join(&name), &error))?;
         }
         // Other users of this computer see the names of the files, not the keys.
         std::fs::set_permissions(staged.path(), Permissions::from_mode(0o755))
+            .and_then(|()| sync(staged.path()))
             .and_then(|()| std::fs::rename(staged.path(), dir))
+            .and_then(|()| sync(parent))
             .map_err(|error| named(dir, &error))
     }
 
-    fn key_files(&self) -> impl Iterator<Item = File> {
+    fn key_files(&self) -> impl Iterator<Item = Content> {
         let hex = |key: [u8; 32]| {
             key.iter()
                 .fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"))
@@ -116,11 +129,18 @@ impl Bundle<'_> {
     }
 
     /// Returns the files of relay `index`.
-    fn relay(&self, index: u16) -> Result<Vec<File>, String> {
+    fn relay(&self, index: u16) -> Result<Vec<Content>, String> {
+        if index > MAX_SYSTEM {
+            return Err(format!(
+                "relay {index}: the MAVLink system number of a drone is at most {MAX_SYSTEM}"
+            ));
+        }
         let own = &self.deployment.companion;
         let mut file = self.document()?;
         _ = file.remove("ground");
         let section = section(&mut file, "companion")?;
+        written_files(section, "companion", &["log_file", "capture"])?;
+        absolute(section, "companion", &["positions"])?;
         section.insert("index", value(i64::from(index)));
         let mut ports = vec!["shared"];
         if own.upstream.is_some() || own.downstream.is_some() {
@@ -160,7 +180,7 @@ impl Bundle<'_> {
             .replace(" --index %i", "")
             .replace("Relay %i of", &format!("Relay {index} of"))
             .replace("uav-relay@%i", "uav-relay");
-        let parameters = self.parameters(index);
+        let parameters = self.parameters(index)?;
         let mut px4 = "# Vehicle-Id\tComponent-Id\tName\tValue\tType\n".to_owned();
         let mut ardupilot = String::new();
         for (of_px4, of_ardupilot) in parameters {
@@ -190,12 +210,24 @@ impl Bundle<'_> {
     }
 
     /// Returns the files of the ground station.
-    fn ground(&self) -> Result<Vec<File>, String> {
+    fn ground(&self) -> Result<Vec<Content>, String> {
         let own = &self.deployment.companion;
         let is_shared = own.upstream.is_none() && own.downstream.is_none();
         let mut file = self.document()?;
         _ = file.remove("companion");
         let section = section(&mut file, "ground")?;
+        written_files(section, "ground", &["log_file", "capture"])?;
+        absolute(section, "ground", &["web_password"])?;
+        let is_file = |it: &&String| !it.starts_with("udp:");
+        if self
+            .deployment
+            .ground
+            .measurements
+            .iter()
+            .any(|it| is_file(&it))
+        {
+            absolute(section, "ground", &["measurements"])?;
+        }
         default(section, "tty", &format!("/dev/{LINK}shared"));
         default(section, "end", "tx");
         state_file(section, "epoch_file", "epoch");
@@ -240,8 +272,10 @@ impl Bundle<'_> {
             .text
             .parse()
             .map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
-        // Only the planner reads the elevation files, which are not in the bundle.
-        _ = file.remove("terrain");
+        // Only the planner reads the elevation files and no-fly areas, whose files are not in the bundle.
+        for section in ["terrain", "no_fly"] {
+            _ = file.remove(section);
+        }
         let network = section(&mut file, "network")?;
         network.insert("id", value(i64::from(self.network)));
         network.insert("relays", value(i64::from(self.uavs)));
@@ -260,7 +294,10 @@ impl Bundle<'_> {
     /// Returns the parameters that the chain needs in the autopilot of relay `index`.
     ///
     /// Drones return at different altitudes, because a returning drone crosses the line of the others.
-    fn parameters(&self, index: u16) -> Vec<Parameter> {
+    ///
+    /// # Errors
+    /// The highest one is above the range of a fence.
+    fn parameters(&self, index: u16) -> Result<Vec<Parameter>, String> {
         let config = self.mission.config();
         let fence = self.fence(index);
         let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
@@ -270,14 +307,25 @@ impl Bundle<'_> {
         let step_m = (f64::from(config.min_separation_m) + 2.0).max(6.0).ceil();
         let return_m = |index: u16| (top_m + 10.0).ceil() + step_m * f64::from(index - 1);
         let wide_m = f64::from(fence.most_y_m.max(-fence.least_y_m));
+        // A drone takes off near its place, so that the largest radius contains its flight.
         let radius_m = (f64::from(config.distance_m) + wide_m + 200.0).ceil();
+        let radius_m = radius_m.min(FENCE_RADIUS_M);
         let ceiling_m = return_m(self.uavs) + 20.0;
+        if ceiling_m > FENCE_ALT_M {
+            return Err(format!(
+                "FENCE_ALT_MAX would be {ceiling_m} m: {} drones that return above each other and above the chain need a fence above {FENCE_ALT_M} m, which ArduCopter does not have",
+                self.uavs
+            ));
+        }
         let baud = self.deployment.companion.autopilot_baud.unwrap_or(115_200);
         let (own, baud) = (f64::from(index), f64::from(baud));
         let px4 = |name, kind, value| (Some((name, kind, value)), None);
         let ardupilot = |name, value| (None, Some((name, value)));
-        vec![
+        Ok(vec![
             (Some(("MAV_SYS_ID", INT, own)), Some(("SYSID_THISMAV", own))),
+            // The names from ArduCopter 4.7 on: an autopilot knows one of the two.
+            ardupilot("MAV_SYSID", own),
+            ardupilot("RTL_ALT_M", return_m(index)),
             // TELEM 2, messages for an onboard computer.
             px4("MAV_1_CONFIG", INT, 102.0),
             px4("MAV_1_MODE", INT, 2.0),
@@ -295,6 +343,11 @@ impl Bundle<'_> {
                 Some(("RTL_RETURN_ALT", FLOAT, return_m(index))),
                 Some(("RTL_ALT", 100.0 * return_m(index))),
             ),
+            // A drone that is engaged goes on without its remote control. The 16 is ArduCopter's default.
+            ardupilot("FS_OPTIONS", 20.0),
+            // Near home, too, a drone first climbs to its own altitude.
+            px4("RTL_CONE_ANG", INT, 0.0),
+            ardupilot("RTL_CONE_SLOPE", 0.0),
             // Hold, or brake, at a fence around home that contains the flight.
             (Some(("GF_ACTION", INT, 2.0)), Some(("FENCE_ACTION", 4.0))),
             ardupilot("FENCE_ENABLE", 1.0),
@@ -307,7 +360,7 @@ impl Bundle<'_> {
                 Some(("GF_MAX_VER_DIST", FLOAT, ceiling_m)),
                 Some(("FENCE_ALT_MAX", ceiling_m)),
             ),
-        ]
+        ])
     }
 
     fn heading(&self, who: &str) -> String {
@@ -363,15 +416,24 @@ impl Bundle<'_> {
         };
         let [before, after] = [Side::Upstream, Side::Downstream].map(neighbour);
         _ = writeln!(page, "neighbours: {before} and {after}\n");
-        page.push_str(
+        let (more, parameters) = match self.deployment.companion.positions {
+            Some(_) => (" --no-autopilot", ""),
+            None => (
+                "",
+                "[ ] px4.params or ardupilot.parm loaded into the autopilot, which is then restarted\n",
+            ),
+        };
+        _ = write!(
+            page,
             "Before flight, propellers off:\n\
              [ ] serial numbers of the adapters in 70-uav-relay.rules, then: sudo sh install.sh\n\
-             [ ] px4.params or ardupilot.parm loaded into the autopilot, which is then restarted\n\
-             [ ] sudo systemctl stop uav-relay; sudo -u uav-relay linux_companion --check --config /etc/uav-relay/drone.toml\n\
-             [ ] all lines green, then: sudo rm -f /var/lib/uav-relay/views; sudo systemctl start uav-relay\n\
+             {parameters}\
+             [ ] sudo systemctl stop uav-relay; sudo rm -f /var/lib/uav-relay/views /var/lib/uav-relay/mission\n\
+             [ ] sudo -u uav-relay linux_companion --check{more} --config /etc/uav-relay/drone.toml\n\
+             [ ] all lines green, then: sudo systemctl start uav-relay\n\
              In the air:\n\
              [ ] flown by hand to its place in the order along the line, between its neighbours\n\
-             [ ] OFFBOARD or GUIDED chosen after the log line `ready`; any other mode takes the drone back\n",
+             [ ] OFFBOARD or GUIDED chosen after the log line `ready`; any other mode takes the drone back\n"
         );
         page
     }
@@ -390,6 +452,48 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
     if !section.contains_key(key) {
         section.insert(key, value(text));
     }
+}
+
+/// Moves relative paths of files that the unit writes, if they are given, into the folder that it may write.
+///
+/// # Errors
+/// An absolute path is in another folder.
+fn written_files(section: &mut dyn TableLike, name: &str, keys: &[&str]) -> Result<(), String> {
+    for key in keys {
+        let Some(given) = section
+            .get(key)
+            .and_then(Item::as_str)
+            .map(ToOwned::to_owned)
+        else {
+            continue;
+        };
+        state_file(section, key, &given);
+        let path = section.get(key).and_then(Item::as_str).map(Path::new);
+        let may_write = |path: &Path| WRITABLE.iter().any(|folder| path.starts_with(folder));
+        if !path.is_some_and(may_write) {
+            return Err(format!(
+                "{name}.{key} = {given:?}: the unit may write only in {}",
+                WRITABLE.join(" and ")
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses relative paths of files that are not in the bundle.
+///
+/// # Errors
+/// The key and its path.
+fn absolute(section: &dyn TableLike, name: &str, keys: &[&str]) -> Result<(), String> {
+    for key in keys {
+        let given = section.get(key).and_then(Item::as_str);
+        if let Some(given) = given.filter(|path| !Path::new(path).is_absolute()) {
+            return Err(format!(
+                "{name}.{key} = {given:?}: this file is not in the bundle: give its path on the other computer, from the root folder"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Moves a relative path of a written file into the folder that the unit may write.
@@ -435,6 +539,7 @@ fn install(program: &str, config: &str, unit: &str) -> String {
          # Installs this folder; {program} is already in /usr/local/bin. Type: sudo sh install.sh\n\
          set -e\n\
          cd \"$(dirname \"$0\")\"\n\
+         if grep -Hn '^[^#].*{FILL_IN}' *.rules; then echo \"replace {FILL_IN} first: see the comments there\"; exit 1; fi\n\
          test -x /usr/local/bin/{program} || {{ echo \"/usr/local/bin/{program} is missing\"; exit 1; }}\n\
          id uav-relay > /dev/null 2>&1 || useradd --system --groups dialout uav-relay\n\
          install -d -m 755 /etc/uav-relay\n\
@@ -454,4 +559,8 @@ fn write(file: &Path, mode: u32, content: &str) -> std::io::Result<()> {
     let mut new = options.write(true).create_new(true).mode(mode).open(file)?;
     new.write_all(content.as_bytes())?;
     new.sync_all()
+}
+
+fn sync(folder: &Path) -> std::io::Result<()> {
+    File::open(folder)?.sync_all()
 }

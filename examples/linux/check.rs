@@ -1,0 +1,47 @@
+//! Colours, end and verdict of a check before flight, `--check`.
+
+use uav_relay::{Duration, Instant};
+
+/// Result of one item of a check, as a text. An `Err` is red.
+pub type Finding = Result<String, String>;
+
+/// Returns the colour of an item of a check.
+#[must_use]
+pub const fn colour(is_green: bool) -> &'static str {
+    if is_green { "green" } else { "red" }
+}
+
+/// Returns the last line of a check with `red` red ones of `all` items, whose plural is `items`.
+///
+/// # Errors
+/// The line, if an item is red.
+pub fn verdict(red: usize, all: usize, items: &str) -> Finding {
+    if red == 0 {
+        Ok(format!("all {all} {items} are green"))
+    } else {
+        Err(format!("{red} of {all} {items} are red: do not fly"))
+    }
+}
+
+/// End of a check: all items have been green for a time, or its limit is over.
+#[derive(Debug)]
+pub struct End {
+    /// Latest end.
+    pub limit: Instant,
+    /// Time for which all items have to be green.
+    pub green_for: Duration,
+    /// Time since which all items have been green.
+    pub green_since: Option<Instant>,
+}
+
+impl End {
+    /// Takes the present state of all items. Returns true at the end of the check.
+    pub fn is_reached(&mut self, now: Instant, are_green: bool) -> bool {
+        let since = self.green_since.filter(|_| are_green);
+        self.green_since = are_green.then(|| since.unwrap_or(now));
+        let is_settled = self
+            .green_since
+            .is_some_and(|since| now.since(since) >= self.green_for);
+        is_settled || now >= self.limit
+    }
+}
