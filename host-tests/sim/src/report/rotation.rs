@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::timeline::seconds;
-use crate::simulator::rotation::{GOOD, RESERVE_S, Rotated, RotationSpec};
+use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSpec};
 
 /// Result of a run in which drones with tired batteries are replaced.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -55,9 +55,12 @@ pub struct RotationFigures {
     /// Smallest true distance of two drones in the air, m. Drones flown by their pilots count, too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest_m: Option<f64>,
-    /// Relays of the two nearest drones.
+    /// Time of the closest approach, s.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub nearest_pair: Option<[usize; 2]>,
+    pub nearest_at_s: Option<f64>,
+    /// Two nearest drones at that time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest: Option<[NearDrone; 2]>,
     /// Largest number of chains that flew by agreements of their own at the same time.
     pub chains: usize,
 }
@@ -81,8 +84,9 @@ impl RotationFigures {
             mean_wait_s: rotated.waits_s / left,
             longest_wait_s: rotated.longest_wait_s,
             least_left_s: rotated.least_left_s,
-            nearest_m: rotated.nearest.map(|it| it.apart_m),
-            nearest_pair: rotated.nearest.map(|it| it.pair),
+            nearest_m: rotated.nearest.as_ref().map(|it| it.apart_m),
+            nearest_at_s: rotated.nearest.as_ref().map(|it| seconds(it.at)),
+            nearest: rotated.nearest.as_ref().map(|it| it.drones.clone()),
             chains,
         }
     }
@@ -147,9 +151,20 @@ impl RotationReport {
         row("nearest distance of two drones, m", &|it| {
             some(it.nearest_m, 2)
         });
+        row("nearest distance at, s", &|it| some(it.nearest_at_s, 1));
         row("most chains at the same time", &|it| it.chains.to_string());
         if self.unannounced.is_some() {
             text += "unannounced: a tired drone flies home with its relay off, and a spare in the air is switched on at that moment\n";
+        }
+        for figures in std::iter::once(&self.announced).chain(&self.unannounced) {
+            for drone in figures.nearest.iter().flatten() {
+                let [[x, y, h], [to_x, to_y, to_h]] = [drone.at_m, drone.goal_m];
+                _ = writeln!(
+                    text,
+                    "nearest: relay {} at ({x:.1}, {y:.1}, {h:.1}) m toward ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
+                    drone.relay, drone.state
+                );
+            }
         }
         text
     }

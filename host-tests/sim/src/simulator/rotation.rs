@@ -1,13 +1,15 @@
 //! Fleet larger than its chain: batteries, pilots, chargers, and the record of a run.
 //!
 //! Pilots fly in tubes of their own. Take-offs are at one side of the line from Tx to Rx, returns at the other side; drones in the air at
-//! the same side have altitudes of their own. A spare waits beside the line at 1.25 spacings of the pilots.
+//! the same side have altitudes of their own. A spare waits beside the line at 1.25 spacings of the pilots, and keeps its altitude, a
+//! spacing from that of any other spare, until its relay has flown it into the line.
 
 use std::collections::VecDeque;
 
+use serde::Serialize;
 use uav_relay::{Duration, Instant};
 
-use super::drones::{Nearest, Point};
+use super::drones::Point;
 
 /// Parameters of a run in which drones with tired batteries are replaced.
 #[derive(Clone, PartialEq, Debug)]
@@ -57,8 +59,8 @@ pub(super) const CLIMB_MPS: f64 = 4.0;
 pub(super) enum Duty {
     /// Drone on the ground, with a full battery from this time on.
     Ground(Instant),
-    /// Drone on the way to its place beside the line, in this tube.
-    Rising { path: VecDeque<Point>, tube: usize },
+    /// Drone on the way to its place beside the line.
+    Rising { path: VecDeque<Point> },
     /// Spare beside the line, with its relay outside of the chain.
     Standby,
     /// Drone flown by its relay.
@@ -77,6 +79,8 @@ pub(super) struct Battery {
     pub(super) used_s: f64,
     /// Time of the request to leave; `None` before.
     pub(super) requested: Option<Instant>,
+    /// Tube at the side of take-offs, from take-off until the drone is in the line.
+    pub(super) tube: Option<usize>,
     /// Time since which a spare hovers at its place.
     pub(super) hovers_since: Instant,
     /// True once the drone has been in place after it joined: the data depends on it.
@@ -106,8 +110,32 @@ pub struct Rotated {
     pub waits_s: f64,
     /// Least remaining endurance of a drone of the chain beyond its way home, s.
     pub least_left_s: Option<f64>,
-    /// Closest approach of two drones in the air.
-    pub nearest: Option<Nearest>,
+    /// Closest approach of two drones in the air since the start.
+    pub nearest: Option<Encounter>,
+}
+
+/// Closest approach of two drones, and their states at that time.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Encounter {
+    /// True distance of the two drones, m.
+    pub apart_m: f64,
+    /// Time of the closest approach.
+    pub at: Instant,
+    /// The two drones, the lower number first.
+    pub drones: [NearDrone; 2],
+}
+
+/// Drone of an [`Encounter`].
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct NearDrone {
+    /// Number of the drone's relay.
+    pub relay: usize,
+    /// Activity of the drone, departure state of its relay, and what holds its setpoint toward Tx and toward Rx.
+    pub state: String,
+    /// True position: x, y and altitude, m.
+    pub at_m: Point,
+    /// Position to which the drone flies, by its own estimate, m.
+    pub goal_m: Point,
 }
 
 /// State of the pilots, and the record.
@@ -136,9 +164,8 @@ impl Rotation {
     pub(super) fn free_tube(&self, home: bool) -> usize {
         let is_used = |tube: usize| {
             self.drones.iter().any(|drone| match &drone.duty {
-                Duty::Rising { tube: used, .. } => !home && *used == tube,
                 Duty::Home { tube: used, .. } => home && *used == tube,
-                _ => false,
+                _ => !home && drone.tube == Some(tube),
             })
         };
         (0..=self.drones.len())
@@ -146,17 +173,17 @@ impl Rotation {
             .unwrap_or(0)
     }
 
-    /// Returns the way from the ground to the place `x_m` beside the line at the altitude `altitude_m`.
+    /// Returns the way from the ground to the place `x_m` beside the line, a spacing above `altitude_m` for each lower tube.
     pub(super) fn way_out(&self, x_m: f64, altitude_m: f64, tube: usize) -> VecDeque<Point> {
         let spacing_m = self.spacing_m;
-        let (pad_m, high_m) = self.tube(altitude_m, tube);
+        let (pad_m, above_m) = self.tube(altitude_m, tube);
+        let high_m = above_m - spacing_m;
         let [near_m, far_m] = [-1.25 * spacing_m, -2.5 * spacing_m];
         [
             [pad_m, far_m, 0.0],
             [pad_m, far_m, high_m],
             [x_m, far_m, high_m],
             [x_m, near_m, high_m],
-            [x_m, near_m, altitude_m],
         ]
         .into()
     }

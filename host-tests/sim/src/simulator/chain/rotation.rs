@@ -10,7 +10,7 @@ use crate::simulator::drones::{
 };
 use crate::simulator::outcome::TimelineEvent;
 use crate::simulator::rotation::{
-    Battery, CLIMB_MPS, Duty, MOVING, Rotated, Rotation, RotationSpec, SPEED_MPS, duration,
+    Battery, CLIMB_MPS, Duty, Encounter, MOVING, NearDrone, Rotated, Rotation, RotationSpec, SPEED_MPS, duration,
 };
 use crate::simulator::watch::{has_agreed, undisturbed};
 
@@ -89,6 +89,7 @@ impl Chain {
                     0.6 * share * spec.endurance_s
                 },
                 requested: None,
+                tube: None,
                 hovers_since: Instant::ZERO,
                 is_settled: true,
             });
@@ -274,16 +275,61 @@ impl Chain {
             .map(|(index, (_, drone))| (index, drone.at()))
             .collect();
         let places: Vec<Point> = air.iter().map(|(_, at)| *at).collect();
-        if let Some(mut nearest) = Nearest::of(&places, now)
-            && rotation
-                .record
-                .nearest
-                .is_none_or(|it| nearest.apart_m < it.apart_m)
+        let least_m = rotation.record.nearest.as_ref().map_or(f64::INFINITY, |it| it.apart_m);
+        if std::env::var_os("C35_TRACE").is_some() {
+            let text: String = rotation.drones.iter().zip(&self.members).map(|(d, m)| match d.duty {
+                Duty::Ground(at) => if at <= now { 'g' } else { '.' },
+                Duty::Rising { .. } => '^',
+                Duty::Standby => match m.relay.departure(now) { Departure::Spare => 's', Departure::Member => 'j', _ => '?' },
+                Duty::Home { .. } => 'h',
+                Duty::Serving => match m.relay.departure(now) { Departure::Member => if d.is_settled { 'M' } else { 'm' }, Departure::Requested => 'R', Departure::Outside => 'O', Departure::Free => 'F', _ => 'X' },
+            }).collect();
+            let relays: Vec<u16> = self.members.iter().zip(&rotation.drones).filter(|(m, d)| d.duty == Duty::Serving && m.killed.is_none()).map(|(m, _)| m.relay.neighbours()[1].unwrap_or(0)).collect();
+            let holds: String = self.members.iter().zip(&rotation.drones).enumerate().filter(|(_, (m, d))| d.duty == Duty::Serving && m.killed.is_none()).filter_map(|(i, (m, _))| { let h = [Side::Upstream, Side::Downstream].map(|s| m.relay.hold_reason(s)); (h != [None, None]).then(|| format!("{}:{:?}/{:?} ", i + 1, h[0], h[1]).replace("Some", "").replace("None", "-")) }).collect();
+            let xs: Vec<String> = self.members.iter().zip(&rotation.drones).zip(&flight.drones).enumerate().filter(|(_, ((_, d), _))| matches!(d.duty, Duty::Serving | Duty::Standby)).map(|(i, ((m, _), f))| format!("{}:{:.0}({:.0})>{:.0}>{:.0}", i + 1, f.at()[0], f.at()[1], m.relay.setpoint().map_or(f32::NAN, |p| p.x_m), m.relay.agreed_place().map_or(f32::NAN, |p| p.x_m))).collect();
+            let waits: Vec<String> = rotation.drones.iter().enumerate().filter(|(_, d)| d.requested.is_some()).map(|(i, d)| format!("{}:{:.0}", i + 1, seconds(now.since(d.requested.unwrap())))).collect();
+            eprintln!("T {:.1} {:.3} {} next{:?} req{:?} {} | {}", now.as_micros() as f64 / 1e6, share, text, relays, waits, xs.join(" "), holds);
+        }
+        if std::env::var_os("C35_NEAR").is_some()
+            && let Some(nearest) = Nearest::of(&places, now).filter(|it| it.apart_m < 3.2)
         {
-            nearest.pair = nearest
-                .pair
-                .map(|at| air.get(at - 1).map_or(0, |(index, _)| index + 1));
-            rotation.record.nearest = Some(nearest);
+            let pair = nearest.pair.map(|at| air.get(at - 1).map_or(0, |(index, _)| *index));
+            eprintln!("NEAR {:.1} {:.2} {:?}", now.as_micros() as f64 / 1e6, nearest.apart_m, pair.map(|index| self.near_drone(rotation, flight, index)));
+        }
+        if let Some(nearest) = Nearest::of(&places, now).filter(|it| it.apart_m < least_m) {
+            let pair = nearest.pair.map(|at| air.get(at - 1).map_or(0, |(index, _)| *index));
+            rotation.record.nearest = Some(Encounter {
+                apart_m: nearest.apart_m,
+                at: now,
+                drones: pair.map(|index| self.near_drone(rotation, flight, index)),
+            });
+        }
+    }
+
+    /// Returns drone `index` (from 0) as part of an encounter.
+    fn near_drone(&self, rotation: &Rotation, flight: &Flight, index: usize) -> NearDrone {
+        let duty = match rotation.drones.get(index).map(|it| &it.duty) {
+            Some(Duty::Rising { .. }) => "on its way to its place beside the line",
+            Some(Duty::Standby) => "spare beside the line",
+            Some(Duty::Home { .. }) => "on its way home",
+            Some(Duty::Serving) => "flown by its relay",
+            Some(Duty::Ground(_)) | None => "on the ground",
+        };
+        let relay = self.members.get(index).filter(|it| it.killed.is_none());
+        let relay = relay.map_or("relay off".to_owned(), |member| {
+            let relay = &member.relay;
+            let holds = [Side::Upstream, Side::Downstream].map(|side| {
+                relay.hold_reason(side).map_or("nothing".to_owned(), |it| format!("{it:?}"))
+            });
+            let [up, down] = holds;
+            format!("{:?}, held by {up} toward Tx and {down} toward Rx", relay.departure(self.now))
+        });
+        let drone = flight.drones.get(index);
+        NearDrone {
+            relay: index + 1,
+            state: format!("{duty}; {relay}"),
+            at_m: drone.map_or([f64::NAN; 3], Drone::at),
+            goal_m: drone.map_or([f64::NAN; 3], |it| it.goal),
         }
     }
 
@@ -323,7 +369,7 @@ impl Chain {
         match &mut battery.duty {
             Duty::Ground(_) => return false,
             Duty::Standby | Duty::Serving => {}
-            Duty::Rising { path, .. } | Duty::Home { path, .. } => {
+            Duty::Rising { path } | Duty::Home { path, .. } => {
                 if let Some(next) = path.front()
                     && apart(*next, estimated) < ARRIVED_M
                 {
@@ -381,6 +427,7 @@ impl Chain {
             }
             let agreed = member.relay.agreed_place().map(point);
             battery.is_settled |= agreed.is_some_and(|place| apart(place, at) < 3.0);
+            battery.tube = battery.tube.filter(|_| !battery.is_settled);
         }
         let leaves = battery.duty == Duty::Serving && departure == Departure::Free;
         let moves = drone.moves() || apart(drone.goal, estimated) > 0.01;
@@ -432,6 +479,7 @@ impl Chain {
             return;
         };
         battery.duty = Duty::Home { path, tube };
+        battery.tube = None;
         let waited_s = battery
             .requested
             .take()
@@ -580,7 +628,8 @@ impl Chain {
             {
                 drone.used_s = 0.0;
                 drone.requested = None;
-                drone.duty = Duty::Rising { path, tube };
+                drone.duty = Duty::Rising { path };
+                drone.tube = Some(tube);
                 rotation.last_take_off = now;
                 self.take_off_from.push((index, pad));
             }
