@@ -10,7 +10,8 @@ use crate::simulator::drones::{
 };
 use crate::simulator::outcome::TimelineEvent;
 use crate::simulator::rotation::{
-    Battery, CLIMB_MPS, Duty, Encounter, MOVING, NearDrone, Rotated, Rotation, RotationSpec, SPEED_MPS, duration,
+    Battery, CLIMB_MPS, Duty, Encounter, MOVING, NearDrone, Rotated, Rotation, RotationSpec,
+    SPEED_MPS, duration,
 };
 use crate::simulator::watch::{has_agreed, undisturbed};
 
@@ -275,29 +276,15 @@ impl Chain {
             .map(|(index, (_, drone))| (index, drone.at()))
             .collect();
         let places: Vec<Point> = air.iter().map(|(_, at)| *at).collect();
-        let least_m = rotation.record.nearest.as_ref().map_or(f64::INFINITY, |it| it.apart_m);
-        if std::env::var_os("C35_TRACE").is_some() {
-            let text: String = rotation.drones.iter().zip(&self.members).map(|(d, m)| match d.duty {
-                Duty::Ground(at) => if at <= now { 'g' } else { '.' },
-                Duty::Rising { .. } => '^',
-                Duty::Standby => match m.relay.departure(now) { Departure::Spare => 's', Departure::Member => 'j', _ => '?' },
-                Duty::Home { .. } => 'h',
-                Duty::Serving => match m.relay.departure(now) { Departure::Member => if d.is_settled { 'M' } else { 'm' }, Departure::Requested => 'R', Departure::Outside => 'O', Departure::Free => 'F', _ => 'X' },
-            }).collect();
-            let relays: Vec<u16> = self.members.iter().zip(&rotation.drones).filter(|(m, d)| d.duty == Duty::Serving && m.killed.is_none()).map(|(m, _)| m.relay.neighbours()[1].unwrap_or(0)).collect();
-            let holds: String = self.members.iter().zip(&rotation.drones).enumerate().filter(|(_, (m, d))| d.duty == Duty::Serving && m.killed.is_none()).filter_map(|(i, (m, _))| { let h = [Side::Upstream, Side::Downstream].map(|s| m.relay.hold_reason(s)); (h != [None, None]).then(|| format!("{}:{:?}/{:?} ", i + 1, h[0], h[1]).replace("Some", "").replace("None", "-")) }).collect();
-            let xs: Vec<String> = self.members.iter().zip(&rotation.drones).zip(&flight.drones).enumerate().filter(|(_, ((_, d), _))| matches!(d.duty, Duty::Serving | Duty::Standby)).map(|(i, ((m, _), f))| format!("{}:{:.0}({:.0})>{:.0}>{:.0}", i + 1, f.at()[0], f.at()[1], m.relay.setpoint().map_or(f32::NAN, |p| p.x_m), m.relay.agreed_place().map_or(f32::NAN, |p| p.x_m))).collect();
-            let waits: Vec<String> = rotation.drones.iter().enumerate().filter(|(_, d)| d.requested.is_some()).map(|(i, d)| format!("{}:{:.0}", i + 1, seconds(now.since(d.requested.unwrap())))).collect();
-            eprintln!("T {:.1} {:.3} {} next{:?} req{:?} {} | {}", now.as_micros() as f64 / 1e6, share, text, relays, waits, xs.join(" "), holds);
-        }
-        if std::env::var_os("C35_NEAR").is_some()
-            && let Some(nearest) = Nearest::of(&places, now).filter(|it| it.apart_m < 3.2)
-        {
-            let pair = nearest.pair.map(|at| air.get(at - 1).map_or(0, |(index, _)| *index));
-            eprintln!("NEAR {:.1} {:.2} {:?}", now.as_micros() as f64 / 1e6, nearest.apart_m, pair.map(|index| self.near_drone(rotation, flight, index)));
-        }
+        let least_m = rotation
+            .record
+            .nearest
+            .as_ref()
+            .map_or(f64::INFINITY, |it| it.apart_m);
         if let Some(nearest) = Nearest::of(&places, now).filter(|it| it.apart_m < least_m) {
-            let pair = nearest.pair.map(|at| air.get(at - 1).map_or(0, |(index, _)| *index));
+            let pair = nearest
+                .pair
+                .map(|at| air.get(at - 1).map_or(0, |(index, _)| *index));
             rotation.record.nearest = Some(Encounter {
                 apart_m: nearest.apart_m,
                 at: now,
@@ -319,10 +306,15 @@ impl Chain {
         let relay = relay.map_or("relay off".to_owned(), |member| {
             let relay = &member.relay;
             let holds = [Side::Upstream, Side::Downstream].map(|side| {
-                relay.hold_reason(side).map_or("nothing".to_owned(), |it| format!("{it:?}"))
+                relay
+                    .hold_reason(side)
+                    .map_or("nothing".to_owned(), |it| format!("{it:?}"))
             });
             let [up, down] = holds;
-            format!("{:?}, held by {up} toward Tx and {down} toward Rx", relay.departure(self.now))
+            format!(
+                "{:?}, held by {up} toward Tx and {down} toward Rx",
+                relay.departure(self.now)
+            )
         });
         let drone = flight.drones.get(index);
         NearDrone {
@@ -704,8 +696,8 @@ impl Chain {
         let is_on_line = |index: usize| {
             let drone = rotation.drones.get(index);
             let is_away = drone.is_none_or(|drone| match &drone.duty {
-                Duty::Ground(_) | Duty::Rising { .. } => true,
-                Duty::Standby | Duty::Serving => false,
+                Duty::Ground(_) | Duty::Rising { .. } | Duty::Standby => true,
+                Duty::Serving => false,
                 Duty::Home { .. } => flight
                     .true_position(index)
                     .is_some_and(|at| at[1].abs() >= rotation.spacing_m),
