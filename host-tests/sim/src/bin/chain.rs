@@ -23,7 +23,7 @@ use uav_relay_sim::{command, svg};
 
 fn main() -> ExitCode {
     match Options::try_parse() {
-        Ok(options) => command::ended(run(&options)),
+        Ok(options) => command::ended(run(&options.settled())),
         Err(error) => command::usage(&error),
     }
 }
@@ -80,6 +80,11 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
     if let Some(file) = &options.svg {
         command::write(file, &svg::draw(&run.picture(&outcome, &report)))?;
+    }
+    report.rotation = run.rotation(&outcome)?;
+    if report.rotation.is_some() {
+        // The availability counts drones on the ground as missing.
+        report.watched = uav_relay_sim::report::chain::AvailabilityReport::default();
     }
     show(options, &report)
 }

@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use uav_relay::flight::axis::{Axis, LONGEST_M, SHORTEST_M};
 use uav_relay::{Duration, GuardConfig, Instant, Sites, Wiring};
 
+use super::rotation::Rotation;
 use super::time::{instant, span};
 use super::upload::Uploads;
 use crate::command::{Failure, carries, number, whole};
@@ -423,16 +424,16 @@ fn soak(text: &str) -> Result<Instant, String> {
 }
 
 /// Bound on the constant error of a drone's reported position, m.
-const BIAS_M: f64 = 0.5;
+pub(super) const BIAS_M: f64 = 0.5;
 /// Bound on the random error of a drone's reported position, m.
-const NOISE_M: f64 = 0.3;
+pub(super) const NOISE_M: f64 = 0.3;
 /// Standard deviation of the gusts, m/s per axis.
 const GUST_MPS: f64 = 0.3;
 
 /// Largest distance of a hovering drone's reported position from its setpoint, m.
 ///
 /// It allows for the errors of the position and for gusts.
-const HOVER_M: f32 = 1.5;
+pub(super) const HOVER_M: f32 = 1.5;
 
 /// Command-line options for simulated drones, their pilots and autopilots.
 #[derive(Args, Debug)]
@@ -449,6 +450,8 @@ pub struct Flight {
     /// File with the position of each drone's first hand-over, one line `index, x_m, y_m, h_m` per drone
     #[arg(long, value_name = "FILE", requires = "fly")]
     start: Option<PathBuf>,
+    #[command(flatten)]
+    pub rotation: Rotation,
 }
 
 /// Largest |x|, |y| and height of the start position that an option gives a drone, m.
@@ -457,6 +460,11 @@ const START_WITHIN_M: f64 = 5_000.0;
 impl Flight {
     pub const fn is_chosen(&self) -> bool {
         self.fly
+    }
+
+    /// Returns the number of drones of the fleet, if it is given.
+    pub const fn fleet(&self) -> Option<u16> {
+        self.rotation.fleet
     }
 
     /// Returns each `--takeover` option as text, for error messages, and the start of the takeover.
@@ -497,6 +505,9 @@ impl Flight {
         }
         let config = setup.mission.config();
         let distance_m = f64::from(config.distance_m);
+        if self.rotation.fleet.is_some() {
+            return self.rotation.prepare(setup);
+        }
         let axis = axis.or_else(|| somewhere(distance_m)).ok_or_else(|| {
             Failure::input(format!(
                 "--fly: the distance from Tx to Rx is {distance_m} m: must be within {SHORTEST_M} to {LONGEST_M} m"

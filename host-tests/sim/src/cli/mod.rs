@@ -11,6 +11,7 @@ mod data;
 mod hostile;
 mod options;
 mod prepared;
+mod rotation;
 mod time;
 mod upload;
 mod web;

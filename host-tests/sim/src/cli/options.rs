@@ -107,6 +107,12 @@ pub enum Method {
 }
 
 impl Options {
+    /// Returns the options with the number of relays of the fleet, if it is given.
+    pub fn settled(mut self) -> Self {
+        self.uavs = self.hostile.flight.fleet().unwrap_or(self.uavs);
+        self
+    }
+
     /// Rejects options that have no effect with the chosen method. `method` is its name, for the message.
     pub(super) fn agree(&self, method: &str) -> Result<(), Failure> {
         let is_step = matches!(self.method, Method::AlignStep | Method::StochasticStep);

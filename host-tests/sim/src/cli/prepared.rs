@@ -8,12 +8,15 @@ use uav_relay_scenario::{Interference, Scenario};
 
 use super::options::{Method, Options};
 use crate::command::{self, Failure};
+use crate::report::rotation::RotationReport;
 use crate::report::{
     self, AirReport, AllInterferersReport, ChainReport, SensingReport, TrafficReport, timeline,
 };
 use crate::simulator::chain::Chain;
+use crate::simulator::chain::run as simulate;
 use crate::simulator::faults::Faults;
 use crate::simulator::outcome::{Outcome, RelayEnd};
+use crate::simulator::rotation::RotationSpec;
 use crate::simulator::route::TrueHops;
 use crate::simulator::setup::Setup;
 use crate::simulator::traffic::{TrafficSpec, traffic};
@@ -212,6 +215,31 @@ impl<'a> Prepared<'a> {
         let traffic = traffic(spec, &hops, outcome, self.options.uavs.into());
         let traffic = traffic.map_err(|error| Failure::input(error.to_string()))?;
         Ok(traffic.map(|traffic| TrafficReport::new(spec, &traffic)))
+    }
+
+    /// Returns the report of the replacements in a run, and of the same run without announcements. `None` without a fleet.
+    ///
+    /// # Errors
+    /// A setting that a relay rejects.
+    pub fn rotation(&self, outcome: &Outcome) -> Result<Option<RotationReport>, Failure> {
+        let (Some(spec), Some(rotated)) = (&self.setup.rotation, &outcome.rotated) else {
+            return Ok(None);
+        };
+        let mut plain = self.setup.clone();
+        plain.rotation = Some(RotationSpec {
+            announced: false,
+            ..spec.clone()
+        });
+        let plain = simulate(plain).map_err(|error| Failure::input(error.to_string()))?;
+        let chains = |outcome: &Outcome| outcome.watched.map_or(0, |it| it.most_flying);
+        Ok(Some(RotationReport::new(
+            spec,
+            (rotated, chains(outcome)),
+            plain
+                .rotated
+                .as_ref()
+                .map(|rotated| (rotated, chains(&plain))),
+        )))
     }
 
     /// Returns the linear SIR of every hop from Tx to Rx, for the interferer's position at the time `then`.

@@ -10,6 +10,7 @@ use uav_relay_scenario::{Scenario, mission};
 
 use super::attack::AttackReport;
 use super::hops::{HopSlots, LostReport, RelayReport, WorstBack, db, hop_sirs, hop_sirs_back};
+use super::rotation::RotationReport;
 use super::sensing::SensingReport;
 use super::timeline::{MomentReport, RecoveryReport, recoveries, seconds};
 use super::traffic::TrafficReport;
@@ -116,6 +117,9 @@ pub struct ChainReport {
     /// Availability of the chain: the part of the run in which it had the best positions.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
+    /// Replacement of tired drones; absent without `--fleet`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<RotationReport>,
     /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
     #[serde(flatten)]
     pub listened: Option<SensingReport>,
@@ -251,6 +255,9 @@ impl ChainReport {
 
     /// Formats the report as text: the table of relays, the worst SIR, the messages and bytes, and the log.
     pub fn table(&self) -> String {
+        if let Some(rotation) = &self.rotation {
+            return rotation.table();
+        }
         let rx = (self.rx_sir, self.back.map(|back| back.rx_sir_back));
         let mut text = hops::hops_table(&self.relays, &self.lost, rx, self.room);
         text += &HopSlots::table(&self.hop_slots);

@@ -3,6 +3,7 @@
 pub mod attack;
 pub mod chain;
 pub mod hops;
+pub mod rotation;
 pub mod sensing;
 pub mod timeline;
 pub mod traffic;

@@ -5,6 +5,7 @@ mod fleet;
 mod ground;
 mod judge;
 mod live;
+mod rotation;
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -19,11 +20,12 @@ use uav_relay::{
 };
 
 use super::attack::{AttackKind, Attacker, NETWORK};
-use super::drones::Flight;
+use super::drones::{Flight, Point};
 use super::faults::{Bursts, Line};
 use super::fleet::Vehicle;
 use super::medium::{Access, AirCounts, AirEvent, Medium};
 use super::outcome::{Film, Outcome, Record, RelayEnd, TimelineEvent};
+use super::rotation::Rotation;
 use super::route::Track;
 use super::setup::Setup;
 use super::watch::{ObservedState, Run, Watch};
@@ -141,6 +143,7 @@ impl Chain {
             let watched = watch.end(self.now, is_judged, flown_m);
             self.outcome.watched = Some(watched);
         }
+        self.outcome.rotated = self.rotation.map(|rotation| rotation.record);
         let controlled = self.members.iter().map(|member| member.under_relay_control);
         let places = self.fleet.iter().map(Vehicle::along);
         self.outcome.fleet = places.zip(controlled).collect();
@@ -181,6 +184,7 @@ impl Chain {
             self.pending_planned -= 1;
         }
         match event {
+            QueuedEvent::Fly if self.rotation.is_some() => self.rotate(),
             QueuedEvent::Fly if self.fleet.is_empty() => self.fly(),
             QueuedEvent::Fly => self.fly_fleet(),
             QueuedEvent::Restart => self.restart_autopilot(index),
@@ -196,6 +200,34 @@ impl Chain {
         }
     }
 
+    /// Switches relay `index` (from 0) on, with the mission and the votes that it has stored.
+    fn boot(&mut self, index: usize) {
+        let now = self.now;
+        let seed = self.rng.random();
+        let Some(member) = self.members.get_mut(index) else {
+            return;
+        };
+        let start = Start {
+            index: member.node,
+            number: member.starts + 1,
+            seed,
+            now,
+        };
+        let (stored, record) = (member.stored.as_ref(), member.record.as_ref());
+        let Ok(relay) = switched_on(&self.setup, start, stored, record) else {
+            return;
+        };
+        member.swept += member.relay.stats().passes_begun;
+        member.starts = start.number;
+        member.relay = relay;
+        member.killed = None;
+        member.wake = None;
+        if let Some(vehicle) = self.fleet.get_mut(index) {
+            vehicle.boot(now);
+        }
+        self.log(index, TimelineEvent::Booted, None);
+    }
+
     /// Processes an event that concerns only relay `index` (from 0), such as received bytes or a timer.
     fn process_relay_event(&mut self, index: usize, event: QueuedEvent) {
         let now = self.now;
@@ -203,27 +235,7 @@ impl Chain {
             return;
         };
         match event {
-            QueuedEvent::Boot => {
-                let start = Start {
-                    index: member.node,
-                    number: member.starts + 1,
-                    seed: self.rng.random(),
-                    now,
-                };
-                let (stored, record) = (member.stored.as_ref(), member.record.as_ref());
-                let Ok(relay) = switched_on(&self.setup, start, stored, record) else {
-                    return;
-                };
-                member.swept += member.relay.stats().passes_begun;
-                member.starts = start.number;
-                member.relay = relay;
-                member.killed = None;
-                member.wake = None;
-                if let Some(vehicle) = self.fleet.get_mut(index) {
-                    vehicle.boot(now);
-                }
-                self.log(index, TimelineEvent::Booted, None);
-            }
+            QueuedEvent::Boot => self.boot(index),
             _ if member.killed.is_some() => return,
             QueuedEvent::Kill => {
                 member.killed = Some(now);
@@ -277,6 +289,7 @@ impl Chain {
         }
         self.drain_events(index);
         self.check(index);
+        self.on_setpoint(index);
         self.film(index);
         let Some(member) = self.members.get_mut(index) else {
             return;
@@ -352,6 +365,9 @@ pub struct Chain {
     attacker: Option<Attacker>,
     flight: Option<Flight>,
     fleet: Vec<Vehicle>,
+    rotation: Option<Rotation>,
+    /// Drones, from 0, that take off now, and their places on the ground.
+    take_off_from: Vec<(usize, Point)>,
     /// Distance of each pair of drones when both were last handed over to their relays, m.
     ///
     /// `None` while one of them is on the ground, takes off, lands or is flown by its pilot.
@@ -492,6 +508,8 @@ impl Chain {
             attacker: None,
             flight: None,
             fleet: Vec::new(),
+            rotation: None,
+            take_off_from: Vec::new(),
             handed_over_m: Vec::new(),
             medium,
             bursts,
@@ -511,7 +529,13 @@ impl Chain {
         chain.schedule_attack();
         chain.take_off();
         for index in 0..chain.members.len() {
-            chain.drain(index);
+            if chain
+                .members
+                .get(index)
+                .is_some_and(|it| it.killed.is_none())
+            {
+                chain.drain(index);
+            }
         }
         chain.update_statistics(ChangedRelays::All);
         Ok(chain)

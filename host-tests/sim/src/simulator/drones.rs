@@ -183,6 +183,26 @@ impl Drone {
             .fly(goal, self.speed_mps, self.acceleration_mps2, step_s);
     }
 
+    /// Returns the true position of the drone, m.
+    pub(super) const fn at(&self) -> Point {
+        self.body.at
+    }
+
+    /// Returns true while the drone moves.
+    pub(super) fn moves(&self) -> bool {
+        self.body.velocity_mps.iter().any(|v| v.abs() > 0.01)
+    }
+
+    /// Sets the largest speed of the drone per axis, m/s.
+    pub(super) const fn set_speed(&mut self, speed_mps: f64) {
+        self.speed_mps = speed_mps;
+    }
+
+    /// Puts the drone on the ground at the position `at`.
+    pub(super) fn put(&mut self, at: Point) {
+        self.body = Body::hovering(at);
+    }
+
     /// Returns the drone's own position estimate: the true position plus the bias.
     pub(super) fn estimated_position(&self) -> Point {
         sum(self.body.at, self.bias)

@@ -10,6 +10,7 @@ use super::attack::AttackCounts;
 use super::drones::{Nearest, Point};
 use super::faults::Injected;
 use super::medium::AirCounts;
+use super::rotation::Rotated;
 use super::route::Track;
 use super::true_interference::Snapshot;
 use super::watch::ObservedState;
@@ -199,6 +200,8 @@ pub struct Outcome {
     pub bytes: u64,
     /// Virtual time when the run ended.
     pub ended: Instant,
+    /// Record of the replacements; `None` without a fleet larger than its chain.
+    pub rotated: Option<Rotated>,
     /// Counts of the frame faults that the links caused.
     pub injected: Injected,
     /// Counts of the attacker's frames by how relays classified them.

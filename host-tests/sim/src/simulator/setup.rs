@@ -12,6 +12,7 @@ use super::faults::{Faults, LinkSpec, OneWayFailure};
 use super::fleet::FleetSpec;
 use super::medium;
 use super::medium::Access;
+use super::rotation::RotationSpec;
 use super::true_interference::TrueInterference;
 
 /// Period in which relays 1 to `after` and the other relays do not receive each other.
@@ -112,6 +113,8 @@ pub struct Setup {
     pub flight: Option<FlightSpec>,
     /// Flight of drones with simulated autopilots, in place of `flight`; `None` if it is not simulated.
     pub fleet: Option<FleetSpec>,
+    /// Replacement of tired drones, in place of `flight` and `fleet`; `None` if it is not simulated.
+    pub rotation: Option<RotationSpec>,
     /// Radio range on a shared channel, in relays. Relays receive each other if their numbers differ by at most this.
     pub radio_reach: usize,
     /// Access method of the radios on a shared channel.
@@ -168,6 +171,7 @@ impl Setup {
             attack: None,
             flight: None,
             fleet: None,
+            rotation: None,
             radio_reach: Self::RADIO_REACH,
             access: Access::Ideal,
             burst: 1.0,

@@ -11,6 +11,7 @@
 mod capture;
 mod hostile;
 mod methods;
+mod rotation;
 mod traffic;
 mod upload;
 mod web;
@@ -277,6 +278,15 @@ const WRONG: &[&str] = &[
     "--deaf 4:3@9-5",
     "--deaf 9:3@1",
     "--deaf 3:0@1",
+    "--fly --soak 60 --fleet 1",
+    "--fly --soak 60 --fleet 12 --flying 6",
+    "--fly --soak 60 --fleet 12 --flying 13",
+    "--fly --soak 60 --fleet 12 --endurance 299",
+    "--fly --soak 60 --fleet 12 --ground-time -1",
+    "--fly --soak 60 --fleet 12 --kill 3@5",
+    "--fly --soak 60 --fleet 12 --uavs 8",
+    "--fleet 12 --soak 60",
+    "--fly --soak 60 --flying 8",
     "--soak 0",
 ];
 

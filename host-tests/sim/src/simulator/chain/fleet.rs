@@ -246,6 +246,9 @@ impl Chain {
     /// Creates the setup's drones, if any, and schedules their first time step. Drones without autopilots start in
     /// the air.
     pub(super) fn take_off(&mut self) {
+        if let Some(spec) = self.setup.rotation.clone() {
+            return self.begin_rotation(&spec);
+        }
         if let Some(spec) = &self.setup.flight {
             self.flight = Some(Flight::new(spec, self.setup.seed));
             self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);

@@ -98,7 +98,7 @@ impl Chain {
         }
         watch.count_time(self.now);
         watch.count_groups(self.now);
-        if self.setup.soak.is_some() {
+        if self.setup.soak.is_some() && self.setup.rotation.is_none() {
             let is_right = self.is_right(watch);
             watch.set_available(is_right);
         }

@@ -1,0 +1,171 @@
+//! Report of a run in which drones with tired batteries are replaced.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::timeline::seconds;
+use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSpec};
+
+/// Result of a run in which drones with tired batteries are replaced.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RotationReport {
+    /// Number of drones that are meant to fly.
+    pub flying: u16,
+    /// Tired drones announce that they leave, and fresh ones join first.
+    pub announced: RotationFigures,
+    /// Losses instead of departures.
+    ///
+    /// A tired drone flies home with its relay off; a spare in the air is switched on at that moment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unannounced: Option<RotationFigures>,
+}
+
+/// Figures of one run with replacements.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct RotationFigures {
+    /// Time when the chain was first complete, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub complete_at_s: Option<f64>,
+    /// Time since then, s.
+    pub watched_s: f64,
+    /// Fraction of that time in which the worst hop had less than 0.99 of the optimum's SIR.
+    pub below: f64,
+    /// Smallest SIR of the worst hop, as a fraction of the optimum.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst: Option<f64>,
+    /// Virtual time of the smallest SIR, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_at_s: Option<f64>,
+    /// Number of relays that left.
+    pub replaced: u32,
+    /// Number of these that left without permission.
+    pub forced: u32,
+    /// Relays that left per hour.
+    pub per_hour: f64,
+    /// Relays that would leave per hour if each stayed until only its reserve and way home remained.
+    pub arithmetic_per_hour: f64,
+    /// Mean time from the request to the permission to leave, s.
+    pub mean_wait_s: f64,
+    /// Longest time from the request to the permission to leave, s.
+    pub longest_wait_s: f64,
+    /// Least remaining endurance of a drone that left, beyond its way home, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_left_s: Option<f64>,
+    /// Smallest true distance of two drones in the air, m. Drones flown by their pilots count, too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest_m: Option<f64>,
+    /// Time of the closest approach, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest_at_s: Option<f64>,
+    /// Two nearest drones at that time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nearest: Option<[NearDrone; 2]>,
+    /// Largest number of chains that flew by agreements of their own at the same time.
+    pub chains: usize,
+}
+
+impl RotationFigures {
+    fn new(spec: &RotationSpec, rotated: &Rotated, chains: usize) -> Self {
+        let hours = rotated.watched_s / 3_600.0;
+        let left = f64::from(rotated.replaced).max(1.0);
+        // The drones' own times in the chain are known: no relay may stay longer than its battery allows.
+        let served_s = rotated.possible_s / left;
+        Self {
+            complete_at_s: rotated.complete_at.map(seconds),
+            watched_s: rotated.watched_s,
+            below: rotated.below_s / rotated.watched_s.max(1.0),
+            worst: rotated.worst.map(|(share, _)| share),
+            worst_at_s: rotated.worst.map(|(_, at)| seconds(at)),
+            replaced: rotated.replaced,
+            forced: rotated.forced,
+            per_hour: f64::from(rotated.replaced) / hours.max(1e-9),
+            arithmetic_per_hour: f64::from(spec.flying) * 3_600.0 / served_s.max(1.0),
+            mean_wait_s: rotated.waits_s / left,
+            longest_wait_s: rotated.longest_wait_s,
+            least_left_s: rotated.least_left_s,
+            nearest_m: rotated.nearest.as_ref().map(|it| it.apart_m),
+            nearest_at_s: rotated.nearest.as_ref().map(|it| seconds(it.at)),
+            nearest: rotated.nearest.as_ref().map(|it| it.drones.clone()),
+            chains,
+        }
+    }
+}
+
+impl RotationReport {
+    /// Creates the report of a run with announced departures, and of one without. Each has its number of chains.
+    pub fn new(
+        spec: &RotationSpec,
+        announced: (&Rotated, usize),
+        unannounced: Option<(&Rotated, usize)>,
+    ) -> Self {
+        Self {
+            flying: spec.flying,
+            announced: RotationFigures::new(spec, announced.0, announced.1),
+            unannounced: unannounced
+                .map(|(rotated, chains)| RotationFigures::new(spec, rotated, chains)),
+        }
+    }
+
+    /// Formats the figures as a table: announced departures and ordinary losses side by side.
+    pub fn table(&self) -> String {
+        let mut text = format!(
+            "\nreplacement of tired drones, {} of the fleet flying{:>17}{:>14}\n",
+            self.flying, "announced", "unannounced"
+        );
+        let mut row = |name: &str, of: &dyn Fn(&RotationFigures) -> String| {
+            let plain = self.unannounced.as_ref().map_or(String::new(), of);
+            _ = writeln!(text, "{name:<52}{:>14}{plain:>14}", of(&self.announced));
+        };
+        let some = |value: Option<f64>, digits: usize| {
+            value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+        };
+        row("hours after the chain was complete", &|it| {
+            format!("{:.2}", it.watched_s / 3_600.0)
+        });
+        row(&format!("time below {GOOD} of the optimum, %"), &|it| {
+            format!("{:.4}", 100.0 * it.below)
+        });
+        row("worst moment, share of the optimum", &|it| {
+            some(it.worst, 4)
+        });
+        row("worst moment at, s", &|it| some(it.worst_at_s, 1));
+        row("replacements", &|it| it.replaced.to_string());
+        row("replacements without permission", &|it| {
+            it.forced.to_string()
+        });
+        row("replacements per hour", &|it| format!("{:.2}", it.per_hour));
+        row("replacements per hour by arithmetic", &|it| {
+            format!("{:.2}", it.arithmetic_per_hour)
+        });
+        row("request to permission, mean, s", &|it| {
+            format!("{:.1}", it.mean_wait_s)
+        });
+        row("request to permission, longest, s", &|it| {
+            format!("{:.1}", it.longest_wait_s)
+        });
+        row(
+            &format!("least endurance beyond the way home ({RESERVE_S} asked), s"),
+            &|it| some(it.least_left_s, 1),
+        );
+        row("nearest distance of two drones, m", &|it| {
+            some(it.nearest_m, 2)
+        });
+        row("nearest distance at, s", &|it| some(it.nearest_at_s, 1));
+        row("most chains at the same time", &|it| it.chains.to_string());
+        if self.unannounced.is_some() {
+            text += "unannounced: a tired drone flies home with its relay off, and a spare in the air is switched on at that moment\n";
+        }
+        for figures in std::iter::once(&self.announced).chain(&self.unannounced) {
+            for drone in figures.nearest.iter().flatten() {
+                let [[x, y, h], [to_x, to_y, to_h]] = [drone.at_m, drone.goal_m];
+                _ = writeln!(
+                    text,
+                    "nearest: relay {} at ({x:.1}, {y:.1}, {h:.1}) m toward ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
+                    drone.relay, drone.state
+                );
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,745 @@
+//! Replacement of tired drones: pilots, spares, returns, and the measured SIR.
+
+use rand::RngExt;
+use uav_relay::{Departure, Duration, HoldReason, Instant, Side};
+
+use super::{Chain, ChangedRelays, QueuedEvent};
+use crate::report::{hop_sirs, hop_sirs_back};
+use crate::simulator::drones::{
+    Drone, Flight, FlightSpec, Nearest, Point, apart, placement, point,
+};
+use crate::simulator::outcome::TimelineEvent;
+use crate::simulator::rotation::{
+    Battery, CLIMB_MPS, Duty, Encounter, MOVING, NearDrone, Rotated, Rotation, RotationSpec,
+    SPEED_MPS, duration,
+};
+use crate::simulator::watch::{has_agreed, undisturbed};
+
+/// Time step while a drone moves.
+const STEP: Duration = Duration::from_millis(100);
+
+/// Time between two steps while all drones hover.
+const IDLE: Duration = Duration::from_millis(1_000);
+
+/// Period of the pilots' decisions.
+const PILOTS: Duration = Duration::from_millis(1_000);
+
+/// Least time between two take-offs.
+const TAKE_OFFS: Duration = Duration::from_millis(8_000);
+
+/// Distance from a position below which a drone has arrived, m.
+const ARRIVED_M: f64 = 0.5;
+
+/// Time by which a spare is early at its place, s.
+const EARLY_S: f64 = 25.0;
+
+/// Time before a drone has to leave from which on it asks to leave even without a spare, s.
+const DEADLINE_S: f64 = 80.0;
+
+/// Time for which a spare hovers before a departure is requested: it then counts as a spare.
+const HOVERS: Duration = Duration::from_millis(13_000);
+
+/// Converts an endurance to whole seconds within 0 to 60 000.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "within the range of u16"
+)]
+fn whole(endurance_s: f64) -> u16 {
+    endurance_s.clamp(0.0, 6e4) as u16
+}
+
+fn seconds(span: Duration) -> f64 {
+    span.as_micros() as f64 / 1e6
+}
+
+impl Chain {
+    /// Puts the drones of `spec` that fly first at their best places, and the others on the ground.
+    pub(super) fn begin_rotation(&mut self, spec: &RotationSpec) {
+        let all = self.setup.mission.relays();
+        let flying = spec.flying.clamp(1, all);
+        let first: Vec<u16> = (0..flying).map(|at| 1 + at * all / flying).collect();
+        let places = undisturbed(&self.setup, &first, 0).unwrap_or_default();
+        let altitude_m = f64::from(self.setup.mission.config().common.altitude_m);
+        let separation_m = f64::from(self.setup.mission.config().min_separation_m);
+        let mut start = vec![[0.0, 0.0, 0.0]; usize::from(all)];
+        for (node, at) in first.iter().zip(&places) {
+            if let Some(start) = start.get_mut(usize::from(*node) - 1) {
+                *start = [at[0], at[1], altitude_m];
+            }
+        }
+        let flight = FlightSpec::multicopters(start, spec.bias_m, spec.noise_m);
+        let flight = Flight::new(&flight, self.setup.seed);
+        let mut drones = Vec::new();
+        for index in 0..self.members.len() {
+            let is_first = first.iter().any(|node| usize::from(*node) == index + 1);
+            let spread = spec.spread * self.rng.random_range(-1.0..=1.0);
+            drones.push(Battery {
+                duty: if is_first {
+                    Duty::Serving
+                } else {
+                    Duty::Ground(Instant::ZERO)
+                },
+                capacity_s: spec.endurance_s * (1.0 + spread),
+                // The pilots start with batteries of different charge, so that not all are tired at the same time.
+                used_s: {
+                    let rank = first
+                        .iter()
+                        .position(|node| usize::from(*node) == index + 1);
+                    let share = rank.map_or(0.0, |rank| rank as f64 / first.len() as f64);
+                    0.6 * share * spec.endurance_s
+                },
+                requested: None,
+                tube: None,
+                hovers_since: Instant::ZERO,
+                is_settled: true,
+            });
+            if let Some(member) = self.members.get_mut(index)
+                && !is_first
+            {
+                member.killed = Some(Instant::ZERO);
+            }
+        }
+        let since = drones
+            .iter()
+            .map(|drone| (drone.duty == Duty::Serving).then_some(Instant::ZERO));
+        let mut rotation = Rotation {
+            since: since.collect(),
+            spec: spec.clone(),
+            drones,
+            best: 1.0,
+            at: Instant::ZERO,
+            next: Instant::ZERO,
+            pilots_at: Instant::ZERO,
+            last_take_off: Instant::ZERO,
+            slot_s: 90.0,
+            spacing_m: (separation_m + 2.0 * (spec.bias_m + spec.noise_m) + 2.0).max(8.0),
+            record: Rotated::default(),
+        };
+        rotation.best = self.worst_hop(&places);
+        self.flight = Some(flight);
+        self.rotation = Some(rotation);
+        self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
+    }
+
+    /// Returns the SIR of the worst hop over relays at these places, in order; 0 without any.
+    fn worst_hop(&self, places: &[Point]) -> f64 {
+        let mission = &self.setup.mission;
+        let common = mission.config().common;
+        let route: Vec<_> = places.iter().map(|at| (placement(*at), common)).collect();
+        if route.is_empty() {
+            return 0.0;
+        }
+        let reverse = f64::from(mission.reverse());
+        let back = if reverse > 0.0 {
+            hop_sirs_back(mission, &route)
+        } else {
+            Vec::new()
+        };
+        let sirs = hop_sirs(mission, &route);
+        let all = sirs
+            .into_iter()
+            .chain(back.into_iter().map(|sir| sir / reverse));
+        all.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the SIR of the worst hop now. The data takes the best route over the relays of the chain; it may leave out relays that
+    /// leave or have just joined. The positions are the drones' own estimates: a constant error of the positions is not the chain's.
+    fn served(&self, rotation: &Rotation, flight: &Flight) -> f64 {
+        let mut fixed = Vec::new();
+        let mut optional = Vec::new();
+        for (index, (member, drone)) in self.members.iter().zip(&rotation.drones).enumerate() {
+            let Some(at) = flight.drones.get(index).map(Drone::estimated_position) else {
+                continue;
+            };
+            if drone.duty != Duty::Serving || member.killed.is_some() {
+                continue;
+            }
+            let stays = member.relay.departure(self.now) == Departure::Member;
+            if stays && drone.is_settled {
+                fixed.push((index, at));
+            } else if optional.len() < 6 {
+                optional.push((index, at));
+            }
+        }
+        let routes = (0..1_u32 << optional.len()).map(|left_out| {
+            let some = optional.iter().enumerate();
+            let some = some.filter(|(which, _)| left_out >> which & 1 == 0);
+            let mut route = fixed.clone();
+            route.extend(some.map(|(_, one)| *one));
+            route.sort_by_key(|(index, _)| *index);
+            let places: Vec<Point> = route.into_iter().map(|(_, at)| at).collect();
+            self.worst_hop(&places)
+        });
+        routes.fold(0.0, f64::max)
+    }
+
+    /// Schedules a step of the flight soon after the setpoint of relay `index` (from 0) has changed.
+    pub(super) fn on_setpoint(&mut self, index: usize) {
+        let soon = self.now + STEP;
+        let (Some(rotation), Some(flight)) = (&mut self.rotation, &self.flight) else {
+            return;
+        };
+        let (Some(drone), Some(battery), Some(member)) = (
+            flight.drones.get(index),
+            rotation.drones.get(index),
+            self.members.get(index),
+        ) else {
+            return;
+        };
+        if rotation.next > soon
+            && battery.duty == Duty::Serving
+            && member
+                .relay
+                .setpoint()
+                .is_some_and(|to| apart(point(to), drone.goal) > 0.0)
+        {
+            rotation.next = soon;
+            self.queue.put(soon, 0, QueuedEvent::Fly);
+        }
+    }
+
+    /// Moves all drones up to now, measures the SIR, and lets the pilots decide.
+    pub(super) fn rotate(&mut self) {
+        let now = self.now;
+        let (Some(mut rotation), Some(mut flight)) = (self.rotation.take(), self.flight.take())
+        else {
+            return;
+        };
+        if now < rotation.next {
+            self.rotation = Some(rotation);
+            self.flight = Some(flight);
+            return;
+        }
+        let span = now.since(rotation.at);
+        rotation.at = now;
+        let span_s = seconds(span);
+        for (drone, battery) in flight.drones.iter_mut().zip(&mut rotation.drones) {
+            if !matches!(battery.duty, Duty::Ground(_)) && span_s > 0.0 {
+                let moves = drone.moves();
+                drone.fly(span_s);
+                battery.used_s += span_s * if moves { MOVING } else { 1.0 };
+            }
+        }
+        self.record(&mut rotation, &flight, span);
+        if rotation.pilots_at <= now {
+            rotation.pilots_at = now + PILOTS;
+            self.decide(&mut rotation, &flight);
+        }
+        self.put_on_pads(&mut flight);
+        let distance_m = f64::from(self.setup.mission.config().distance_m);
+        for index in 0..rotation.drones.len() {
+            let waits = rotation
+                .drones
+                .get(index)
+                .is_some_and(|it| it.duty == Duty::Standby);
+            let gap = Self::gap(&rotation, index);
+            let [from_m, to_m] = Self::gap_m(&rotation, &flight, gap, distance_m);
+            let part_m = (to_m - from_m) / 4.0;
+            // A pilot keeps a spare beside its gap.
+            if let Some(drone) = flight.drones.get_mut(index)
+                && waits
+                && !(from_m + part_m..to_m - part_m).contains(&drone.goal[0])
+            {
+                drone.goal[0] = f64::midpoint(from_m, to_m);
+                if let Some(battery) = rotation.drones.get_mut(index) {
+                    battery.hovers_since = now;
+                }
+            }
+        }
+        let mut moves = false;
+        for index in 0..rotation.drones.len() {
+            moves |= self.steer_drone(&mut rotation, &mut flight, index);
+        }
+        rotation.next = now + if moves { STEP } else { IDLE };
+        self.queue.put(rotation.next, 0, QueuedEvent::Fly);
+        self.rotation = Some(rotation);
+        self.flight = Some(flight);
+        self.update_statistics(ChangedRelays::All);
+    }
+
+    fn record(&mut self, rotation: &mut Rotation, flight: &Flight, span: Duration) {
+        let now = self.now;
+        let share = self.served(rotation, flight) / rotation.best;
+        let serving = rotation.drones.iter().filter(|it| it.duty == Duty::Serving);
+        if rotation.record.complete_at.is_none()
+            && serving.count() >= usize::from(rotation.spec.flying)
+            && share > 0.999
+            && self.is_whole(rotation)
+        {
+            rotation.record.complete_at = Some(now);
+        }
+        rotation.count(now, span, share);
+        let air = rotation.drones.iter().zip(&flight.drones).enumerate();
+        let air: Vec<(usize, Point)> = air
+            .filter(|(_, (battery, _))| !matches!(battery.duty, Duty::Ground(_)))
+            .map(|(index, (_, drone))| (index, drone.at()))
+            .collect();
+        let places: Vec<Point> = air.iter().map(|(_, at)| *at).collect();
+        let least_m = rotation
+            .record
+            .nearest
+            .as_ref()
+            .map_or(f64::INFINITY, |it| it.apart_m);
+        if let Some(nearest) = Nearest::of(&places, now).filter(|it| it.apart_m < least_m) {
+            let pair = nearest
+                .pair
+                .map(|at| air.get(at - 1).map_or(0, |(index, _)| *index));
+            rotation.record.nearest = Some(Encounter {
+                apart_m: nearest.apart_m,
+                at: now,
+                drones: pair.map(|index| self.near_drone(rotation, flight, index)),
+            });
+        }
+    }
+
+    /// Returns drone `index` (from 0) as part of an encounter.
+    fn near_drone(&self, rotation: &Rotation, flight: &Flight, index: usize) -> NearDrone {
+        let duty = match rotation.drones.get(index).map(|it| &it.duty) {
+            Some(Duty::Rising { .. }) => "on its way to its place beside the line",
+            Some(Duty::Standby) => "spare beside the line",
+            Some(Duty::Home { .. }) => "on its way home",
+            Some(Duty::Serving) => "flown by its relay",
+            Some(Duty::Ground(_)) | None => "on the ground",
+        };
+        let relay = self.members.get(index).filter(|it| it.killed.is_none());
+        let relay = relay.map_or("relay off".to_owned(), |member| {
+            let relay = &member.relay;
+            let holds = [Side::Upstream, Side::Downstream].map(|side| {
+                relay
+                    .hold_reason(side)
+                    .map_or("nothing".to_owned(), |it| format!("{it:?}"))
+            });
+            let [up, down] = holds;
+            format!(
+                "{:?}, held by {up} toward Tx and {down} toward Rx",
+                relay.departure(self.now)
+            )
+        });
+        let drone = flight.drones.get(index);
+        NearDrone {
+            relay: index + 1,
+            state: format!("{duty}; {relay}"),
+            at_m: drone.map_or([f64::NAN; 3], Drone::at),
+            goal_m: drone.map_or([f64::NAN; 3], |it| it.goal),
+        }
+    }
+
+    /// Returns true if all serving relays that stay are one chain with leases and positions.
+    fn is_whole(&self, rotation: &Rotation) -> bool {
+        let members = self.members.iter().zip(&rotation.drones);
+        let on: Vec<_> = members
+            .filter(|(member, drone)| {
+                drone.duty == Duty::Serving
+                    && member.killed.is_none()
+                    && member.relay.departure(self.now) != Departure::Outside
+            })
+            .map(|(member, _)| crate::simulator::watch::ObservedState::of(&member.relay, true))
+            .collect();
+        let leased = on.iter().all(|one| one.leased);
+        let same = on.windows(2).all(|pair| match pair {
+            [one, other] => one.view == other.view,
+            _ => true,
+        });
+        let count = on
+            .first()
+            .is_some_and(|one| usize::from(one.relays) == on.len());
+        leased && same && count && has_agreed(&on)
+    }
+
+    /// Follows the setpoint or the pilot's path with drone `index` (from 0). Returns true if the drone moves.
+    fn steer_drone(&mut self, rotation: &mut Rotation, flight: &mut Flight, index: usize) -> bool {
+        let now = self.now;
+        let Some(drone) = flight.drones.get_mut(index) else {
+            return false;
+        };
+        let (at, estimated) = (drone.at(), drone.estimated_position());
+        let Some(battery) = rotation.drones.get_mut(index) else {
+            return false;
+        };
+        let mut arrived = false;
+        match &mut battery.duty {
+            Duty::Ground(_) => return false,
+            Duty::Standby | Duty::Serving => {}
+            Duty::Rising { path } | Duty::Home { path, .. } => {
+                if let Some(next) = path.front()
+                    && apart(*next, estimated) < ARRIVED_M
+                {
+                    path.pop_front();
+                }
+                match path.front() {
+                    Some(next) => {
+                        let climbs = (next[2] - estimated[2]).abs() > ARRIVED_M;
+                        drone.set_speed(if climbs { CLIMB_MPS } else { SPEED_MPS });
+                        drone.goal = *next;
+                    }
+                    None => arrived = true,
+                }
+            }
+        }
+        if arrived && matches!(battery.duty, Duty::Home { .. }) {
+            battery.duty = Duty::Ground(now + duration(rotation.spec.ground_s));
+            self.switch_off(index);
+            return false;
+        }
+        if arrived {
+            battery.duty = Duty::Standby;
+            battery.hovers_since = now;
+            drone.set_speed(SPEED_MPS);
+            if rotation.spec.announced {
+                self.switch_on(index, true);
+            }
+        }
+        let noisy = flight.reported(index).unwrap_or(at);
+        let (Some(battery), Some(drone), Some(member)) = (
+            rotation.drones.get_mut(index),
+            flight.drones.get_mut(index),
+            self.members.get_mut(index),
+        ) else {
+            return false;
+        };
+        if member.killed.is_none() {
+            member.relay.handle_position(now, placement(noisy), now);
+        }
+        let departure = member.relay.departure(now);
+        let mut joins = false;
+        if battery.duty == Duty::Standby
+            && member.killed.is_none()
+            && departure == Departure::Member
+        {
+            joins = member.relay.setpoint().is_some();
+            if joins {
+                battery.duty = Duty::Serving;
+                battery.is_settled = false;
+            }
+        }
+        if battery.duty == Duty::Serving {
+            if let Some(place) = member.relay.setpoint() {
+                drone.goal = point(place);
+            }
+            let agreed = member.relay.agreed_place().map(point);
+            battery.is_settled |= agreed.is_some_and(|place| apart(place, at) < 3.0);
+            battery.tube = battery.tube.filter(|_| !battery.is_settled);
+        }
+        let leaves = battery.duty == Duty::Serving && departure == Departure::Free;
+        let moves = drone.moves() || apart(drone.goal, estimated) > 0.01;
+        if joins && let Some(since) = rotation.since.get_mut(index) {
+            *since = Some(now);
+        }
+        if member.killed.is_none() {
+            self.drain(index);
+        }
+        if leaves {
+            self.go_home(rotation, flight, index, false);
+        }
+        moves
+    }
+
+    fn switch_off(&mut self, index: usize) {
+        let now = self.now;
+        if let Some(member) = self.members.get_mut(index) {
+            member.killed = Some(now);
+        }
+        if let Some(medium) = &mut self.medium {
+            medium.switch_off(index);
+        }
+    }
+
+    /// Switches relay `index` (from 0) on, as a spare or as a relay that was lost.
+    fn switch_on(&mut self, index: usize, spare: bool) {
+        let node = u16::try_from(index + 1).unwrap_or(u16::MAX);
+        self.setup.spares.retain(|other| *other != node);
+        if spare {
+            self.setup.spares.push(node);
+        }
+        self.boot(index);
+        self.drain(index);
+    }
+
+    /// Flies drone `index` (from 0) home from its place; `forced` if the relay may not leave yet.
+    fn go_home(&mut self, rotation: &mut Rotation, flight: &Flight, index: usize, forced: bool) {
+        let now = self.now;
+        let Some(at) = flight.drones.get(index).map(Drone::estimated_position) else {
+            return;
+        };
+        let tube = rotation.free_tube(true);
+        let path = rotation.way_home(at, tube);
+        let left_s = rotation.left_s(index, at);
+        let is_complete = rotation.record.complete_at.is_some();
+        let joined = rotation.since.get_mut(index).and_then(Option::take);
+        let Some(battery) = rotation.drones.get_mut(index) else {
+            return;
+        };
+        battery.duty = Duty::Home { path, tube };
+        battery.tube = None;
+        let waited_s = battery
+            .requested
+            .take()
+            .map_or(0.0, |at| seconds(now.since(at)));
+        let record = &mut rotation.record;
+        if is_complete {
+            record.replaced += 1;
+            record.forced += u32::from(forced);
+            record.waits_s += waited_s;
+            let served_s = joined.map_or(0.0, |from| seconds(now.since(from)));
+            record.possible_s += served_s + left_s;
+            record.longest_wait_s = record.longest_wait_s.max(waited_s);
+            let least_s = record.least_left_s.unwrap_or(f64::INFINITY);
+            record.least_left_s = Some(least_s.min(left_s + crate::simulator::rotation::RESERVE_S));
+        }
+        if waited_s > 0.0 {
+            rotation.slot_s += (waited_s - rotation.slot_s) / 8.0;
+        }
+        if forced || !rotation.spec.announced {
+            self.switch_off(index);
+            self.log(index, TimelineEvent::Silent, None);
+        } else if let Some(member) = self.members.get_mut(index) {
+            member.relay.handle_control(now, false);
+            self.drain(index);
+        }
+    }
+
+    /// Lets the pilots send spares, request departures, and report drones that are gone.
+    fn decide(&mut self, rotation: &mut Rotation, flight: &Flight) {
+        let now = self.now;
+        let mut tired: Vec<(usize, f64)> = Vec::new();
+        for index in 0..rotation.drones.len() {
+            if let Some(drone) = rotation.drones.get(index)
+                && drone.duty == Duty::Serving
+                && let Some(at) = flight.true_position(index)
+            {
+                tired.push((index, rotation.left_s(index, at)));
+            }
+        }
+        tired.sort_by(|one, other| one.1.total_cmp(&other.1));
+        // One departure at a time: the latest start of each.
+        // A spare comes back after its way home, its time on the ground and its way out.
+        let all = usize::from(self.setup.mission.relays());
+        let spares = all.saturating_sub(usize::from(rotation.spec.flying)).max(1) as f64;
+        let turn_s = (rotation.spec.ground_s + 200.0) / spares;
+        let mut latest = f64::INFINITY;
+        let mut starts: Vec<(usize, f64, f64)> = Vec::new();
+        for (index, left_s) in tired.iter().rev() {
+            latest = left_s.min(latest) - rotation.slot_s.max(turn_s);
+            starts.push((*index, latest, *left_s));
+        }
+        starts.reverse();
+        let serving = starts.len();
+        self.send_spares(rotation, flight, &starts, serving);
+        let spares = rotation
+            .drones
+            .iter()
+            .filter(|it| it.duty == Duty::Standby && now.since(it.hovers_since) >= HOVERS)
+            .count();
+        let mut requests = 0;
+        for (at, (index, start_s, left_s)) in starts.into_iter().enumerate() {
+            let Some(drone) = rotation.drones.get_mut(index) else {
+                continue;
+            };
+            if !rotation.spec.announced {
+                if left_s <= 0.0 {
+                    self.go_home(rotation, flight, index, false);
+                    self.join_as_lost(rotation);
+                }
+                continue;
+            }
+            requests += usize::from(drone.requested.is_some());
+            let is_due = left_s <= DEADLINE_S || start_s <= 2.0 * EARLY_S && spares > requests;
+            let is_due = is_due && at < 2 && rotation.record.complete_at.is_some();
+            if drone.requested.is_none() && is_due {
+                drone.requested = Some(now);
+                requests += 1;
+            }
+            let requested = rotation.drones.get(index).and_then(|drone| drone.requested);
+            if requested.is_some()
+                && let Some(member) = self.members.get_mut(index)
+            {
+                member.relay.leave(now, Some(whole(left_s)));
+                self.drain(index);
+            }
+            if left_s < -RETREAT_S {
+                self.go_home(rotation, flight, index, true);
+            }
+        }
+        self.report_gone(rotation, flight);
+    }
+
+    /// Sends spares: one for each drone whose turn to leave comes before a spare could be there.
+    fn send_spares(
+        &mut self,
+        rotation: &mut Rotation,
+        flight: &Flight,
+        starts: &[(usize, f64, f64)],
+        serving: usize,
+    ) {
+        let now = self.now;
+        let is_up = |duty: &Duty| matches!(duty, Duty::Rising { .. } | Duty::Standby);
+        let up = rotation
+            .drones
+            .iter()
+            .filter(|drone| is_up(&drone.duty))
+            .count();
+        let missing = usize::from(rotation.spec.flying).saturating_sub(serving);
+        let altitude_m = f64::from(self.setup.mission.config().common.altitude_m);
+        let distance_m = f64::from(self.setup.mission.config().distance_m);
+        let lead_s = |x_m: f64| {
+            let path = rotation.way_out(x_m, altitude_m, 0);
+            Rotation::time_s([-20.0, 0.0, 0.0], &path) + EARLY_S
+        };
+        let wanted = starts.iter().filter(|(index, start_s, _)| {
+            let x_m = flight.true_position(*index).map_or(0.0, |at| at[0]);
+            *start_s <= lead_s(x_m)
+        });
+        let wanted: Vec<usize> = wanted.map(|(index, ..)| *index).collect();
+        if up >= wanted.len() + missing || now.since(rotation.last_take_off) < TAKE_OFFS {
+            return;
+        }
+        let near = wanted.get(up.saturating_sub(missing)).copied();
+        let near = near
+            .or(starts.first().map(|(index, ..)| *index))
+            .unwrap_or(0);
+        let ready = rotation.drones.iter().enumerate();
+        let ready = ready.filter(|(_, drone)| matches!(drone.duty, Duty::Ground(at) if at <= now));
+        let mut ready: Vec<usize> = ready.map(|(index, _)| index).collect();
+        ready.sort_by_key(|index| index.abs_diff(near));
+        for index in ready {
+            let gap = Self::gap(rotation, index);
+            let is_taken = rotation
+                .drones
+                .iter()
+                .enumerate()
+                .any(|(other, drone)| is_up(&drone.duty) && Self::gap(rotation, other) == gap);
+            if is_taken {
+                continue;
+            }
+            let [from_m, to_m] = Self::gap_m(rotation, flight, gap, distance_m);
+            let tube = rotation.free_tube(false);
+            let mut path = rotation.way_out(f64::midpoint(from_m, to_m), altitude_m, tube);
+            if let Some(drone) = rotation.drones.get_mut(index)
+                && let Some(pad) = path.pop_front()
+            {
+                drone.used_s = 0.0;
+                drone.requested = None;
+                drone.duty = Duty::Rising { path };
+                drone.tube = Some(tube);
+                rotation.last_take_off = now;
+                self.take_off_from.push((index, pad));
+            }
+            return;
+        }
+    }
+
+    /// Returns the serving drones next to the number of drone `index` (from 0), toward Tx and toward Rx.
+    fn gap(rotation: &Rotation, index: usize) -> [Option<usize>; 2] {
+        let serves = |other: &usize| {
+            rotation
+                .drones
+                .get(*other)
+                .is_some_and(|drone| drone.duty == Duty::Serving)
+        };
+        [
+            (0..index).rev().find(serves),
+            (index + 1..rotation.drones.len()).find(serves),
+        ]
+    }
+
+    fn gap_m(
+        rotation: &Rotation,
+        flight: &Flight,
+        [before, after]: [Option<usize>; 2],
+        distance_m: f64,
+    ) -> [f64; 2] {
+        let x_m = |index: Option<usize>| Some(flight.true_position(index?)?[0]);
+        // Beyond an end of the chain: a spacing of the chain.
+        let serves = |index: &usize| {
+            rotation
+                .drones
+                .get(*index)
+                .is_some_and(|it| it.duty == Duty::Serving)
+        };
+        let spacing_m =
+            |end: f64, next: Option<f64>| next.map_or(distance_m, |next| (next - end).abs());
+        match (x_m(before), x_m(after)) {
+            (Some(from), Some(to)) => [from, to],
+            (Some(from), None) => {
+                let next = x_m(before.and_then(|at| (0..at).rev().find(serves)));
+                [from, distance_m.min(from + spacing_m(from, next))]
+            }
+            (None, Some(to)) => {
+                let next = x_m(after.and_then(|at| (at + 1..rotation.drones.len()).find(serves)));
+                [(to - spacing_m(to, next)).max(0.0), to]
+            }
+            (None, None) => [0.0, distance_m],
+        }
+    }
+
+    /// Switches the spares on that wait for a loss, so that they join as relays that were lost.
+    fn join_as_lost(&mut self, rotation: &Rotation) {
+        let waits = |index: &usize| {
+            let off = self
+                .members
+                .get(*index)
+                .is_some_and(|it| it.killed.is_some());
+            off && rotation
+                .drones
+                .get(*index)
+                .is_some_and(|it| it.duty == Duty::Standby)
+        };
+        if let Some(index) = (0..rotation.drones.len()).find(waits) {
+            self.switch_on(index, false);
+        }
+    }
+
+    /// Simulates operators who report that a drone that was lost has left the line.
+    fn report_gone(&mut self, rotation: &Rotation, flight: &Flight) {
+        let now = self.now;
+        let is_on_line = |index: usize| {
+            let drone = rotation.drones.get(index);
+            let is_away = drone.is_none_or(|drone| match &drone.duty {
+                Duty::Ground(_) | Duty::Rising { .. } | Duty::Standby => true,
+                Duty::Serving => false,
+                Duty::Home { .. } => flight
+                    .true_position(index)
+                    .is_some_and(|at| at[1].abs() >= rotation.spacing_m),
+            });
+            !is_away
+        };
+        for index in 0..self.members.len() {
+            for side in [Side::Upstream, Side::Downstream] {
+                let Some(member) = self.members.get(index).filter(|it| it.killed.is_none()) else {
+                    continue;
+                };
+                let reason = member.relay.hold_reason(side);
+                if !matches!(reason, Some(HoldReason::Lost | HoldReason::NotFlown)) {
+                    continue;
+                }
+                let [before, after] = member.relay.neighbours();
+                let (from, to) = match side {
+                    Side::Upstream => (before.map_or(0, usize::from), index),
+                    Side::Downstream => (
+                        index + 1,
+                        after.map_or(self.members.len(), |it| usize::from(it) - 1),
+                    ),
+                };
+                if !(from..to).any(is_on_line)
+                    && let Some(member) = self.members.get_mut(index)
+                {
+                    member.relay.clear_lost(now, side);
+                    self.drain(index);
+                }
+            }
+        }
+    }
+
+    /// Puts the drones that take off now on the ground at their pads.
+    fn put_on_pads(&mut self, flight: &mut Flight) {
+        for (index, pad) in std::mem::take(&mut self.take_off_from) {
+            if let Some(drone) = flight.drones.get_mut(index) {
+                drone.put(pad);
+            }
+        }
+    }
+}
+
+/// Time after its latest start for home at which a pilot takes a drone without permission, s.
+const RETREAT_S: f64 = 60.0;
