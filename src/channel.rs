@@ -40,7 +40,7 @@ pub enum ChannelError {
     Carrier,
     /// An excess loss factor is not within 1 (0 dB) to 1e20 (200 dB).
     ExcessLoss,
-    /// The excess loss without line of sight is smaller than with it.
+    /// The excess loss without line of sight is smaller than that with line of sight.
     LossOrder,
     /// The weight of the line-of-sight path in the channel model is not within 0 to 1.
     Weight,

@@ -126,7 +126,7 @@ pub enum LineError {
 }
 
 error_texts!(LineError {
-    Distance => "the mission's distance must be equal to the distance between its sites (positions of Tx and Rx on earth); without sites of its own it uses those loaded before flight",
+    Distance => "the mission's distance must be equal to the distance between its sites (positions of Tx and Rx on earth); a mission without sites uses the sites loaded before flight",
     Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
     Altitude => "the mission's altitudes must be within this relay's geofence",
     Lateral => "the mission's lateral range must be within this relay's geofence",

@@ -109,8 +109,12 @@ fn text(event: Event) -> defmt::Str {
             "the measurements do not fit a single interferer on the ground, or are too few: the relays keep their last estimate"
         ),
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
-        Event::MayLeaveTold { .. } => defmt::intern!("may fly away; report it once it has left"),
-        Event::MayLeave => defmt::intern!("the chain has closed up: this drone may fly away"),
+        Event::MayLeaveTold { .. } => {
+            defmt::intern!("may fly away; when it has left, report to this relay that it is gone")
+        }
+        Event::MayLeave => {
+            defmt::intern!("the chain works without this relay now: this drone may fly away")
+        }
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }
@@ -128,7 +132,7 @@ mod autopilot {
     });
 
     texts!(State {
-        State::Silent => "no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?",
+        State::Silent => "no heartbeat for 3 s: check that the autopilot is switched on, check its cable, and set its port to MAVLink 2 and to the data rate of this relay",
         State::Grounded => "on the ground, or not armed",
         State::Standby => "in the air, and not controlled by the relay",
         State::Engaged => "setpoint control engaged",
@@ -144,17 +148,17 @@ mod autopilot {
 
     texts!(FlightMode {
         FlightMode::Companion => "still OFFBOARD or GUIDED",
-        FlightMode::Sticks => "a manual mode",
+        FlightMode::Sticks => "manual",
         FlightMode::Hold => "Hold or LOITER",
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        FlightMode::Other => "another one, such as a mission or a take-off",
+        FlightMode::Other => "other, for example mission or take-off",
     });
 
     impl defmt::Format for Release {
         fn format(&self, f: defmt::Formatter<'_>) {
-            defmt::write!(f, "{}; the mode is {}", self.cause, self.mode);
+            defmt::write!(f, "{}; flight mode: {}", self.cause, self.mode);
         }
     }
 
@@ -163,15 +167,15 @@ mod autopilot {
         WaitReason::Link => "messages from the autopilot arrive late: check the link to it",
         WaitReason::Found => "OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
         WaitReason::Unseen => "the relay has not received the pilot's choice of a mode yet: end the failsafe if there is one, choose a mode other than OFFBOARD and GUIDED, then OFFBOARD or GUIDED",
-        WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line",
-        WaitReason::NotReady => "this drone is on the wrong side of a neighbour along the line; fly it to its own side first",
+        WaitReason::Position => "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly the drone nearer to the line",
+        WaitReason::NotReady => "the relays are not in the order of their numbers along the line from Tx to Rx: fly this drone to the right side of its neighbour first",
     });
 
     texts!(Mistrust {
-        Mistrust::NoKey => "signs its frames and ignores unsigned ones: give this relay the autopilot's key",
-        Mistrust::SignsOnly => "signs its frames and accepts unsigned ones, too: this relay controls it without a key",
-        Mistrust::Unsigned => "does not sign its frames, which are ignored: give it the key, or take the autopilot's key from this relay",
-        Mistrust::OtherKey => "signs with another key than this relay has for it, so its frames are ignored: give both the same key",
+        Mistrust::NoKey => "signs its frames and ignores unsigned frames: give this relay the autopilot's key",
+        Mistrust::SignsOnly => "signs its frames, but accepts unsigned frames: this relay controls it without a key",
+        Mistrust::Unsigned => "does not sign its frames, so they are ignored: load the key into the autopilot, or provision this relay without the autopilot's key",
+        Mistrust::OtherKey => "signs with another key than this relay, so its frames are ignored: give the autopilot and this relay the same key",
         Mistrust::Old => "signs with an old timestamp, so its frames are ignored: check the autopilot's clock",
     });
 
@@ -184,12 +188,16 @@ mod autopilot {
                     "rebooted; setpoint control begins when the pilot chooses OFFBOARD or GUIDED again in the air"
                 ),
                 Self::State(state) => defmt::write!(f, "{}", state),
-                Self::Released(release) => defmt::write!(f, "released: {}", release),
-                Self::Waits(reason) => defmt::write!(f, "cannot be engaged: {}", reason),
-                Self::Ready => defmt::write!(f, "ready: its pilot may choose OFFBOARD or GUIDED"),
+                Self::Released(release) => {
+                    defmt::write!(f, "setpoint control released: {}", release)
+                }
+                Self::Waits(reason) => {
+                    defmt::write!(f, "setpoint control cannot be engaged: {}", reason)
+                }
+                Self::Ready => defmt::write!(f, "ready: the pilot may choose OFFBOARD or GUIDED"),
                 Self::Refused => defmt::write!(
                     f,
-                    "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
+                    "the autopilot flies to a target other than the setpoint that the relay has sent: check whether the setpoint is outside the autopilot's fence"
                 ),
                 Self::FenceBreached => {
                     defmt::write!(f, "the drone is outside the autopilot's fence");
@@ -208,7 +216,7 @@ mod autopilot {
                 ),
                 Self::ClearRefused { relays, from } => defmt::write!(
                     f,
-                    "denied MAVLink system {=u8}, component {=u8} to clear the lost relays {}: the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other",
+                    "refused the command of MAVLink system {=u8}, component {=u8} to report the lost relays {} as landed: the command must name all lost relays on one side of this relay (toward Tx or toward Rx), and no other relay",
                     from.system,
                     from.component,
                     named(relays)

@@ -332,7 +332,7 @@ error_texts!(SetupError {
     Index => "the relay's index must be within 1 to the mission's number of relays",
     Profile => "profile.altitude_m must be within 0.1 to 1e5, profile.power_w within 1e-6 to 1e6",
     Step => "the fixed target step (linear SIR) must be above 0",
-    Method => "the method must be Align in a mission with an interference field; in other missions Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust the cargo feature `adjust`",
+    Method => "the method cannot be used: a mission with an interference field needs Align; Joint needs the cargo feature `altitude` and at most 100 relays; Adjust needs the cargo feature `adjust`",
     Reverse => "Joint needs a known interferer if the mission's reverse is above 0: listen must be None, or the method Align or Adjust",
     Fitted => "fitted slots (the mission's fitted_gap above 0) need the method Joint and a known interferer: method must be Joint, listen None, and the interference a Source",
     Adjust => "Adjust::explore_m must be within 0 to 1e5, and the grid of Adjust::local at least 2 by 2",

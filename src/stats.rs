@@ -47,8 +47,8 @@ pub struct Stats {
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Ignored messages of passes along the chain and of view changes, with a foreign view or mission. Their view or
-    /// mission is not the one that this relay uses.
+    /// Number of ignored messages with the digest of another view or mission than this relay uses. Counted are messages of passes along the
+    /// chain and of view changes.
     pub view: u32,
     /// Views (chain memberships) that this relay has accepted.
     pub views: u32,

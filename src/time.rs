@@ -123,7 +123,7 @@ pub(crate) struct MonotonicClock {
 }
 
 impl MonotonicClock {
-    /// Creates a clock whose internal time equals the caller's until the caller's clock steps.
+    /// Creates a clock whose internal time equals the caller's time until the caller's clock jumps.
     pub(crate) const fn new(now: Instant) -> Self {
         Self {
             latest: now,

@@ -107,8 +107,8 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3, the first sweep message from relay 1 to it, its length, and the time. The time is that at
-/// which relay 1 sends the message, which carries the search for the positions along the chain.
+/// Returns relay 2 of 3, a sweep message, the message's length, and a time. The message is the first sweep from relay 1 to relay 2; the
+/// time is that at which relay 1 sends this message.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {

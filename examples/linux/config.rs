@@ -22,11 +22,11 @@ const TOLERANCE: f64 = 1e-4;
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Channel given by the file; `None` for the default channel, that of the paper.
+    /// Path-loss parameters of the channel in the file; `None` for the default channel, that of the paper.
     pub channel: Option<Channel>,
     /// Distribution of the interference along x given by the file, if any.
     pub field: Option<Interference>,
-    /// Profiles (altitude and power) of single relays, with the indices of these relays.
+    /// Profiles (altitude and power) of single relays, each with the index of its relay.
     pub profiles: Vec<(u16, Profile)>,
     /// Indices of the relays whose altitude the file fixes. The method chooses only the altitudes of the other relays.
     pub held: Vec<u16>,

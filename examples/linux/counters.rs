@@ -88,9 +88,9 @@ impl RejectionReasons {
                 version >= MANY,
                 version,
                 if signs {
-                    "have another version of the frame format: do all relays run the same software version?"
+                    "have another version of the frame format: use the same software version at all relays"
                 } else {
-                    "are signed, and this relay has no --key-file; or they have another version of the frame format"
+                    "are signed, but this relay has no --key-file; or their sender has another software version"
                 },
             ),
             (

@@ -45,9 +45,9 @@ fn parsed_w(words: &[&str]) -> Option<f32> {
 /// A text that says that the line is too long or not UTF-8.
 pub fn words(line: &[u8]) -> Result<Vec<&str>, String> {
     if line.len() > LONGEST {
-        return Err(format!("it has more than {LONGEST} bytes"));
+        return Err(format!("the line must have at most {LONGEST} bytes"));
     }
-    let text = std::str::from_utf8(line).map_err(|_| "it is not UTF-8")?;
+    let text = std::str::from_utf8(line).map_err(|_| "the line must be UTF-8 text")?;
     Ok(text.split_whitespace().collect())
 }
 
@@ -64,13 +64,13 @@ impl InvalidLines {
         log: &Log,
         event: &str,
         line: &[u8],
-        [why, expected]: [&str; 2],
+        [input, why, expected]: [&str; 3],
     ) {
         self.0 += 1;
         if self.0 == 1 {
             let text = String::from_utf8_lossy(line);
             let what = format_args!(
-                "the line {text:?} is ignored: {why}; a valid line is {expected}; further invalid lines are counted, but not logged"
+                "invalid line {text:?} in {input} is ignored: {why}; a valid line is {expected}; further invalid lines are counted, but not logged"
             );
             log.line(now, event, what);
         }

@@ -127,9 +127,8 @@ impl Log {
 
     /// Logs that frames are signed, and the epoch, a number that rises at every start.
     pub fn signed(&self, epoch: u32) {
-        let what = format_args!(
-            "frames are signed; epoch {epoch}, a number that is larger at every start"
-        );
+        let what =
+            format_args!("frames are signed; epoch {epoch} (start counter, larger at every start)");
         self.event(Instant::ZERO, "signed", json!({ "epoch": epoch }), what);
     }
 
@@ -201,7 +200,7 @@ impl Writer {
             let more = dropped - self.reported_drops;
             let fields = json!({ "dropped": dropped });
             let notice = format!(
-                "{more} log lines dropped: the disk was full, or the reader of the log too slow or gone"
+                "{more} log lines dropped: the disk was full, or the program that reads the log was too slow or had ended"
             );
             text += &self.format.line(now, "log", fields, &notice);
         }

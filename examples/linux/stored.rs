@@ -55,11 +55,11 @@ pub fn next_epoch(file: &Path) -> Result<u32, String> {
         Err(error) => return Err(named(&format!("cannot be read: {error}"))),
     };
     let last: u32 = last.ok_or_else(|| {
-        named("must contain one number within 0 to 4294967294: the epoch of the last start")
+        named("must contain one number within 0 to 4294967294: the epoch (start counter) of the last start")
     })?;
     let epoch = last
         .checked_add(1)
-        .ok_or_else(|| named("contains the largest epoch, and every start needs a larger one: give all relays a new key, and remove this file"))?;
+        .ok_or_else(|| named("the epoch (start counter) in the file is the largest one, and every start needs a larger epoch: give all relays a new key, and delete this file"))?;
     replace(file, format!("{epoch}\n").as_bytes())
         .map_err(|error| named(&format!("cannot be written: {error}")))?;
     Ok(epoch)
@@ -225,7 +225,7 @@ impl StoredFile {
         self.ended.as_fd()
     }
 
-    /// Returns the number of successful writes of the record file.
+    /// Passes the newest record of votes to the writer thread. Does nothing while that thread is writing.
     pub const fn writes(&self) -> u64 {
         self.writes
     }

@@ -142,7 +142,7 @@ impl Companion {
             Instant::ZERO,
             EVENT,
             format_args!(
-                "connected by {place}{from}, maximum speed {} m/s; setpoint control begins when the pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
+                "opened {place}{from}, maximum speed of the drone {} m/s; setpoint control begins when the pilot chooses OFFBOARD (PX4) or GUIDED (ArduCopter) in the air",
                 pace.speed_m_s
             ),
         );
@@ -280,21 +280,20 @@ impl Companion {
                 format!("no answer at {}", datagrams.silence())
             }
             (Received::Nothing, Port::Tty(tty)) => format!(
-                "no answer at {}, {} bit/s: is the autopilot on, is its TX wired to this RX and its RX to this TX, and is that its data rate there?",
+                "no bytes received at {}, {} bit/s: check that the autopilot is switched on, that its TX is wired to this computer's RX and its RX to this computer's TX, and that its port has this data rate",
                 tty.path().display(),
                 tty.baud()
             ),
             (Received::Noise, port) => format!(
-                "the bytes received at {} are not MAVLink 2: {}, and does it send MAVLink 2 there?",
+                "the bytes received at {} are not MAVLink 2: check that {} and sends MAVLink 2",
                 self.plan.port,
                 match port {
-                    Port::Udp(_) => "is that the autopilot's port".to_owned(),
-                    Port::Tty(tty) =>
-                        format!("is {} bit/s the autopilot's data rate there", tty.baud()),
+                    Port::Udp(_) => "this is the address of the autopilot, which".to_owned(),
+                    Port::Tty(tty) => format!("the autopilot's port has {} bit/s", tty.baud()),
                 }
             ),
             (Received::Others, _) => format!(
-                "no frame received at {} is from a PX4 or an ArduCopter: is this the port of the autopilot itself (MAVLink component 1)?",
+                "MAVLink frames are received at {}, but none from a PX4 or an ArduCopter: connect the relay to the autopilot itself (MAVLink component 1)",
                 self.plan.port
             ),
         }
@@ -358,13 +357,13 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
                 .to_owned()
         }
         AutopilotEvent::Refused => {
-            "flies to another target than the one sent; is the setpoint outside the autopilot's fence?"
+            "the autopilot flies to a target other than the setpoint that the relay has sent: check whether the setpoint is outside the autopilot's fence"
                 .to_owned()
         }
         AutopilotEvent::State(state) => {
             let what = match state {
                 State::Silent => {
-                    "no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?"
+                    "no heartbeat for 3 s: check that the autopilot is switched on, check its cable, and set its port to MAVLink 2 and to the data rate of this relay"
                 }
                 State::Grounded => "on the ground, or not armed",
                 State::Standby => "in the air, and not controlled by the relay",
@@ -375,16 +374,16 @@ fn log_event(now: Instant, log: &Log, event: AutopilotEvent) {
         }
         AutopilotEvent::Released(release) => {
             let (cause, mode) = (cause(release.cause), mode(release.mode));
-            format!("released: {cause}; the mode is {mode}")
+            format!("setpoint control released: {cause}; flight mode: {mode}")
         }
-        AutopilotEvent::Waits(reason) => format!("cannot be engaged: {}", wait_reason(reason)),
-        AutopilotEvent::Ready => "ready: its pilot may choose OFFBOARD or GUIDED".to_owned(),
+        AutopilotEvent::Waits(reason) => format!("setpoint control cannot be engaged: {}", wait_reason(reason)),
+        AutopilotEvent::Ready => "ready: the pilot may choose OFFBOARD or GUIDED".to_owned(),
         AutopilotEvent::LostCleared { side, relays, from } => {
             let text = lost::cleared(numbers(&relays), side);
             return log_command(now, log, Ok(text), &relays, from);
         }
         AutopilotEvent::ClearRefused { relays, from } => {
-            let text = "the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other";
+            let text = "the command must name all lost relays on one side of this relay (toward Tx or toward Rx), and no other relay";
             return log_command(now, log, Err(text.to_owned()), &relays, from);
         }
         AutopilotEvent::FenceBreached => "the drone is outside the autopilot's fence".to_owned(),
@@ -426,12 +425,12 @@ const fn cause(cause: ReleaseCause) -> &'static str {
 const fn mode(mode: FlightMode) -> &'static str {
     match mode {
         FlightMode::Companion => "still OFFBOARD or GUIDED",
-        FlightMode::Sticks => "a manual mode",
+        FlightMode::Sticks => "manual",
         FlightMode::Hold => "Hold or LOITER",
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        _ => "another one, such as a mission or a take-off",
+        _ => "other, for example mission or take-off",
     }
 }
 
@@ -440,16 +439,16 @@ const fn wait_reason(reason: WaitReason) -> &'static str {
         WaitReason::Failsafe => "the autopilot is in a failsafe; choose a mode to end it",
         WaitReason::Link => "messages from the autopilot arrive late: check the link to it",
         WaitReason::Found => {
-            "it was in OFFBOARD or GUIDED before this program started: choose another mode, then OFFBOARD or GUIDED again"
+            "the autopilot was in OFFBOARD or GUIDED before this program started: choose another mode, then OFFBOARD or GUIDED again"
         }
         WaitReason::Unseen => {
             "this program has not received the pilot's choice of a mode yet: end the failsafe if there is one, choose a mode other than OFFBOARD and GUIDED, then OFFBOARD or GUIDED"
         }
         WaitReason::Position => {
-            "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line"
+            "the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly the drone nearer to the line"
         }
         WaitReason::NotReady => {
-            "this drone is on the wrong side of a neighbour along the line; fly it to its own side first"
+            "the relays are not in the order of their numbers along the line from Tx to Rx: fly this drone to the right side of its neighbour first"
         }
         _ => "the reason is unknown",
     }
@@ -467,15 +466,17 @@ const fn word(state: State) -> &'static str {
 
 const fn mistrusted(why: Mistrust) -> &'static str {
     match why {
-        Mistrust::NoKey => "signs its frames and ignores unsigned ones: give --autopilot-key-file",
+        Mistrust::NoKey => {
+            "signs its frames and ignores unsigned frames: give its key with --autopilot-key-file"
+        }
         Mistrust::SignsOnly => {
-            "signs its frames and accepts unsigned ones, too: it is controlled without --autopilot-key-file"
+            "signs its frames, but accepts unsigned frames: the relay controls it without a key, because there is no --autopilot-key-file"
         }
         Mistrust::Unsigned => {
-            "does not sign its frames, which are ignored: give it the key of --autopilot-key-file, or leave out that option"
+            "does not sign its frames, so they are ignored: load the key of --autopilot-key-file into the autopilot, or leave out that option"
         }
         Mistrust::OtherKey => {
-            "signs with another key than that of --autopilot-key-file, so its frames are ignored: give both the same key"
+            "signs with another key than that of --autopilot-key-file, so its frames are ignored: give the autopilot and this relay the same key"
         }
         Mistrust::Old => {
             "signs with an old timestamp, so its frames are ignored: check the autopilot's clock"

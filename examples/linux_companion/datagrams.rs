@@ -39,7 +39,7 @@ impl Datagrams {
             .map_err(|error| format!("{peer} cannot be reached: {error}"))?;
         if socket.local_addr().is_ok_and(|own| own == peer) {
             return Err(format!(
-                "{peer} is this program's own port: LOCAL must be another one than PORT, within 1 to 65535"
+                "{peer} is this program's own address and port: LOCAL in udp:HOST:PORT@LOCAL must differ from PORT, within 1 to 65535"
             ));
         }
         let ready = socket.set_nonblocking(true);
@@ -92,11 +92,11 @@ impl Datagrams {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
             return format!(
-                "{peer} (from local port {local}): connection refused, because no program listens there: is the autopilot on, and is that its port?"
+                "{peer} (from local port {local}): connection refused, because no program listens there: check that the autopilot is switched on, and check HOST and PORT of --autopilot"
             );
         }
         format!(
-            "{peer} (from local port {local}): is the autopilot on, and does it send to this port? Until it restarts, a PX4 sends to the first port it has received from: give that one as LOCAL in udp:HOST:PORT@LOCAL"
+            "{peer} (from local port {local}): check that the autopilot is switched on and sends to local port {local}; a PX4 sends only to the first port that has sent to it: restart the PX4, or give that first port as LOCAL in udp:HOST:PORT@LOCAL"
         )
     }
 

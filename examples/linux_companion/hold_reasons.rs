@@ -57,8 +57,10 @@ impl HoldReasonLog {
             let whom = node.map_or_else(|| "its neighbour".to_owned(), &name);
             let fields = json!({ "node": node, "reason": reason.map(word) });
             let text = match reason {
-                Some(reason) => format!("holds its position: {}", describe(reason, &whom)),
-                None => format!("no longer holds its position because of {whom}"),
+                Some(reason) => {
+                    format!("this drone holds its position: {}", describe(reason, &whom))
+                }
+                None => format!("this drone no longer waits for {whom}"),
             };
             log.event(now, "waits", fields, text);
         }
@@ -87,14 +89,14 @@ fn describe(reason: HoldReason, whom: &str) -> String {
             )
         }
         HoldReason::Order => format!(
-            "this drone is on the wrong side of {whom} along the line, or too close to it to be sure: fly one of the two drones to its own side by hand"
+            "this drone is on the wrong side of {whom} along the line from Tx to Rx, or too close to it to decide: fly one of the two drones by hand until they are in the order of their numbers"
         ),
         HoldReason::Close => {
             format!("the agreed position is too close to the present position of {whom}")
         }
         HoldReason::Lost => {
             format!(
-                "a lost relay may still hover between this drone and {whom}: once it has landed, send `clear-lost` with its number"
+                "a lost relay may still hover between this drone and {whom}: when it has landed, send the command `clear-lost` with its number"
             )
         }
         HoldReason::NotFlown => {
@@ -103,7 +105,7 @@ fn describe(reason: HoldReason, whom: &str) -> String {
             )
         }
         HoldReason::Pending => {
-            format!("{whom} has not left the space yet that this drone is to move into")
+            format!("{whom} has not yet left the space into which this drone has to move")
         }
         HoldReason::Halted => {
             format!(

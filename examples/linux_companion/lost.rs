@@ -64,7 +64,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "unknown command `{command}`: the only one is `{CLEAR} N ..`, with the numbers of every lost relay on one side of this relay, once all of them have landed"
+                "unknown command `{command}`: the only command is `{CLEAR} N ..`; N .. are the numbers of all lost relays on one side of this relay, and all of them must have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -75,7 +75,7 @@ impl Lost {
             (_, Some(last)) if *last < self.index => Side::Upstream,
             (None, _) => {
                 return Err(format!(
-                    "{CLEAR} names no relay: once every lost relay on one side of this relay has landed, send their numbers, as in `{CLEAR} 3`"
+                    "{CLEAR} names no relay: when all lost relays on one side of this relay have landed, give their numbers, as in `{CLEAR} 3`"
                 ));
             }
             _ => {
@@ -90,7 +90,7 @@ impl Lost {
         let missing: Vec<u16> = missing.copied().filter(|it| !named.contains(it)).collect();
         if !missing.is_empty() {
             return Err(format!(
-                "{} lost, too, on that side of this relay: once every lost relay of that side has landed, name all of them in one command",
+                "{} also lost on the same side of this relay, but not named in the command: when all of them have landed, name all their numbers in one command",
                 listed(missing)
             ));
         }
@@ -110,11 +110,13 @@ impl Lost {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
             let most = self.relays;
-            return Err(format!("relay {word}: must be within 1 to {most}"));
+            return Err(format!(
+                "relay {word}: the number of a relay must be within 1 to {most}"
+            ));
         };
         if number == self.index {
             return Err(format!(
-                "relay {number} is this relay: name lost relays only"
+                "relay {number} is this relay itself: name lost relays only"
             ));
         }
         let is_heard = relay.neighbours().contains(&Some(number)) && !self.nodes.contains(&number);
@@ -141,7 +143,7 @@ pub(crate) fn log_command(
     };
     let (Ok(text) | Err(text)) = done;
     let fields = json!({ "command": command, "by": by });
-    let line = format_args!("{text} (`{command}` by {by})");
+    let line = format_args!("{text} (command `{command}` from {by})");
     log.event(now, event, fields, line);
     json!({ "done": is_done, "text": text })
 }

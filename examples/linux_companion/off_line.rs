@@ -204,9 +204,9 @@ impl fmt::Display for OffLineReport {
         )?;
         match (self.kind, self.is_swapped) {
             (Kind::Line, true) => f.write_str(": are latitude and longitude swapped?"),
-            (Kind::Line, false) => {
-                f.write_str(": are these the sites (Tx and Rx) of this flight, and is the drone's position right?")
-            }
+            (Kind::Line, false) => f.write_str(
+                ": check the mission's sites (positions of Tx and Rx), and the drone's position",
+            ),
             (Kind::Fence, _) => {
                 write!(
                     f,

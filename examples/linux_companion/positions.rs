@@ -56,7 +56,13 @@ impl Positions {
                 } else {
                     "x_m y_m altitude_m"
                 };
-                bad.refuse(now, log, "position", line, [why.as_str(), expected]);
+                bad.refuse(
+                    now,
+                    log,
+                    "position",
+                    line,
+                    ["--positions", why.as_str(), expected],
+                );
             }
         });
         self.newest = newest.map(|place| (now, place)).or(self.newest);
@@ -121,7 +127,7 @@ fn parse_line(text: &[u8], listens: bool) -> Result<(Option<Placement>, Option<S
         return Ok((None, Some(Sample::Receiver { power_w })));
     }
     let [x, y, altitude, rest @ ..] = &words[..] else {
-        return Err("it has fewer than three numbers".to_owned());
+        return Err("the line must have at least three numbers".to_owned());
     };
     let at = Placement {
         x_m: number(x)?,

@@ -36,11 +36,11 @@ pub(crate) fn resume_views(
     if let Some(bytes) = &bytes {
         stored = record(bytes, ViewRecord::LENGTH);
         let votes = stored.and_then(ViewRecord::from_bytes).ok_or_else(|| {
-            refused("is damaged, or not a file of votes: before a new flight remove the file, and start again; in the same flight the relay cannot rejoin the chain")
+            refused("the file is damaged, or not a file of votes. Before a new flight, delete the file and start again. In the same flight, the relay cannot rejoin the chain")
         })?;
         relay.resume_view(now, &votes).map_err(|error| match error {
             RecordError::Base => refused(&format!(
-                "{error}: for a new flight remove the file, and start again; in the same flight start the relay with the mission that it had"
+                "{error}. Before a new flight, delete this file and start again. In the same flight, start the relay with the mission that it had before"
             )),
             _ => refused(&error.to_string()),
         })?;
@@ -56,7 +56,7 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
     let resumed = load_upload(file, mission).and_then(|upload| match upload {
         Some(upload) => match relay.resume(&upload) {
             Ok(()) => Ok(true),
-            Err(error) => Err(format!("{UPLOADS}: {error}")),
+            Err(error) => Err(format!("{UPLOADS} {}: {error}", file.display())),
         },
         None => Ok(false),
     });
@@ -64,7 +64,9 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
         log.line(
             Instant::ZERO,
             "file",
-            format_args!("{why}; the relay starts with the mission of its options"),
+            format_args!(
+                "{why}; the relay ignores the file and starts with the mission of its options"
+            ),
         );
         false
     })
@@ -80,11 +82,11 @@ pub(crate) fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Uploa
         return Ok(None);
     };
     let upload = record(&bytes, Upload::LENGTH).and_then(Upload::decode);
-    let upload = upload.ok_or_else(|| named("is damaged, or not an uploaded mission"))?;
+    let upload = upload.ok_or_else(|| named("the file is damaged, or not an uploaded mission"))?;
     let (base, loaded) = (upload.base(), mission.digest());
     if base != loaded || upload.config().relays != mission.relays() {
         return Err(named(&format!(
-            "is an upload for relays that were loaded with the mission of digest 0x{base:04x}, but this relay was loaded with 0x{loaded:04x}"
+            "the uploaded mission in this file is for relays with a loaded mission of digest 0x{base:04x}, but the loaded mission of this relay has digest 0x{loaded:04x}"
         )));
     }
     Ok(Some(upload))

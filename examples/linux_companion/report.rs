@@ -158,7 +158,7 @@ impl Report {
             ),
             Event::MayLeave => tell(
                 "may leave",
-                "the other relays have closed up, so this drone may fly away",
+                "the chain works without this relay now, so this drone may fly away",
             ),
             other => self.node_event(now, other, relay),
         }
@@ -220,7 +220,9 @@ impl Report {
             }
             Event::MayLeaveTold { .. } => say(
                 "told",
-                format_args!("{name} {toward} may fly away; report it once it has left"),
+                format_args!(
+                    "{name} {toward} may fly away; when it has left, send the command `clear-lost` with its number"
+                ),
             ),
             Event::NotHeard { .. } => say(
                 "not heard",
@@ -231,7 +233,7 @@ impl Report {
             Event::MissionMismatch { .. } => say(
                 "mismatch",
                 format_args!(
-                    "{name} has another mission than this relay, whose digest is 0x{:04x}; load the same mission into both",
+                    "{name} has another mission than this relay (digest of this relay's mission: 0x{:04x}); load the same mission into both",
                     self.mission_digest(relay)
                 ),
             ),
@@ -324,7 +326,7 @@ impl Report {
             now,
             "view accepted",
             json!({ "place": place, "relays": relays, "view": view }),
-            format_args!("the chain has {relays} relays, this one at place {place} from the transmitter (view {view})"),
+            format_args!("the chain has {relays} relays; this relay is at place {place}, counted from the transmitter (view {view})"),
         );
     }
 
@@ -356,7 +358,7 @@ impl Report {
             .chain(back.into_iter().filter(|_| end > begin));
         let used = used.collect::<Vec<_>>().join(", ");
         let text = format_args!(
-            "shares of the frame: {used}; the chain carries {:.6} bit/s/Hz",
+            "time slots as shares of the frame: {used}; the chain carries {:.6} bit/s/Hz",
             Exact(slots.bits_per_hz)
         );
         self.log.event(now, "slots", status::slots(slots), text);

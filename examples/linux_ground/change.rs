@@ -17,7 +17,11 @@ pub(crate) fn log_changes(log: &Log, now: Instant, before: &Basis, after: &Basis
         log.event(now, "change", fields, what);
     }
     if is_same {
-        log.line(now, "change", "none");
+        log.line(
+            now,
+            "change",
+            "the new mission has the same values as the present one",
+        );
     }
 }
 
@@ -68,21 +72,21 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
                     format!("{} W at x {} m, y {} m", at.power_w, at.x_m, at.y_m)
                 }
                 Interference::Unknown => "measured by the relays".to_owned(),
-                Interference::Field(_) => "a field".to_owned(),
+                Interference::Field(_) => "a field (interference along the line)".to_owned(),
             },
         ),
         ("noise", format!("{noise_w} W")),
         (
-            "SIR needed toward the transmitter",
-            format!("{reverse} of that toward the receiver"),
+            "required SIR from Rx to Tx",
+            format!("{reverse} times the SIR from Tx to Rx"),
         ),
         ("power of the receiver", format!("{rx_power_w} W")),
         (
-            "slots",
+            "time slots",
             if fitted_gap > 0.0 {
-                format!("fitted, with an SNR gap of {fitted_gap}")
+                format!("fitted to the data rate of each hop, SNR gap {fitted_gap}")
             } else {
-                "equal".to_owned()
+                "equal for all hops".to_owned()
             },
         ),
         ("minimum separation", format!("{min_separation_m} m")),

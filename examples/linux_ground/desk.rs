@@ -133,7 +133,7 @@ impl Desk {
         let reply = match task.filter(|_| parts.plan.options.stand) {
             Some((task, body)) => self.perform(now, log, &mut parts, task, &body.to_string(), by),
             None => Err(format!(
-                "{line}: must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, at a station with --stand, or empty to read its state"
+                "command {line:?}: must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, which need a station with --stand, or empty to read the state"
             )),
         };
         let is_done = reply.is_ok();
@@ -183,7 +183,9 @@ impl Desk {
             return Err(UploadError::Field.to_string());
         }
         if uploading.as_ref().is_some_and(|it| !it.is_idle()) {
-            return Err("another preview or upload is under way".to_owned());
+            return Err(
+                "another preview or upload has not finished yet: try again later".to_owned(),
+            );
         }
         let form = form(self.previews + 1, plan.sited, body)?;
         self.previews = form.number;
@@ -196,8 +198,9 @@ impl Desk {
 /// Reads the form of preview `number` from `body`, a JSON object of texts. With `sited`, the receiver may have
 /// latitude and longitude.
 fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
-    let mut given: BTreeMap<String, String> =
-        serde_json::from_str(body).map_err(|error| format!("not an object of texts: {error}"))?;
+    let mut given: BTreeMap<String, String> = serde_json::from_str(body).map_err(|error| {
+        format!("the request must be a JSON object whose values are strings: {error}")
+    })?;
     let receiver_m = given
         .remove("receiver")
         .map(|text| place(&text))
@@ -211,7 +214,7 @@ fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
     match sited {
         Some(line) => words.push(format!("--site-tx={}", degrees(line.tx))),
         None if moves_site => {
-            return Err("the mission that was loaded before flight has no sites".to_owned());
+            return Err("site-tx and site-rx need sites (positions of Tx and Rx on earth) in the mission loaded before flight, which has none".to_owned());
         }
         None => {}
     }
@@ -246,10 +249,13 @@ fn upload(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, Str
     let age_s = now.as_micros() as f64 / 1e6 - asked.time_s;
     if !(-1.0..=OLDEST_S).contains(&age_s) {
         return Err(format!(
-            "the page shows a state of {age_s:.1} s before: must be at most {OLDEST_S} s; look at the page again"
+            "the page shows the state of {age_s:.1} s ago, but at most {OLDEST_S} s are allowed: wait until the page is up to date, and try again"
         ));
     }
-    let uploading = parts.uploading.as_mut().ok_or("there is no preview")?;
+    let uploading = parts
+        .uploading
+        .as_mut()
+        .ok_or("there is no preview: make a preview first")?;
     uploading.confirm(now, parts.ground, asked.preview, &asked.digest)?;
     Ok(json!({ "preview": asked.preview }).to_string())
 }

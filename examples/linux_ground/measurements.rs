@@ -101,7 +101,9 @@ impl Measurements {
             log.line(
                 now,
                 "measurement",
-                format_args!("no measurement from {name} for {seconds} s"),
+                format_args!(
+                    "no valid measurement of the interference from {name} for {seconds} s"
+                ),
             );
         }
         let newest_w = self.newest_w.take_if(|_| self.next_at <= now)?;
@@ -146,7 +148,8 @@ impl Measurements {
             Ok(power_w) => power_w,
             Err(why) => {
                 let expected = format!("POWER or {} POWER", name(self.end));
-                let texts = [why.as_str(), expected.as_str()];
+                let input = format!("{OPTION} {}", self.name);
+                let texts = [input.as_str(), why.as_str(), expected.as_str()];
                 return self.bad.refuse(now, log, "measurement", text, texts);
             }
         };
@@ -159,7 +162,7 @@ impl Measurements {
                 now,
                 "measurement",
                 fields,
-                format_args!("{power_w:.3e} W from {name}; further measurements are passed to the relays, but not logged"),
+                format_args!("measured interference {power_w:.3e} W, from {name}; further measurements are passed to the relays, but not logged"),
             );
         }
     }

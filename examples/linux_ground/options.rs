@@ -208,7 +208,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         }
         if !options.yes && !options.dry_run && !std::io::stdin().is_terminal() {
             return Err(format!(
-                "--version {version}: nobody can confirm the upload, because standard input is not a terminal: give --yes to upload without a question, or --dry-run to see the changes only"
+                "--version {version}: standard input is not a terminal, so nobody can confirm the upload: give --yes to upload without a question, or --dry-run to see the changes only"
             ));
         }
     }

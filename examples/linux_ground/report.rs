@@ -78,12 +78,12 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
             format!(
-                "--version {version}: must be within {next} to 65535, because the relays have version {held}"
+                "--version {version}: must be within {next} to 65535, because the relays have version {held} of the mission"
             )
         }
         None => {
             format!(
-                "--version {version}: must be above {held}, the version of the relays, but that is the largest one: load the relays with the new mission before their next flight"
+                "--version {version}: the relays have version {held}, the largest possible, so no upload is possible: load the new mission into the relays before their next flight"
             )
         }
     }
@@ -110,10 +110,10 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
 /// Returns the error text for an upload that relay `by` refused. It names the value that most likely caused it.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
-    let who = format!("--version {version}: relay {by}, or a relay behind it, rejects the upload");
+    let who = format!("upload of version {version} refused by relay {by}, or by a relay beyond it");
     match FenceViolation::of(&plan.loaded.mission, upload) {
         Some(FenceViolation { what, .. }) => format!("{who}: {what}"),
-        None => format!("{who}; the log of that relay gives the reason"),
+        None => format!("{who}: the log of that relay has the reason"),
     }
 }
 
@@ -146,7 +146,7 @@ impl FenceViolation {
                     "altitude",
                     altitudes(asked),
                     altitudes(own),
-                    "this --altitude and --band",
+                    "--altitude and --band",
                     "altitude",
                     |at| at.altitude_m,
                 )
@@ -155,7 +155,7 @@ impl FenceViolation {
                     "lateral range",
                     sides(asked),
                     sides(own),
-                    "this --lateral-min-m and --lateral-max-m",
+                    "--lateral-min-m and --lateral-max-m",
                     "y",
                     |at| at.y_m,
                 )
@@ -164,7 +164,7 @@ impl FenceViolation {
                     "distance",
                     [asked.most_x_m; 2],
                     [own.least_x_m, own.most_x_m],
-                    "this --distance",
+                    "--distance",
                     "x",
                     |at| at.x_m,
                 )
@@ -177,7 +177,7 @@ impl FenceViolation {
         };
         let [least, most] = range_m;
         let what = format!(
-            "{what} {is} m: must be within {least} to {most} m, the geofence of relays that were loaded with {options}"
+            "{what} {is} m: must be within {least} to {most} m, the relays' geofence by {options} of the mission loaded before flight"
         );
         Some(Self {
             what,
@@ -232,7 +232,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
     };
     let refused = ground.refused();
     format!(
-        "--timeout {seconds}: not finished after {seconds} s: {state}; {refused} received frames were rejected"
+        "upload not finished within --timeout {seconds} s: {state}; {refused} received frames were rejected"
     )
 }
 
@@ -242,7 +242,7 @@ pub(crate) fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         (
             stats.mission,
             format!(
-                "frames come from relays that were loaded with another mission than this station, whose digest is 0x{:04x}: give it the mission that the relays were loaded with",
+                "frames come from relays that were loaded with another mission than this station (digest of this station's mission: 0x{:04x}): give the station the mission that was loaded into the relays",
                 plan.loaded.mission.digest()
             ),
         ),
@@ -252,7 +252,7 @@ pub(crate) fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         ),
         (
             stats.unsigned,
-            "frames are not signed: relays without --key-file accept no uploads".to_owned(),
+            "frames are not signed: give the relays a --key-file, because relays without a key accept no uploads".to_owned(),
         ),
         (
             stats.foreign,
@@ -268,7 +268,7 @@ pub(crate) fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         (
             stats.misaddressed.saturating_add(stats.overheard),
             format!(
-                "frames were received, but none for the {}: compare --key-file, --end and --of with the options of the relays, and read the log of the nearest relay",
+                "frames were received, but none addressed to the {}: compare --key-file, --end and --of with the options of the relays, and read the log of the nearest relay",
                 name(plan.end)
             ),
         ),
@@ -287,11 +287,11 @@ pub(crate) fn likely_reason(plan: &Plan, stats: &Stats) -> String {
         }
         // A relay with another mission sends only handshakes.
         None if stats.handshakes > 0 => format!(
-            "a relay is received, but does not accept this station: it was probably loaded with another mission than this station, whose digest is 0x{:04x}",
+            "a relay is received, but ignores this station: the relay was probably loaded with another mission than this station (digest of this station's mission: 0x{:04x})",
             plan.loaded.mission.digest()
         ),
         None => format!(
-            "no frame was received: check that --tty {} leads to the chain, and check --network {}, --baud {}, --end and --key-file; a relay that receives this station logs what does not fit",
+            "no frame was received: check that --tty {} leads to the chain, and check --network {}, --baud {}, --end and --key-file; a relay that receives this station logs why it rejects the station's frames",
             plan.options.tty.display(),
             plan.options.network,
             plan.options.baud

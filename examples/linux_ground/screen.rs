@@ -47,9 +47,9 @@ impl Web {
         let (screen, posts) = Screen::start_acting(address, plan.web_password.clone())
             .map_err(|error| format!("--web {address}: {error}"))?;
         let who = match (plan.web_password.is_some(), screen.is_public()) {
-            (true, false) => "; it asks for the password",
+            (true, false) => "; the page asks for the password",
             (true, true) => {
-                "; other computers reach it, too, and it asks for the password, which they send without encryption"
+                "; other computers can reach it, too: the browser asks for the password, and sends it without encryption"
             }
             _ => "; every user of this computer can use it",
         };

@@ -205,7 +205,9 @@ impl Uploading {
         number: u32,
         digest: &str,
     ) -> Result<(), String> {
-        let newest = self.number().ok_or("there is no preview")?;
+        let newest = self
+            .number()
+            .ok_or("there is no preview: make a preview first")?;
         if number != newest {
             return Err(format!(
                 "preview {number} is not the newest one, which is preview {newest}"
@@ -218,7 +220,7 @@ impl Uploading {
             let why = if self.is_confirmed {
                 "was used already: make a new preview"
             } else {
-                "is not ready"
+                "is not computed yet: try again later"
             };
             return Err(format!("preview {number} {why}"));
         };
@@ -268,7 +270,7 @@ impl Uploading {
         } else {
             let version = upload.version();
             failed(format!(
-                "--version {version}: not confirmed, so nothing was uploaded"
+                "upload of version {version} not confirmed: nothing was uploaded"
             ))
         };
         self.finish(ground, outcome)
@@ -327,7 +329,7 @@ impl Uploading {
                     return self.decide(now, log, plan, ground, flown);
                 }
                 return failed(format!(
-                    "--version {version}: relay {} flies version {}, and its older firmware cannot report the values of that mission: give --from-loaded, and every value of that version that the new mission has to keep",
+                    "upload of version {version} refused: relay {} flies version {}, but its firmware is too old to report the values of that mission: give --from-loaded, and as options all values of that mission that the new one keeps",
                     flown.by, flown.version
                 ));
             }
@@ -359,7 +361,7 @@ impl Uploading {
         if let (true, Some(upload)) = (self.is_confirmed, self.upload) {
             if basis != self.based_on {
                 return failed(format!(
-                    "preview {}: computed for version {} of the mission, but the chain has another mission now, version {}: make a new preview",
+                    "preview {} was computed for version {} of the mission, but the chain flies another mission now, version {}: make a new preview",
                     self.number().unwrap_or(0),
                     self.based_on.0,
                     flown.version
@@ -372,7 +374,7 @@ impl Uploading {
             && *shown != of
         {
             return failed(format!(
-                "the map shows mission {shown}, but the chain has mission {of} (version and digest), whose line may be another: look at the coordinates again"
+                "the map shows mission {shown} (version and digest), but the chain flies mission {of}, which may have another line from Tx to Rx: wait for the new map, and check the coordinates"
             ));
         }
         let version = self.version.unwrap_or(flown.version.saturating_add(1));
@@ -457,7 +459,9 @@ impl Uploading {
             return failed(match self.form {
                 Some(_) => outside,
                 None => {
-                    format!("--version {version}: {outside}; --no-fence uploads it nevertheless")
+                    format!(
+                        "upload of version {version} refused: {outside}; --no-fence uploads the mission nevertheless"
+                    )
                 }
             });
         }
@@ -472,7 +476,7 @@ impl Uploading {
             return None;
         }
         if options.dry_run {
-            let what = format_args!("version {version} was not uploaded");
+            let what = format_args!("version {version} of the mission was not uploaded");
             log.line(now, "dry run", what);
             return Some(Ok(()));
         }
@@ -482,7 +486,7 @@ impl Uploading {
         // Earlier log lines must be printed before the question. A closed standard error is ignored.
         log.flush(std::time::Duration::from_millis(500));
         let mut out = std::io::stderr();
-        let _ = write!(out, "Upload version {version}? [y/N] ");
+        let _ = write!(out, "Upload version {version} of the mission? [y/N] ");
         let _ = out.flush();
         None
     }

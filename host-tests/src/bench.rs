@@ -75,7 +75,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Creates a bench of `relays`, whose frames reach their neighbours without delay.
+    /// Creates a test bench with `relays`. Frames reach the neighbours without delay.
     pub fn new(relays: Vec<Relay>, now: Instant) -> Self {
         let places = relays.iter().map(|relay| usize::from(relay.index()));
         let mut bench = Self {

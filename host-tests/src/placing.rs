@@ -178,7 +178,7 @@ impl Mixed {
 /// Hop of a random chain, with the position of the hop's sender.
 #[derive(Debug)]
 pub struct DrawnHop {
-    /// Random chain of 1 to 4 relays that has the hop. Its numbers are rounded to the relays' f32.
+    /// Random chain of 1 to 4 relays that contains the tested hop. Its numbers are rounded to f32, as in the relays.
     pub link: Link,
     /// Tested hop as a value of the crate. The reference computes the same hop from `link`.
     pub hop: Hop,

@@ -23,7 +23,8 @@ struct Function {
     error: Error,
     /// Range of the test points x. The points of a range above 0 are spaced logarithmically, those of others evenly.
     range: [f64; 2],
-    /// Maps a test point x to the arguments of the function. A function of one argument ignores the second.
+    /// Function that maps a test point x to the arguments of the tested function. A tested function of one argument ignores the second
+    /// argument.
     arguments: fn(f64) -> [f64; 2],
     micromath: fn([f32; 2]) -> f32,
     libm: fn([f32; 2]) -> f32,

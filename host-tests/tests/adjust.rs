@@ -164,8 +164,8 @@ fn grid_search_moves_as_the_reference_program() {
     }
 }
 
-/// Checks that the fine search of one relay finds a position as good as the best of a dense grid. Both searches keep
-/// the minimum separation from the neighbours.
+/// Checks that the fine search of Algorithm 2 for one relay is as good as a dense grid. The SIR of the relay's worse hop is compared. Both
+/// searches keep the minimum separation from the neighbours.
 #[test]
 fn the_fine_search_is_as_good_as_a_dense_grid() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(71));

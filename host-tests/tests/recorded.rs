@@ -284,7 +284,7 @@ fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f
     best.0
 }
 
-/// Checks that the recorded optimum of one relay is that of a search over x, y and altitude.
+/// Checks that the recorded optimal SIR of a chain with one relay equals that of a search. The search varies the relay's x, y and altitude.
 #[test]
 fn one_relay_agrees_with_brute_force() {
     let plane = of("figures aside").step_by(18);

@@ -26,7 +26,7 @@ fn recovered(setup: Setup) -> (Outcome, ChainReport) {
     (outcome, report)
 }
 
-/// Checks that a run lost only relay `lost` and settled without it. Returns the report of that recovery.
+/// Checks that a run lost only relay `lost`, and settled without this relay. Returns the report of the recovery.
 fn only(report: &ChainReport, relays: u16, lost: u16) -> RecoveryReport {
     let [one] = report.recovery.as_slice() else {
         panic!("{:?}", report.recovery);
@@ -100,7 +100,7 @@ fn detected(report: &ChainReport) -> f64 {
     lost.unwrap().at_s - AT_S as f64
 }
 
-/// Checks that the remaining chain agrees on exactly the positions of a new chain with as many relays.
+/// Checks that the relays that remain after a loss agree on the same positions as a new chain. The new chain has as many relays.
 #[test]
 fn the_remaining_chain_is_as_good_as_a_new_one() {
     for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {

@@ -142,7 +142,7 @@ const ZERO: SerialStats = SerialStats {
     unrouted: 0,
 };
 
-/// Stores the current task's waker in `place`, unless the waker stored there wakes this task anyway.
+/// Stores the current task's waker in `place`. Does nothing if the stored waker already wakes this task.
 pub(super) fn store_waker(place: &Cell<Option<Waker>>, cx: &Context<'_>) {
     let kept = place.take().filter(|waker| waker.will_wake(cx.waker()));
     place.set(Some(kept.unwrap_or_else(|| cx.waker().clone())));

@@ -39,9 +39,9 @@ pub enum FieldError {
 
 error_texts!(FieldError {
     Points => "an interference field must have 1 to 1024 points",
-    Place => "x_m must be within -1e7 to 1e7",
-    Order => "x_m must increase from point to point",
-    Upsilon => "upsilon_per_w must be within 1e-9 to 1e32",
+    Place => "x_m of each point of the interference field must be within -1e7 to 1e7",
+    Order => "x_m of the points of the interference field must increase from point to point",
+    Upsilon => "upsilon_per_w (mean of 1 / interference power, in 1/W) must be within 1e-9 to 1e32",
 });
 
 /// Interference field: a checked table of Upsilon = E[1/I] along x. It is linear between two points, and constant

@@ -45,7 +45,7 @@ const REPORTED: usize = 128;
 #[cfg(feature = "telemetry")]
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay after which the station polls the next relay.
+/// Number of unanswered hellos to one relay. After it the station sends its hellos to the next relay.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
@@ -396,7 +396,7 @@ impl Ground {
         self.flown = Some(flown);
     }
 
-    /// Handles a hello of relay `by`, `distance` relays away, which reports the relay's newest mission.
+    /// Handles a hello of relay `by`, `distance` hops away. The hello reports the newest mission of that relay.
     fn on_hello(&mut self, by: u16, distance: u16, hello: Hello) {
         if self.is_querying() {
             return self.on_query_reply(by, distance, hello);
@@ -830,8 +830,8 @@ impl PendingReports {
         measurements: 0,
     };
 
-    /// Records the interference `power_w`, W, measured at this station, for a report to relays. They are the `reach`
-    /// relays nearest to the station, all within radio reach. Returns true if a handshake must be sent to them first.
+    /// Records the interference `power_w`, W, measured at this station, to be reported to relays. The report goes to the `reach` nearest
+    /// relays. Returns true if a handshake must be sent to these relays first.
     pub(super) fn record(&mut self, power_w: f32, reach: u16) -> bool {
         self.power_w = power_w;
         self.pending = (1..=reach).fold(0, |all, distance| all | bit(distance));
@@ -839,7 +839,8 @@ impl PendingReports {
         self.measurements == 0
     }
 
-    /// Schedules the last report again for the relay at `distance`, which may have restarted and lost it.
+    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. That relay may have restarted, and
+    /// has then lost the report.
     pub(super) fn schedule(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.pending |= bit(distance);

@@ -148,7 +148,7 @@ pub enum MissionError {
 }
 
 error_texts!(MissionError {
-    Relays => "relays must be within 1 to 1000",
+    Relays => "the number of relays must be within 1 to 1000",
     Distance => "distance_m must be within 1 to 1e6",
     Separation => "min_separation_m must be within 0 to 1e5",
     TooManyForDistance => "(relays - 1) x min_separation_m must be at most distance_m",
@@ -306,9 +306,8 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of its sender, 1/W. The hop's SIR is computed from it. It is eta /
-    /// (`mu_los` `p_MSI`), with path-loss factors and the interferer's power; in an interference field `Upsilon_max`
-    /// / `mu_los`, m^2/W.
+    /// Gain of a drone-to-drone hop per watt of the sender's power, 1/W, in the formula of the hop's SIR. The gain is eta / (`mu_los`
+    /// `p_MSI`), with path-loss factors and the interferer's power; in an interference field `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
     /// Gain of the last hop per watt of its sender, m^2/W. The SIR at Rx is this times the power over the squared
     /// distance.
@@ -752,7 +751,7 @@ impl Mission {
         self.config.distance_m - after * self.step_of(least)
     }
 
-    /// Returns the step in x, m, that keeps two relays at least `least` metres apart in spite of rounding.
+    /// Returns the step in x, m, that keeps two relays at least `least` metres apart after rounding to f32.
     fn step_of(&self, least: f32) -> f32 {
         let distance_m = self.config.distance_m;
         if least > 0.0 {

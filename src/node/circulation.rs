@@ -54,7 +54,7 @@ pub(crate) enum Stage {
     Outstanding,
     /// The message has circulated through the chain, and its result is known.
     Completed,
-    /// The message was cancelled after it was sent. Duplicates of it are answered, but replies to it no longer prove
+    /// The message was cancelled after it was sent. The relay still answers duplicates of the message, but a reply to it no longer proves
     /// that a neighbour is alive.
     Cancelled,
 }
@@ -68,8 +68,7 @@ pub(crate) enum Reply {
     InProgress,
 }
 
-/// Path along the chain from this relay to the one that replies to a message. The retransmission timeout is computed
-/// from it.
+/// Path along the chain from this relay to the relay that replies to a message. The retransmission timeout follows from the path's length.
 #[derive(Clone, Copy)]
 pub(crate) struct Path {
     /// Duration of one hop: transmission and handling of one frame.
@@ -169,8 +168,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Records the result of the message, and schedules the reply with it. `path` leads to the relay that started the
-    /// message; it has no hops if that is this relay, which then sends no reply.
+    /// Records the result of the message, and schedules the reply. `path` leads to the relay that started the message. It has no hops at
+    /// that relay itself, which sends no reply.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);

@@ -11,7 +11,7 @@ use crate::wire::digest::{MissionId, digest};
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    /// Mission that this relay flies now. Its number of relays is the number of members of the current view.
+    /// Mission that this relay flies now, with the number of relays in the current view.
     pub(crate) mission: Mission,
     /// Interference as the active mission configures it, before any estimate from measurements.
     pub(crate) interference: Interference,

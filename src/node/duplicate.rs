@@ -102,7 +102,7 @@ pub(crate) struct IndexClaims {
     passive_until: Option<Instant>,
     /// Time of the next claim that this relay sends unprompted, not in reply to a frame; `None` for none.
     next_claim: Option<Instant>,
-    /// Time from the next unprompted claim to the one after it.
+    /// Time from the next claim without a request to the claim after it.
     interval: Duration,
     /// Number of claims still to be sent in defence of this relay's node number. They are [`least_interval`] apart.
     defences: u8,
@@ -276,7 +276,7 @@ impl IndexClaims {
         true
     }
 
-    /// Schedules a claim to this relay's node number, unless one was sent just before ([`least_interval`]).
+    /// Schedules a claim to this relay's node number. Does nothing shortly after the last claim ([`least_interval`]).
     fn schedule_claim(&mut self, now: Instant, settings: &Settings) {
         if self.quiet_until <= now {
             self.quiet_until = now + least_interval(settings);

@@ -131,7 +131,7 @@ struct Uploads {
     jitter: Jitter,
 }
 
-/// Returns true if this relay accepts uploaded missions. Its frames must be signed.
+/// Returns true if this relay accepts uploaded missions. It does if its frames are signed.
 pub(crate) const fn accepts_uploads(member: &Member) -> bool {
     UPLOAD && member.settings.auth.is_some()
 }
@@ -452,9 +452,8 @@ impl MissionUpdate {
         uploads.is_some_and(|uploads| core::mem::replace(&mut uploads.sites, sites) != sites)
     }
 
-    /// Returns the configured geofence for the active mission; `None` without a guard. If the mission has Tx and Rx
-    /// positions of its own, their distance may differ from that in the loaded mission. The maximum x then differs by
-    /// as much.
+    /// Returns the configured geofence for the active mission; `None` without a guard. An active mission with its own Tx and Rx positions
+    /// may have another distance Tx-Rx than the loaded mission. The geofence's maximum x is changed by the difference.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {

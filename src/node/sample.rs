@@ -42,8 +42,8 @@ pub enum Sample {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power measured at Rx, on the ground. The firmware gives it to one of the last four relays; the
-    /// last relay of the view uses it.
+    /// Mean interference power measured at Rx, on the ground. The firmware gives the value to the last relay of the view. It may also give
+    /// it to the three relays before that one, each of which uses it when it is the last relay.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,

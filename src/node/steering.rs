@@ -44,7 +44,7 @@ struct Motion {
 /// Stepwise motion of the setpoint to a new agreed position. All relays of a chain thus arrive at the same time.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call, and the present place to fly to, which approaches it in steps.
+    /// Agreed position at the last call, and the place to fly to now. That place approaches the agreed position in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
     /// Motion to the agreed position; `None` once the place to fly to is there.

@@ -19,7 +19,8 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target SIR just below the middle gap of the list, or the only target of a list of one.
+    /// Target SIR at the lower end of the ladder's middle gap, linear. With 16 targets it is the eighth. It is the only target if the
+    /// ladder has one target.
     anchor: f32,
     /// Code of the width of the middle gap between two targets, relative to the lower one. It is a float of 5
     /// exponent and 3 mantissa bits. Code 0: `anchor` is the only target.

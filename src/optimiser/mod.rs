@@ -22,6 +22,5 @@ pub mod reverse;
 pub mod search;
 pub mod spacing;
 
-/// List with one number per target SIR of a pass along the chain. The numbers are the targets, a relay's farthest x,
-/// or the spare lengths at Rx, m.
+/// List with one number per target SIR of a pass along the chain. The numbers are the targets, a relay's farthest x, or the slacks, m.
 pub type PerTarget = heapless::Vec<f32, { ladder::TARGETS }>;

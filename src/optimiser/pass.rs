@@ -57,7 +57,7 @@ impl Behind {
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
     pub mission: &'a Mission,
-    /// Relay from which the pass arrives; `None` for the first relay, which is next to Tx or Rx.
+    /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
     /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
     pub index: u16,
@@ -250,14 +250,14 @@ impl<'a> Link<'a> {
         hop.longest(interference, target, low, high)
     }
 
-    /// Returns the chain's slack (spare length) for `target`, m, and the x of this last relay, m.
+    /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// The slack is the maximum length of a chain that meets the target, less the distance D from Tx to Rx. It is
-    /// below 0 if the chain misses the target. `reach` is the farthest x of this relay that meets the target, and
-    /// `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere.
+    /// The slack is the maximum length of a chain that meets the target, less the distance D from Tx to Rx. It is below 0 if the chain
+    /// misses the target. `reach` is the farthest x of this relay that meets the target, and `from_m` that of the previous relay. `None` if
+    /// Rx is out of reach from everywhere.
     ///
-    /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less
-    /// this relay's x, at the x that maximises it.
+    /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at the
+    /// x that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -306,8 +306,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x up to `most_m`, m, at which this relay receives the one before it on the pass. That relay
-    /// may be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x, m, up to `most_m`, at which this relay receives the previous relay of the pass. The previous relay may be
+    /// anywhere up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -315,9 +315,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's spare length and this last relay's x, m, for traffic in both directions. `hop` leads from
-    /// Rx to this relay, and `slack` returns the spare length toward Rx for an x of this relay. The relay stays short
-    /// of `reach` if it otherwise receives Rx too weakly.
+    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to this relay, and `slack`
+    /// returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if it would receive Rx too weakly there.
     fn held(
         &self,
         hop: &FromRx,
@@ -434,20 +433,18 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// to Rx. It is below 0 if the target is missed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the target that the relays commit to. They then take their positions
-    /// for it. `None` if the search goes on.
+    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
+    /// goes on.
     pub commit: Option<u8>,
-    /// Slack (spare length) of the chain for each target that every hop can meet, m. It is 0 or more if the chain
-    /// meets the target.
+    /// Slack of the chain for each target that every hop can meet, m. It is 0 or more if the chain meets the target.
     pub slacks: PerTarget,
 }
 
 impl Verdict {
-    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's spare lengths for its
-    /// `targets`.
+    /// Returns the result of a pass with the targets of `ladder`. `slacks` are the chain's slacks, m, one for each of its `targets`.
     ///
-    /// The highest target that is met is committed in two cases. The next higher one is missed and within the
-    /// mission's tolerance of it. Or the ladder has no other target, as in the paper's Algorithm 1.
+    /// The highest target that the chain meets is committed in two cases: the next higher target is missed and within the mission's
+    /// tolerance; or the ladder has a single target, as in the paper's Algorithm 1.
     pub(crate) fn new(
         mission: &Mission,
         ladder: Ladder,
@@ -510,12 +507,11 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reach of every relay, and calls `visit` with its index and reach, m. A reach is the farthest x in
-    /// the direction of the pass at which the relay meets the target.
+    /// Computes the reach of every relay, and calls `visit` with its index and reach, m. A reach is the farthest x in the direction of the
+    /// pass at which the relay meets the target.
     ///
-    /// Returns the chain's spare length and the x of the last relay, m; `None` if a hop cannot meet the target. The
-    /// spare length is the maximum length of a chain that meets the target, less the distance from Tx to Rx. It is
-    /// below 0 if the chain misses the target.
+    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target. The slack is the maximum length of
+    /// a chain that meets the target, less the distance from Tx to Rx. It is below 0 if the chain misses the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();

@@ -97,8 +97,8 @@ impl Back {
         })
     }
 
-    /// Returns SIR / r of a backward hop received at `x_m`, multiplied by its squared length, m^2. r is the required
-    /// ratio of backward to forward SIR. Divided by a target, the result is the hop's maximum squared length.
+    /// Returns a number from which the maximum length of a backward hop follows, for a receiver at `x_m`. The maximum length squared, m^2,
+    /// is this number divided by the target SIR of the forward direction.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;

@@ -57,8 +57,8 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation up to which the cubic one is used. It is a fraction of the
-/// gap between two targets. Both yield the target at which the chain has no spare length.
+/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit is the gap between two targets. Both
+/// interpolations estimate the target at which the chain's slack is 0.
 const BEND: f32 = 0.25;
 
 /// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. The bracket is the
@@ -167,9 +167,9 @@ impl Search {
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target known to be infeasible for every chain, after a pass with these `slacks`. A slack is
-    /// the chain's spare length for a target, m. Plain passes prove nothing, because they do not try all chains.
-    /// `None` if no such target is known, and for traffic in both directions.
+    /// Returns the lowest target known to be infeasible for every chain. `slacks` are the chain's slacks, m, for the targets of the last
+    /// pass. Plain passes prove nothing, because they do not try all chains. `None` if no such target is known, and for traffic in both
+    /// directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if cfg!(feature = "reverse") && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
@@ -183,8 +183,8 @@ impl Search {
         Some(missed.map_or(known, |missed| missed.min(known)))
     }
 
-    /// Continues the search with the result of a pass: the slack of each target that every hop meets. A slack is the
-    /// chain's spare length, m. These targets are the first ones of [`Search::ladder`].
+    /// Continues the search after a pass. `slacks` are the chain's slacks, m, one for each target that every hop can meet. These targets
+    /// are the first ones of [`Search::ladder`].
     ///
     /// Constant work: at most some 200 floating-point operations and three logarithms.
     ///
@@ -305,9 +305,8 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the chain's spare length is 0, by cubic interpolation of ln(target). The cubic passes
-/// through the four points about the sign change. `None` if the cubic and the straight line disagree: the spare
-/// length jumps there, and neither root is meaningful.
+/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The cubic passes through the four points about
+/// the sign change. `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -351,7 +350,7 @@ struct StandTrials {
     /// Highest target that all relays accepted, with the list of targets (ladder) that proposes it again. `None`
     /// before the first.
     best: Option<(f32, Ladder)>,
-    /// True once the bisection has ended, and its best target is the one to keep.
+    /// True once the bisection has ended. The best target found is then the result.
     over: bool,
 }
 

@@ -49,8 +49,8 @@ use crate::place::Placement;
 /// a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Squared deviation, in variances, from which on a measurement shows a faulty relay. The exclusion of that relay
-/// must reduce the fit's residual by as much.
+/// Squared deviation, in variances, above which a measurement shows a faulty relay. Without that relay, the fit's residual must be smaller
+/// by at least this amount.
 const DEVIATIONS: f64 = 49.0;
 
 /// Minimum residual of the fit to all measurements for which a faulty relay is searched. The residual is the sum of
@@ -61,8 +61,8 @@ const LEAST: f64 = 0.02;
 /// variance of a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of a fit whose measurements count as consistent with each other. It is the variance of the
-/// relative differences between measurements and fit. This value is a standard deviation of 0.32, or some 1.5 dB.
+/// Maximum variance of the relative differences between measurements and fit. Up to it, the measurements count as consistent. The value is
+/// a standard deviation of 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
@@ -81,8 +81,8 @@ const FEWEST: u16 = 5;
 /// found.
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to that of one relay's position. Above it rounding hides that
-/// relay's measurement in the sums.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above this ratio, rounding errors of the sums
+/// exceed that relay's share in them.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -238,8 +238,8 @@ fn narrow(number: f64) -> f32 {
 /// Ratio of a relay's measurement to the estimate, or its inverse, above which the relay checks itself.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd, so that the relay excludes itself. It is then far off
-/// `expected`, the current estimate there, and does not fit the other relays' measurements, whose sums are `others`.
+/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far off the estimate
+/// `expected` at that place, and does not fit the other relays' measurements, whose sums are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
     place: &Place,

@@ -113,8 +113,8 @@ const BEYOND_CHANCE: f64 = 8.0;
 /// estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of an estimate's mean square change to that by chance that shows another interferer. It is for a
-/// chain that has settled (after [`REFINED`] refinements).
+/// Minimum change of the estimate that shows another interferer, in a chain that has settled. It is the ratio of the mean square change to
+/// that expected by chance. [`REFINED`] refinements settle a chain.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -127,8 +127,8 @@ const ASTRAY: f64 = 4.0;
 /// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
 /// measured positions over the variance of one position's error.
 const LEARNED: f64 = 1.1;
-/// Number of refined estimates of a stationary interferer after which the chain counts as settled. It then gets no
-/// new estimate unless the interference changes.
+/// Number of refined estimates after which a chain with a stationary interferer counts as settled. The chain then gets no new estimate
+/// until the interference changes.
 const REFINED: u8 = 4;
 
 /// Time that drones are assumed to need to fly a few metres. The position of a moving interferer is predicted this

@@ -112,7 +112,7 @@ impl Factor {
         [a, b, c, d]
     }
 
-    /// Pivot of the fit's last unknown. Its inverse is that unknown's variance, for measurements of variance 1.
+    /// Pivot of the fit's last unknown. The inverse of the pivot is the variance of that unknown, if measurements have variance 1.
     const fn last(&self) -> f64 {
         let [.., last] = self.diagonal;
         last

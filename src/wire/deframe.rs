@@ -37,7 +37,7 @@ pub struct Deframer {
     len: usize,
     /// Remaining bytes of the current COBS block; 0 if a code byte is next.
     run: u8,
-    /// True if the decoder has to insert a zero after the current COBS block, unless the frame ends.
+    /// True if the decoder has to insert a zero after the current COBS block. At the end of the frame no zero is inserted.
     zero_after: bool,
     oversized: bool,
 }

@@ -48,8 +48,8 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the claim was certainly sent after this relay's start. It then names this relay's claim number, or is
-    /// signed.
+    /// True if the other node certainly sent the claim after this relay's start. The proof is this relay's own claim number in the message,
+    /// or a signature.
     pub(crate) is_current: bool,
 }
 
@@ -149,7 +149,7 @@ pub(crate) struct Session {
     last_number: u32,
     /// Claim of another node to this relay's node number, as shown by a handshake; `None` once it is read.
     rival: Option<Rival>,
-    /// Number of uses of session table entries so far, wrapping. It orders the entries by their last use.
+    /// Number of uses of session table entries so far, wrapping. By this number the entries are ordered by their last use.
     clock: u32,
     /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
@@ -498,8 +498,8 @@ const fn halves(nonce: u64) -> [u32; 2] {
     ]
 }
 
-/// Returns true if two nonces of one epoch belong to two nodes with the same node number. Their lower halves then
-/// differ by more than [`MAX_GAP`]; the bit [`RAISED`] is ignored.
+/// Returns true if two nonces of one epoch belong to two nodes with the same node number. The lower halves of such nonces differ by more
+/// than [`MAX_GAP`]; the bit [`RAISED`] is ignored.
 const fn is_rival(one: u64, other: u64) -> bool {
     let [[one, at], [other, epoch]] = [halves(one), halves(other)];
     at == epoch && (one & !RAISED).abs_diff(other & !RAISED) > MAX_GAP

@@ -44,7 +44,7 @@ pub enum UploadError {
     Field,
     /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload replaces another mission than the one that the relay loaded before flight.
+    /// The upload was made for another mission than the one loaded into this relay before flight.
     Base,
     /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. The positions may
     /// be invalid, or have another distance than the mission.

@@ -13,7 +13,7 @@ use super::BAUD;
 /// Default silence of a neighbour, ms, after which a heartbeat is requested. It applies if the block's value is 0.
 const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
-/// Checked content of a configuration block, which holds all settings of one relay.
+/// Settings of one relay, decoded from its configuration block and checked.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Config {
     /// Network number and index of this relay.

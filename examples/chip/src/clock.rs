@@ -33,7 +33,7 @@ pub const STM32F405: ClockHardware = ClockHardware {
     over_drive: false,
 };
 
-/// Board NUCLEO-F446RE, whose ST-LINK supplies a clock of 8 MHz at the pin OSC_IN.
+/// Board NUCLEO-F446RE. Its debug probe (ST-LINK) supplies a clock of 8 MHz at the chip's pin OSC_IN.
 pub const NUCLEO_F446RE: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -92,7 +92,7 @@ struct Pll {
     over_drive: bool,
     /// Multiplier PLLN of the PLL. The core's frequency is this number times 1 MHz; the PLL's input has 2 MHz.
     plln: u32,
-    /// Divisor PLLQ for the PLL's USB clock, which may be 48 MHz or less.
+    /// Divisor for the PLL's 48 MHz output (PLLQ), which feeds USB. The output may also be slower, as USB is not used.
     pllq: u32,
 }
 
@@ -224,7 +224,7 @@ fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     chip.wait(Register::FlashAccess, LATENCY, wait_states, POLLS)
 }
 
-/// Enables the flash caches, which a HAL has left off. The wait states do not change.
+/// Enables the flash caches, in case the HAL (driver library) has left them off. The wait states do not change.
 pub fn cache_flash(chip: &mut impl Registers) {
     let wait_states = chip.read(Register::FlashAccess) & LATENCY;
     cache(chip, wait_states);
@@ -303,7 +303,7 @@ mod tests {
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
     }
 
-    /// Returns the clock frequencies that [`start`] should reach on this hardware with these faults.
+    /// Returns the clock frequencies that [`start`] should reach on `hardware` with the simulated `faults`.
     fn expected(hardware: &ClockHardware, faults: Faults) -> Clocks {
         let is_crystal =
             !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;

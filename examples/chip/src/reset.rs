@@ -65,7 +65,8 @@ mod tests {
     use crate::mock::MockRegisters;
     use crate::registers::{Register, Registers as _};
 
-    /// Checks the reset cause for each kind of reset. RCC_CSR has the values that the reference manuals state.
+    /// Checks that RCC_CSR gives the right reset cause, and that reading it clears the reset flags. The register values are those that the
+    /// reference manuals state.
     #[test]
     fn the_reset_cause_is_read_once() {
         for (status, cause) in [

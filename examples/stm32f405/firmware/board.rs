@@ -82,7 +82,7 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// True if interrupts were enabled before the log frame. They are enabled again at its end.
+    /// True if interrupts were enabled before the log frame began. The end of the log frame enables the interrupts again.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
     // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame, which no

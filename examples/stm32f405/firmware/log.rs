@@ -91,11 +91,11 @@ pub(crate) fn started(begun: &Begun) {
     match begun.clocks.pll {
         Some(Source::Crystal) => info!("clock {=u32} MHz, from the 8 MHz crystal", mhz),
         Some(Source::Internal) => warn!(
-            "clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found; do not fly, baud rates may be off by 8 %",
+            "clock {=u32} MHz, from the internal oscillator: no 8 MHz crystal found; do not fly, baud rates may be wrong by 8 %",
             mhz
         ),
         None => warn!(
-            "clock {=u32} MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be off by 8 %",
+            "clock {=u32} MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be wrong by 8 %",
             mhz
         ),
     }
@@ -205,17 +205,17 @@ pub(crate) fn refused(error: ConfigError) {
         }
         ConfigError::Method => {
             error!(
-                "configuration refused: the method must be align with an interference field, and otherwise align, joint or adjust"
+                "configuration refused: the method must be align, joint or adjust; with an interference field it must be align"
             );
         }
         ConfigError::Adjust => {
             error!(
-                "configuration refused: with the method adjust rounds must be within 1 to 65535 and explore_m within 0 to 1e5, with any other method both 0"
+                "configuration refused: method adjust: rounds must be within 1 to 65535 and explore_m within 0 to 1e5 m; with another method both must be 0"
             );
         }
         ConfigError::Measure => {
             error!(
-                "configuration refused: samples must be within 100 to 1000000 and i_max_w within 1e-30 to 1e6 W, or both 0"
+                "configuration refused: measured interference: samples (number for each estimate) must be within 100 to 1000000 and i_max_w (maximum power) within 1e-30 to 1e6 W; without measurements both must be 0"
             );
         }
         ConfigError::Listen => {
@@ -224,7 +224,9 @@ pub(crate) fn refused(error: ConfigError) {
             );
         }
         ConfigError::Reverse => {
-            error!("configuration refused: a reverse above 0 needs the method align or adjust");
+            error!(
+                "configuration refused: reverse above 0 (SIR required from Rx to Tx) together with listen needs the method align or adjust"
+            );
         }
         ConfigError::Fitted => {
             error!(
@@ -251,11 +253,13 @@ pub(crate) fn refused(error: ConfigError) {
         }
         ConfigError::Speed => {
             error!(
-                "configuration refused: the speed must be within 0.1 to 20 m/s, and needs sites"
+                "configuration refused: the maximum speed must be within 0.1 to 20 m/s, and needs sites (positions of Tx and Rx)"
             );
         }
         ConfigError::AutopilotKey => {
-            error!("configuration refused: an autopilot's key needs sites");
+            error!(
+                "configuration refused: an autopilot's key needs sites (positions of Tx and Rx)"
+            );
         }
         ConfigError::Silence => {
             error!("configuration refused: probe_after_ms must be at most 1200000");
@@ -271,12 +275,12 @@ pub(crate) fn refused(error: ConfigError) {
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
         info!(
-            "frames are signed; epoch {=u32}, a number that is larger at every start",
+            "frames are signed; epoch {=u32} (start counter, larger at every start)",
             epoch
         );
     } else {
         error!(
-            "frames are signed; epoch {=u32}, a number that must be larger at every start, but cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch {=u32} (start counter): this relay cannot store it, so increase the epoch in the configuration block before every start",
             epoch
         );
     }

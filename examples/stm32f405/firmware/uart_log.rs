@@ -94,7 +94,7 @@ pub(crate) fn write(bytes: &[u8]) {
     });
 }
 
-/// Ends the log frame, and queues it if the queue has room for all of it.
+/// Ends the log frame. Queues the whole frame if the queue has room for it; otherwise drops the frame.
 pub(crate) fn end() {
     with(|log| {
         let Log {

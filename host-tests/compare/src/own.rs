@@ -91,7 +91,7 @@ fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
         .ok_or_else(|| format!("the chain ended {:?}", outcome.ending))
 }
 
-/// Returns the median processor time of one run of `work`, s, over several batches, and its result.
+/// Returns the median processor time of one run of `work`, s, and the result of `work`. The median is over several batches of runs.
 fn timed<T>(work: impl Fn() -> Result<T, String>) -> Result<(f64, T), String> {
     // Not timed: the first run fills the caches.
     let result = work()?;

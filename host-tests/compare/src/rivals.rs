@@ -108,7 +108,7 @@ impl Rivals {
         &self.versions
     }
 
-    /// Solves `problem` with `solver`, which reports when it first reaches the SIR `level` (linear).
+    /// Solves `problem` with `solver`. The solver also reports the time at which its SIR first reaches `level`, linear.
     pub(crate) fn run(
         &mut self,
         solver: Solver,

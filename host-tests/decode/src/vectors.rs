@@ -74,8 +74,8 @@ pub struct Signed {
 /// Test vector: the compact form of a sweep message's list of target SIRs, and the targets.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Target SIR with index 7 of 0 to 15, or the only one: the bits of its f32 in hexadecimal. The other targets
-    /// follow from it in both directions.
+    /// Bits of the target SIR with index 7 (of 0 to 15) as f32, in hexadecimal. It may be the only target of the ladder. The targets below
+    /// and above follow from it.
     pub anchor: String,
     /// Code of the relative gap between the anchor and the next target SIRs; 0 for a single target.
     pub gap: u8,

@@ -19,9 +19,8 @@ pub use frames::NETWORK;
 
 /// Maximum number of frames that a relay may have to send at once.
 ///
-/// They are: a sweep or other pass, or its result, and a busy sign; a decision on a proposal; a lease renewal and its
-/// answer; for each side a heartbeat, four hellos, a fence, an offer and a hello to the ground; a claim and its echo;
-/// a handshake to each of the eight remembered nodes.
+/// The sum has a term for each group of messages of the file FORMAT.md, in this order: message of a pass and busy notice; view decision;
+/// lease renewal and its answer; eight messages for each side; claim to a node number and its answer; a handshake for each of eight nodes.
 const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 const MOST_EVENTS: usize = 14;

@@ -19,10 +19,11 @@ const WINDOW: f64 = 20.0;
 /// jump by as much.
 const STEP: f64 = 2.0;
 
-/// Largest time between two files without a common frame, and between two frames of one flight, s.
+/// Maximum time without a common frame for which two files count as one flight, s. The same limit holds for the time between two frames of
+/// one flight.
 const APART: f64 = 3_600.0;
 
-/// Relation of a file's clock to that of the first file.
+/// Offset of a file's clock from that of the first file, with its quality.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
     /// Name of the capture file.

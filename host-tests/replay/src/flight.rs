@@ -378,7 +378,8 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Updates the availability and the periods without reports by the snapshot at `now`.
+    /// Updates the chain's availability and the periods without reports. They follow from the relays' states in `snapshot` at `now`. The
+    /// availability is the fraction of time in which all relays have agreed positions.
     fn losses(&mut self, flight: &mut Flight, now: f64, snapshot: &Snapshot) {
         let is_fresh = |report: &Report| instant(now).since(report.at) < SILENT_AFTER;
         let reporting: Vec<&Report> = self.newest.values().filter(|it| is_fresh(it)).collect();

@@ -76,7 +76,7 @@ pub enum Problem {
     DuplicateRelay,
     /// A `[[relay]]` table is useless: it gives the relay neither an altitude nor a power of its own.
     NothingDiffers,
-    /// The given distance between Tx and Rx contradicts the one computed from their geographic positions.
+    /// The distance from Tx to Rx in the file differs from the distance between their geographic positions.
     OtherDistance,
     /// The values of a list are not in increasing order.
     Unsorted,
@@ -119,7 +119,7 @@ impl fmt::Display for Problem {
             Self::OtherBandwidth => "contradicts noise.bandwidth_hz",
             Self::ContainsSite => "contains a site",
             Self::NeedsArea => "needs an area",
-            Self::NoArea => "is not an area",
+            Self::NoArea => "is not a valid area",
             Self::Unsorted => "is not in increasing order",
         })
     }

@@ -513,7 +513,8 @@ fn gauss(ends: &[f64]) -> Vec<WeightedCoordinate> {
         .collect()
 }
 
-/// Interferer power, W, that is right for one quadrature point, and the point's weight in the median.
+/// Power of a single interferer, W, that gives the right interference at one quadrature point. Also the point's weight in the median over
+/// all points.
 struct Ratio {
     value: f64,
     weight: f64,

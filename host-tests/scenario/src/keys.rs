@@ -46,7 +46,7 @@ pub(super) enum Rule {
 pub(super) enum Need {
     Always,
     Never,
-    /// Required unless the table has at least one of these other keys.
+    /// Key that a table must have, if the table has none of these other keys.
     Unless(&'static [&'static str]),
 }
 
@@ -96,7 +96,7 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that a table must have, unless it has one of `others`. The key and `others` exclude each other.
+/// Creates a key that a table must have if it has none of the keys `others`. A table may not have both this key and one of `others`.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),

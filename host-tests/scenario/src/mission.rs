@@ -45,10 +45,10 @@ impl fmt::Display for Refusal {
         match self {
             Self::Area(at, [x_m, y_m]) => write!(
                 f,
-                "interferer[{at}].area: relays compute with one position of an interferer, only `cargo plan` with its area; allowed: x_m and y_m, for example those of its middle, {x_m:.1} and {y_m:.1}"
+                "interferer[{at}].area: only `cargo plan` accepts an area, because relays compute with one position of the interferer; allowed: x_m and y_m, for example the middle of the area, {x_m:.1} and {y_m:.1}"
             ),
             Self::NoHypothetical => {
-                f.write_str("no single interferer has the same effect as all [[interferer]] together, but relays can compute with a single one only: change the interferers' positions or powers, or leave some interferers out")
+                f.write_str("relays compute with a single interferer, but no single interferer has the same effect as all [[interferer]] of the scenario together: change the interferers' positions or powers, or leave some interferers out")
             }
             Self::NoRoom {
                 relays,

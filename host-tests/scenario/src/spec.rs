@@ -126,7 +126,7 @@ pub struct ListenSpec {
     pub following: bool,
     /// Time from an agreement to the leader's next request for measurements, s, 0.01 to 1e5.
     pub every_s: Option<f64>,
-    /// Age at which a measurement counts half as much as a new one, s, 0.01 to 1e12.
+    /// Half-life of a measurement: age at which it counts half as much as a new one, s, 0.01 to 1e12.
     pub half_life_s: Option<f64>,
     /// Relative error of one interference measurement, 1e-3 to 1.
     pub relative_error: Option<f64>,

@@ -71,7 +71,7 @@ impl Reason {
             Self::Key => format!("relay {subject} signs with another key: reported by {by}"),
             Self::Epoch => {
                 format!(
-                    "relay {subject} started with an old epoch: its frames are rejected by {by}"
+                    "relay {subject} started with an old epoch (start counter): its frames are rejected by {by}"
                 )
             }
             Self::Infeasible => format!("{by}: no positions meet any target SIR, positions kept"),
@@ -79,7 +79,9 @@ impl Reason {
             Self::Released => {
                 format!("{by} released: under the pilot's or the autopilot's control")
             }
-            Self::LeaseExpired => format!("last agreement expired, setpoint kept: {by}"),
+            Self::LeaseExpired => {
+                format!("{by}: last agreement on positions expired, setpoint kept")
+            }
             Self::NotReceived => format!("relay {subject} does not receive {by}"),
             Self::Mission => format!("relay {subject} has another mission: reported by {by}"),
             Self::Version => format!("{by} flies another version of the mission"),

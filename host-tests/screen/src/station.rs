@@ -339,7 +339,7 @@ impl StationView {
                 && has_details(&known.report)
                 && known.report.at.since(since) >= SILENT_AFTER
             {
-                let note = format!(": version {version}, other relays version {newest}");
+                let note = format!(": mission version {version}, other relays version {newest}");
                 add(Reason::Version, number, vec![number], note);
             }
         }
@@ -427,7 +427,7 @@ fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     }
     let (waited, waits) = (hold_reason(old), hold_reason(new));
     if waited != waits {
-        lines.push(waits.map_or("waits no longer".to_owned(), |why| format!("waits: {why}")));
+        lines.push(waits.map_or("no longer waits".to_owned(), |why| format!("waits: {why}")));
     }
     for it in silent(new).filter(|it| !silent(old).any(|was| was == *it)) {
         lines.push(format!("does not receive relay {it}"));

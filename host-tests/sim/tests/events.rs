@@ -284,9 +284,9 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Checks that the later of two relays with one number gets no setpoint, and that both report it.
+/// Checks that of two relays with one number the later one gets no setpoint. Both relays must report the duplicate.
 ///
-/// Runs as many chains for each loss rate as the variable `COUNT` says.
+/// Runs `COUNT` chains for each loss rate; `COUNT` is an environment variable.
 #[test]
 fn the_later_of_two_duplicates_gets_no_setpoint() {
     for loss in [0.0, 0.3, 0.5] {
@@ -331,7 +331,7 @@ fn a_duplicate_joins_when_the_other_one_is_gone() {
     }
 }
 
-/// Checks that of two relays with one number that start together, only one flies in the end. The other relay becomes
+/// Checks that only one of two relays with the same number flies in the end. Both relays start at the same time. The other relay becomes
 /// passive, which means that it gets no setpoint.
 #[test]
 fn one_of_two_simultaneous_duplicates_flies() {
@@ -352,7 +352,7 @@ fn one_of_two_simultaneous_duplicates_flies() {
 
 /// Checks that of two relays with the same number, the one with the larger epoch stays active.
 ///
-/// Both have the network key. The other relay becomes passive: it gets no setpoint, and reports the duplicate.
+/// Both relays have the network key. The relay with the smaller epoch becomes passive: it gets no setpoint, and reports the duplicate.
 #[test]
 fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     for (epoch, first_stays) in [(1, true), (9, false)] {
@@ -414,7 +414,7 @@ fn a_key_mismatch_is_reported_with_the_node() {
     }
 }
 
-/// Checks that two handshakes with a wrong key cause no report. Relays report only after more of them.
+/// Checks that two handshakes with a wrong key cause no report. A relay reports a wrong key only after more of these handshakes.
 #[test]
 fn two_forged_handshakes_are_noise() {
     let mission = mission(3);
@@ -609,7 +609,7 @@ fn a_withheld_offer_is_refused_and_the_new_one_flown() {
     }
 }
 
-/// Checks that a withheld offer is accepted if the attacker sends it within the time limit of offers.
+/// Checks that a relay accepts a mission offer if an attacker delays it by less than the time limit.
 #[test]
 fn an_offer_without_delay_is_accepted() {
     let base = mission(4);

@@ -266,7 +266,7 @@ impl Tile {
         let row = (corner[1] - self.corner[1]) / cell[1];
         if (column - column.round()).abs() > ALIGNED || (row - row.round()).abs() > ALIGNED {
             return Err(format!(
-                "its origin, {} {}, is not at a node; the grid",
+                "its origin, {} {}, is not at a grid point of the other file; the grid",
                 self.corner[0], self.corner[1]
             ));
         }
@@ -416,7 +416,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
             .and_then(|text| metadatum(text, role));
         if let Some(value) = value.filter(|value| !["1", "0", "m", "metre"].contains(value)) {
             return Err(format!(
-                "has heights with the {role} {value} (tag {GDAL_METADATA}); allowed: plain metres"
+                "has heights with the {role} {value} (tag {GDAL_METADATA}); allowed: heights in metres, without scale or offset"
             ));
         }
     }

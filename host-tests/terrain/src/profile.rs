@@ -107,7 +107,7 @@ impl<'a> Ground<'a> {
             let amsl_m = f64::from(site.amsl_mm) / 1e3;
             if (ground_m - amsl_m).abs() > SITE_ERROR_M {
                 return Err(format!(
-                    "site.{name}.amsl_m = {amsl_m}: the elevation files have {ground_m:.1} m there; allowed: a difference of at most {SITE_ERROR_M} m (heights above the mean sea level; those of a satellite receiver may be above the ellipsoid, up to 100 m away)"
+                    "site.{name}.amsl_m = {amsl_m}: the elevation files have {ground_m:.1} m there; allowed: a difference of at most {SITE_ERROR_M} m (amsl_m is the height above mean sea level; a satellite receiver may give the height above the ellipsoid, which differs by up to 100 m)"
                 ));
             }
             end.amsl_m = ground_m + mast_m;

@@ -5,8 +5,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::*;
 
-/// Number of senders that one listener receives. They are so many that no sender has two frames to send at the same
-/// time.
+/// Number of radios that send to one listener. With so many radios, no radio ever has two frames to send at the same time.
 const NODES: usize = 400;
 
 /// Length of a frame in bytes, chosen so that its air time is a whole number of microseconds.

@@ -58,7 +58,7 @@ pub(crate) struct Net {
     /// Ground stations: one at the transmitter, one at the receiver.
     pub(crate) grounds: [Ground; 2],
     stored: Vec<Option<Upload>>,
-    /// Number of starts of each relay, which is also its epoch.
+    /// Number of starts of each relay. The number is also the relay's epoch.
     pub(crate) starts: Vec<u32>,
     pub(crate) now: Instant,
     pub(crate) recorded: Vec<RecordedFrame>,
@@ -175,7 +175,7 @@ impl Net {
             && !self.outdated.contains(&heard.number)
     }
 
-    /// Processes the next event unless it is later than `until`. Returns false if there is none.
+    /// Processes the next event if its time is not later than `until`. Returns false if there is no such event.
     pub(crate) fn step(&mut self, until: Instant) -> bool {
         let wake = (1..=self.len())
             .filter_map(|index| Some((self.relay(index).poll_timeout()?, index)))

@@ -38,7 +38,7 @@ fn an_ignored_target_is_repeated_and_then_reported() {
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
 }
 
-/// Checks that an autopilot that stops reporting its target is not taken for one that refuses targets.
+/// Checks that a silent autopilot is not reported as one that refuses targets. Its messages about the present target stop in the test.
 #[test]
 fn stopped_streams_do_not_count_as_a_refused_target() {
     let mut vehicle = Vehicle::flying(Kind::ArduCopter);

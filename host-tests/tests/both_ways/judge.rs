@@ -20,7 +20,7 @@ pub(crate) struct Chain {
     /// Points of a field of interference that replaces the interferer: x in m, and Upsilon = E[1/I] in 1/W. I is the
     /// interference power. The list is empty if there is an interferer.
     pub(crate) field: Vec<[f64; 2]>,
-    /// Path-loss factors, 1/m^2: of links with a drone at one or both ends, and of links on the ground.
+    /// Path-loss factors, 1/m^2. First the factor of links with a drone at one or both ends; second that of links on the ground.
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
     pub(crate) noise_w: f64,
@@ -155,7 +155,7 @@ impl Chain {
         places.map(|(grid, &at)| grid[at]).collect()
     }
 
-    /// Returns the x of the first search's grid, m. It is dense near the interferer and both ends.
+    /// Returns the x values of the first search's grid, m. The grid is dense near the interferer, Tx and Rx.
     fn grid(&self) -> Vec<f64> {
         let d = self.distance_m;
         // The minimum separation is a whole number of steps.

@@ -63,9 +63,9 @@ fn draw(rng: &mut impl Rng, round: usize) -> (Scenario, Chain, u16) {
     (scenario, chain, relays)
 }
 
-/// Checks two-way chains that are placed for one hypothetical interferer in place of the real ones.
+/// Checks two-way chains that are placed for one hypothetical interferer in place of several real ones.
 ///
-/// Positions chosen for both directions must have a higher median SIR than positions chosen for one direction.
+/// With positions chosen for both directions, the median SIR must be higher than with positions chosen for one direction.
 #[test]
 fn places_for_both_directions_beat_one_way_ones_against_several() {
     let mut rng = generator(3325);

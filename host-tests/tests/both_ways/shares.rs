@@ -1,6 +1,6 @@
 //! Shares of a judge's values: worst, percentiles, and a line for the table.
 
-/// List of one ratio for each random scene: the tested SIR over that of the reference search.
+/// Ratios of two SIRs, one ratio for each random scene. A ratio is the tested SIR divided by the SIR of the reference search.
 #[derive(Debug, Default)]
 pub(crate) struct Shares(Vec<f64>);
 

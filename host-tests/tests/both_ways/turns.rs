@@ -220,8 +220,7 @@ fn a_turn_is_as_good_as_a_dense_grid() {
     assert!(silent.percentile(0.5) > 0.9999 && noisy.percentile(0.5) > 0.9999);
 }
 
-/// Checks that Algorithm 2 in simulated chains gains as much SIR as the same rounds by grid search. Both start from
-/// the same positions.
+/// Checks that Algorithm 2 in simulated chains gains as much SIR as a grid search in the same rounds. Both start from the same positions.
 #[test]
 fn flown_turns_gain_what_turns_by_a_dense_grid_gain() {
     let mut rng = generator(3314);

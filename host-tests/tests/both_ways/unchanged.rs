@@ -21,7 +21,8 @@ const ASIDE: u8 = 5;
 /// Number of random scenarios whose results enter the recorded hash.
 const SCENARIOS: u32 = 1_000;
 
-/// FNV-1a hash of the target SIRs, numbers of sweeps and positions of all scenarios with one direction.
+/// FNV-1a hash of the results of all scenarios with one direction. The results are the target SIRs, the numbers of sweeps and the
+/// positions.
 const RECORDED: u64 = 0x12dc_53fc_8c0c_d073;
 
 fn add(hash: &mut u64, bits: u32) {

@@ -84,7 +84,7 @@ fn f32_bits(value: &Value) -> u32 {
     (value.as_f64().unwrap() as f32).to_bits()
 }
 
-/// Starts two relays on one channel with a station at Tx (tty 2), and room for one at Rx (tty 3).
+/// Starts two relays and the ground station at Tx (tty 2) on one radio channel. The channel has a free tty (3) for a station at Rx.
 fn chain_with_page() -> (Chain, Relay, Page) {
     let mut chain = Chain::on_channel(2, Medium::new(4, QUIET));
     for index in [1, 2] {
@@ -106,7 +106,10 @@ fn chain_with_page() -> (Chain, Relay, Page) {
 fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let (mut chain, mut station, page) = chain_with_page();
     let refused = page.post("/upload", &json!({ "preview": 1, "digest": "0x0000" }));
-    assert_eq!(refused, (409, "there is no preview".to_owned()));
+    assert_eq!(
+        refused,
+        (409, "there is no preview: make a preview first".to_owned())
+    );
     let refused = page.post("/preview", &json!({ "altitude": "0" }));
     assert!(
         refused.0 == 409 && refused.1.contains("within 0.1 to 10000"),
@@ -116,12 +119,15 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let (status, number) = page.post("/preview", &json!({ "altitude": "50" }));
     assert_eq!((status, &number[..]), (200, "{\"preview\":1}"));
     let state = page.until("failed");
-    let why = "altitude 50 m: must be within 20 to 20 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m";
+    let why = "altitude 50 m: must be within 20 to 20 m, the relays' geofence by --altitude and --band of the mission loaded before flight; farthest outside is relay 1, at altitude 50.0 m";
     assert_eq!(state["fault"], why);
     let request = json!({ "preview": 1, "digest": state["digest"] });
     assert_eq!(
         page.post("/upload", &request),
-        (409, "preview 1 is not ready".to_owned())
+        (
+            409,
+            "preview 1 is not computed yet: try again later".to_owned()
+        )
     );
 
     let uploaded: Vec<Place> = simulated(&with_source(80.0, 700.0, -300.0), 2);
@@ -182,9 +188,9 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     assert_eq!(page.post("/preview", &of_before).0, 200);
     let why = page.until("failed")["fault"].take();
     assert!(
-        why.as_str()
-            .unwrap()
-            .starts_with("the map shows mission 0, but the chain has mission 1,0x"),
+        why.as_str().unwrap().starts_with(
+            "the map shows mission 0 (version and digest), but the chain flies mission 1,0x"
+        ),
         "{why}"
     );
 
@@ -198,7 +204,7 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     .succeeds();
     assert_eq!(page.post("/upload", &request).0, 200);
     let state = page.until("failed");
-    let why = "preview 4: computed for version 1 of the mission, but the chain has another mission now, version 2: make a new preview";
+    let why = "preview 4 was computed for version 1 of the mission, but the chain flies another mission now, version 2: make a new preview";
     assert_eq!(state["fault"], why);
     station.stopped();
     for relay in &mut chain.relays {
@@ -311,7 +317,7 @@ fn the_status_socket_takes_the_same_tasks() {
             said["text"].as_str().unwrap().to_owned(),
         )
     };
-    let usage = "must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, at a station with --stand, or empty to read its state";
+    let usage = "must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, which need a station with --stand, or empty to read the state";
     for line in ["land", "preview altitude", "upload 1", "upload x 0x1"] {
         assert_eq!(commanded(line), (false, format!("{line}: {usage}")));
     }

@@ -10,7 +10,7 @@ use crate::process::Relay;
 /// Part of the companion's log line about a drone far from its line: the suggested cause.
 const SWAPPED: &str = "are latitude and longitude swapped?";
 
-/// Test scene: a drone, and its relay, which has positions of Tx and Rx far from the drone.
+/// Test scene: a drone, and its relay. The positions of Tx and Rx in the relay's settings are far from the drone.
 struct Apart {
     drone: Peer,
     relay: Relay,
@@ -90,7 +90,7 @@ fn is_off_a_swapped_line(kind: &str) {
     assert!((1..=3).contains(&texts), "{texts} texts");
     // The drone cannot be engaged: the relay has no position, and no targets are streamed.
     // The log gives the reason, and never reports the drone as ready.
-    let reason = "autopilot: cannot be engaged: the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly it nearer to the line";
+    let reason = "autopilot: setpoint control cannot be engaged: the drone's position is unknown, or not near the line between transmitter and receiver: wait for a position, or fly the drone nearer to the line";
     apart.relay.wait_for(reason);
     apart.drone.order("mode companion");
     let heard = apart.drone.receive_for(Duration::from_secs(3));
@@ -129,7 +129,7 @@ fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     let said = format!("the drone is {:.0} km from", away_m / 1e3);
     assert!(line.contains(&said), "{said} is not in {line}");
     assert!(
-        line.contains("are these the sites (Tx and Rx) of this flight"),
+        line.contains("check the mission's sites (positions of Tx and Rx)"),
         "{line}"
     );
     assert_eq!(apart.position()["sites_look_swapped"], false);

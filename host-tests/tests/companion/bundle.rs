@@ -118,7 +118,7 @@ impl Bench {
         Relay::start(&format!("--config {} {more}", config.display()))
     }
 
-    /// Starts relays 1 and 3, which run while relay 2 is checked.
+    /// Starts relays 1 and 3, which run while the test checks relay 2.
     fn neighbours(&self) -> [Relay; 2] {
         let mut relays = [1, 3].map(|index| self.companion(index, ""));
         for relay in &mut relays {
@@ -127,7 +127,7 @@ impl Bench {
         relays
     }
 
-    /// Checks relay 2 and returns its red lines. Fails if the status does not agree with them.
+    /// Checks the computer of relay 2 and returns the failed (red) checks. Fails if the exit status contradicts these results.
     fn reds(&self, more: &str, seconds: u64) -> Vec<String> {
         let ended = self
             .companion(2, &format!("--check={seconds} {more}"))
@@ -296,7 +296,7 @@ fn a_check_names_planted_faults_of_the_computer() {
     let upload = bench.files.write("upload", "damaged");
     statics(
         &format!("--upload-file {upload}"),
-        &["is damaged, or not an uploaded mission"],
+        &["the file is damaged, or not an uploaded mission"],
     );
     bench.rules("relay2", "A50285BI", FILL_IN);
     statics(

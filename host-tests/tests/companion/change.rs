@@ -99,7 +99,7 @@ fn a_later_upload_is_based_on_the_flown_mission() {
     let moves = lines_of_event(&ended, "move");
     assert_eq!(
         lines_of_event(&ended, "dry run"),
-        ["version 2 was not uploaded"]
+        ["version 2 of the mission was not uploaded"]
     );
     assert!(
         !bench.0.relays[0]
@@ -134,7 +134,7 @@ fn an_upload_outside_the_geofence_is_refused_before_sending() {
     bench.agreed();
     let more = "--new-altitude 50 --new-band 50,50 --yes";
     let (ended, error) = bench.uploads("1", more).fails(1);
-    let line = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays that were loaded with this --altitude and --band; farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads it nevertheless";
+    let line = "upload of version 1 refused: altitude 50 m: must be within 20 to 40 m, the relays' geofence by --altitude and --band of the mission loaded before flight; farthest outside is relay 1, at altitude 50.0 m; --no-fence uploads the mission nevertheless";
     assert_eq!(error, line);
     assert_eq!(
         lines_of_event(&ended, "change")[0],
@@ -160,12 +160,12 @@ fn a_dry_run_that_leaves_the_geofence_fails() {
             let lines = station.succeeds();
             assert_eq!(
                 lines_of_event(&lines, "dry run"),
-                ["version 1 was not uploaded"]
+                ["version 1 of the mission was not uploaded"]
             );
             continue;
         }
         let (lines, error) = station.fails(1);
-        let why = "--version 1: altitude 50 m: must be within 20 to 40 m, the geofence of relays";
+        let why = "upload of version 1 refused: altitude 50 m: must be within 20 to 40 m, the relays' geofence";
         assert!(error.starts_with(why), "{error}");
         assert_eq!(
             lines_of_event(&lines, "change")[0],
@@ -284,7 +284,7 @@ fn an_upload_that_has_timed_out_does_not_reach_relays_that_come_back() {
         .iter()
         .find(|line| line.contains("not flown: "))
         .unwrap();
-    assert!(line.contains("--timeout 3: not finished"), "{line}");
+    assert!(line.contains("not finished within --timeout 3 s"), "{line}");
     for index in [1, 2] {
         let signed = bench.0.files.signed("key", &format!("epoch{index}"));
         let own = format!("--distance 1343.795 --band 20,40 {signed}");
@@ -302,12 +302,12 @@ fn the_operator_confirms_at_a_terminal_and_a_script_needs_yes() {
     let mut bench = Bench::new();
     bench.agreed();
     let new = "--new-interferer 80,700,-300";
-    let line = "--version 1: nobody can confirm the upload, because standard input is not a terminal: give --yes to upload without a question, or --dry-run to see the changes only";
+    let line = "--version 1: standard input is not a terminal, so nobody can confirm the upload: give --yes to upload without a question, or --dry-run to see the changes only";
     assert_eq!(bench.uploads("1", new).refused(2), line);
-    let question = "Upload version 1? [y/N] ";
+    let question = "Upload version 1 of the mission? [y/N] ";
     for answer in ["n\n", "\n"] {
         let (status, shown) = at_a_terminal(&bench.options("1", new), answer);
-        let refused = "--version 1: not confirmed, so nothing was uploaded\n";
+        let refused = "upload of version 1 not confirmed: nothing was uploaded\n";
         assert_eq!((status, shown), (Some(1), format!("{question}{refused}")));
     }
     assert!(!bench.0.relays[0].has_printed("uploaded: "));

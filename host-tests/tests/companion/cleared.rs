@@ -81,13 +81,19 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     for (command, why) in [
         (
             "land",
-            "unknown command `land`: the only one is `clear-lost N",
+            "unknown command `land`: the only command is `clear-lost N",
         ),
         ("clear-lost", "clear-lost names no relay"),
         ("clear-lost 2", "relay 2 is this relay"),
         ("clear-lost 1", "relay 1 is not lost"),
-        ("clear-lost 4", "relay 4: must be within 1 to 3"),
-        ("clear-lost x", "relay x: must be within 1 to 3"),
+        (
+            "clear-lost 4",
+            "relay 4: the number of a relay must be within 1 to 3",
+        ),
+        (
+            "clear-lost x",
+            "relay x: the number of a relay must be within 1 to 3",
+        ),
     ] {
         let (is_done, text) = commanded(&socket, &format!("{command}\n"));
         assert!(!is_done && text.starts_with(why), "{command}: {text}");
@@ -103,8 +109,9 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     );
     let uid = rustix::process::getuid().as_raw();
     let process = std::process::id();
-    let line =
-        format!("relay 2  cleared: {said} (`clear-lost 3` by user {uid}, process {process})");
+    let line = format!(
+        "relay 2  cleared: {said} (command `clear-lost 3` from user {uid}, process {process})"
+    );
     drones.fly_until(|all| all.has_logged(2, &line));
     drones.fly_until(|all| all.at[1][0] > 60.0);
     assert_eq!(status_of(&socket)["relay"]["lost"], json!([]));
@@ -119,7 +126,7 @@ fn an_incomplete_command_is_answered() {
     relay.line("converged: ");
     let (is_done, text) = commanded(&socket, "clear-lo");
     assert!(!is_done, "{text}");
-    relay.line("command refused: unknown command `clear-lo`: the only one is `clear-lost N");
+    relay.line("command refused: unknown command `clear-lo`: the only command is `clear-lost N");
     assert_eq!(status_of(&socket)["relay"]["index"], 1);
     let text = answer(&socket, "", false);
     assert!(text.contains("\"has_lease\""), "the state: {text}");
@@ -152,12 +159,12 @@ fn an_operator_clears_a_relay_by_a_mavlink_command() {
     drone.order("clear 1");
     answer(&drone, 2);
     relay.line(
-        "command refused: the command must name every lost relay on one side of this relay (toward Tx or toward Rx), and no other (`MAV_CMD_USER_1 1` by MAVLink system 255, component 190)",
+        "command refused: the command must name all lost relays on one side of this relay (toward Tx or toward Rx), and no other relay (command `MAV_CMD_USER_1 1` from MAVLink system 255, component 190)",
     );
     drone.order("clear 2");
     answer(&drone, 0);
     relay.line(
-        "cleared: relay 2 is cleared: the operator reported that it has landed, so this relay no longer keeps clear of lost relays downstream (toward Rx) (`MAV_CMD_USER_1 2` by MAVLink system 255, component 190)",
+        "cleared: relay 2 is cleared: the operator reported that it has landed, so this relay no longer keeps clear of lost relays downstream (toward Rx) (command `MAV_CMD_USER_1 2` from MAVLink system 255, component 190)",
     );
     assert_eq!(status_of(&socket)["relay"]["lost"], json!([]));
 }

@@ -152,7 +152,7 @@ fn an_unavailable_local_port_is_named() {
             &own,
             [
                 "is this program's own port",
-                "LOCAL must be another one than PORT",
+                "LOCAL in udp:HOST:PORT@LOCAL must differ from PORT",
             ],
         ),
     ] {

@@ -33,7 +33,7 @@ const BLIND: &str = "critical relay #: the autopilot reports no position";
 const UNLINKED: &str = "critical relay #: the link to the autopilot is lost";
 const LOST: &str = "critical relay #";
 
-/// Groups of faults that happen at the same time. Their lines are those of the companions' logs.
+/// Groups of faults that happen at the same time, with the log lines expected in the companions' logs.
 const SCRIPT: [&[Fault]; 14] = [
     &[
         ("pilot", 3, RELEASED, "released: "),
@@ -57,7 +57,7 @@ const SCRIPT: [&[Fault]; 14] = [
             "refuse",
             5,
             "warning relay # does not fly to its setpoint",
-            "flies to another target",
+            "flies to a target other than the setpoint",
         ),
     ],
     &[
@@ -129,7 +129,7 @@ impl Stage {
         Self { chain, flown, page }
     }
 
-    /// Runs as many faults as COUNT says, or only those of the groups in the list ONLY, from 0.
+    /// Runs the groups of faults of the script. The environment variable COUNT limits their number; ONLY selects groups by number, from 0.
     pub(crate) fn run(&mut self) {
         let count = std::env::var("COUNT").map_or(FEW, |it| it.parse().unwrap());
         let mut left = count;

@@ -93,7 +93,7 @@ pub(crate) fn status_of(socket: impl AsRef<Path>) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
 
-/// Queries the status of a process repeatedly until `is_so` is true for it. Returns that status.
+/// Queries the status of a process until `is_so` is true for the status. Returns that status.
 pub(crate) fn until(socket: impl AsRef<Path>, is_so: impl Fn(&Value) -> bool) -> Value {
     let mut said = Value::Null;
     wait_until(|| {

@@ -52,7 +52,7 @@ impl Flight {
         let drone = Peer::autopilot(kind, &link, START_M, theirs.as_deref());
         let ours = ours.map_or_else(String::new, |file| format!("--autopilot-key-file {file}"));
         let mut relay = relay(&link, &format!("{ours} {options}"));
-        relay.line("autopilot: connected by --autopilot");
+        relay.line("autopilot: opened --autopilot");
         Self {
             drone,
             relay,
@@ -184,7 +184,7 @@ fn falls_silent(flight: &mut Flight) {
     flight.drone.order("mute");
     flight
         .relay
-        .line("autopilot: no heartbeat for 3 s: is the autopilot on, is its cable right, and does its port use MAVLink 2 and this data rate?");
+        .line("autopilot: no heartbeat for 3 s: check that the autopilot is switched on, check its cable, and set its port to MAVLink 2 and to the data rate of this relay");
     assert!(flight.targets_for(MOMENT).is_empty(), "nobody is there");
     flight.drone.order("speak");
 }
@@ -227,9 +227,9 @@ fn an_arducopter(key: Option<&str>) {
 
     // The cable is loose for seconds: the mode is the same, but no pilot has chosen it since.
     falls_silent(&mut flight);
-    flight
-        .relay
-        .line("autopilot: cannot be engaged: it was in OFFBOARD or GUIDED");
+    flight.relay.line(
+        "autopilot: setpoint control cannot be engaged: the autopilot was in OFFBOARD or GUIDED",
+    );
     assert!(flight.targets_for(MOMENT).is_empty(), "it was not chosen");
     flight.drone.order("sticks 0 0");
     flight.drone.order("mode pilot");
@@ -248,7 +248,7 @@ fn an_arducopter_that_refuses_targets_is_reported() {
     flight.drone.order("refuse");
     flight.is_engaged();
     flight.relay.line(
-        "autopilot: flies to another target than the one sent; is the setpoint outside the autopilot's fence?",
+        "autopilot: the autopilot flies to a target other than the setpoint that the relay has sent: check whether the setpoint is outside the autopilot's fence",
     );
 }
 
@@ -294,7 +294,7 @@ fn a_px4(key: Option<&str>) {
     falls_silent(&mut flight);
     flight
         .relay
-        .line("autopilot: cannot be engaged: the autopilot is in a failsafe");
+        .line("autopilot: setpoint control cannot be engaged: the autopilot is in a failsafe");
     let heard = flight.drone.receive_for(2 * MOMENT);
     assert!(heard.iter().all(|heard| heard.mode() == "hold"));
     assert!(

@@ -222,6 +222,8 @@ fn neighbours_with_different_missions_report_it() {
     let chain = Chain::on_wires(2, QUIET);
     let mut first = chain.relay(1, "");
     let mut second = chain.relay(2, "--altitude 21");
-    second.line("mismatch: relay 1 has another mission than this relay, whose digest is 0x");
+    second.line(
+        "mismatch: relay 1 has another mission than this relay (digest of this relay's mission: 0x",
+    );
     assert!(!second.has_printed("setpoint") && !first.has_printed("setpoint"));
 }

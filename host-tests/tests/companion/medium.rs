@@ -54,7 +54,7 @@ type Gate = Box<dyn FnMut(usize, &[u8]) -> bool + Send>;
 /// Ttys of a medium; `None` for an unplugged tty.
 type Ttys = Mutex<Vec<Option<Arc<Pty>>>>;
 
-/// Running medium, which copies the bytes of each tty to all others. Its ttys vanish when it is dropped.
+/// Running radio channel or wire: copies the bytes of each tty to all other ttys. The ttys vanish when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Medium {
     paths: Vec<PathBuf>,
@@ -84,7 +84,7 @@ impl Medium {
         Self::of(paths, ptys.into(), QUIET, Box::new(gate), None)
     }
 
-    /// Creates a radio channel without noise that carries `baud` bit/s in all, from one sender at a time.
+    /// Creates a radio channel without noise, on which one sender at a time sends `baud` bit/s.
     pub(crate) fn paced(ttys: usize, baud: u32) -> Self {
         let ptys: Vec<Pty> = (0..ttys).map(|_| Pty::new()).collect();
         let paths: Vec<PathBuf> = ptys.iter().map(|pty| pty.path().to_owned()).collect();

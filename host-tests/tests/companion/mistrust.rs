@@ -12,9 +12,10 @@ const OTHER: &str = " 1111111122222222333333334444444455555555666666667777777788
 /// In some cases only one of drone and relay has a key.
 #[test]
 fn different_mavlink_keys_are_reported_and_frames_ignored() {
-    let unsigned = "signs its frames and ignores unsigned ones: give --autopilot-key-file";
-    let other = "signs with another key than that of --autopilot-key-file, so its frames are ignored: give both the same key";
-    let plain = "does not sign its frames, which are ignored";
+    let unsigned =
+        "signs its frames and ignores unsigned frames: give its key with --autopilot-key-file";
+    let other = "signs with another key than that of --autopilot-key-file, so its frames are ignored: give the autopilot and this relay the same key";
+    let plain = "does not sign its frames, so they are ignored";
     for (drone, relay, line) in [
         (Some(ONE), None, unsigned),
         (None, Some(ONE), plain),

@@ -13,7 +13,7 @@ use crate::process::Relay;
 /// New position of the receiver, about 200 m beyond the old one and to the right, on higher ground.
 const MOVED: Site = [47.4095, 8.5535, 440.0];
 
-/// Time for which the drone must stand still after the upload. It is shorter than the motion guard's wait.
+/// Time for which the drone stands still after the upload. The time is shorter than the wait of the motion guard.
 const STANDS: Duration = Duration::from_millis(2_500);
 
 #[test]

@@ -22,7 +22,7 @@ fn a_drone_keeps_its_number_when_its_place_changes() {
     drop(second);
     third.line("lost: relay 2 upstream (toward Tx) does not reply");
     let line = third.line("view accepted: ");
-    let said = " s  relay 3  view accepted: the chain has 2 relays, this one at place 2 from the transmitter (view ";
+    let said = " s  relay 3  view accepted: the chain has 2 relays; this relay is at place 2, counted from the transmitter (view ";
     assert!(line.contains(said), "{line}");
     let said = until(&socket, |said| said["relay"]["relays"] == 2);
     assert_eq!(said["relay"]["index"], 3, "{said:#}");

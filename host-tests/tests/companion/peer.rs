@@ -201,7 +201,7 @@ impl Peer {
         self.receive_until(wanted).pop().unwrap()
     }
 
-    /// Waits for the next message for which `wanted` is true. Returns all messages up to and with that one.
+    /// Receives messages until `wanted` is true for one of them. Returns all received messages, the wanted one last.
     pub(crate) fn receive_until(
         &self,
         wanted: impl Fn(&ReceivedMessage) -> bool,

@@ -93,13 +93,13 @@ fn a_bad_key_or_epoch_is_named() {
             "key",
             text("text"),
             1,
-            "text: must contain one number within 0 to 4294967294: the epoch of the last start",
+            "text: must contain one number within 0 to 4294967294: the epoch (start counter) of the last start",
         ),
         (
             "key",
             text("last"),
             1,
-            "last: contains the largest epoch, and every start needs a larger one: give all relays a new key, and remove this file",
+            "last: the epoch (start counter) in the file is the largest one, and every start needs a larger epoch: give all relays a new key, and delete this file",
         ),
         ("key", text("no/folder"), 1, "folder: cannot be written"),
         (

@@ -16,7 +16,7 @@ use crate::files::{Files, status_of, until, write};
 use crate::medium::{Medium, QUIET};
 use crate::process::{LIMIT, Relay};
 
-/// Returns the options of relay or ground station `tty`. Three relays and two stations are on one channel.
+/// Returns the command-line options of the relay or ground station at `tty`. Three relays and two stations share one channel.
 fn common(field: &Chain, tty: usize) -> String {
     let socket = field.files.text(&format!("status{tty}"));
     let signed = field.files.signed("key", &format!("epoch{tty}"));
@@ -87,7 +87,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     let started = tx.line("\"event\":\"started\"");
     assert!(started.contains("\"end\":\"transmitter\""));
     rx.line("started: receiver of a chain of 3 relays, ");
-    rx.line("measurement: the line \"nonsense\" is ignored: \"nonsense\" is not a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm; a valid line is POWER or receiver POWER; ");
+    rx.line(&format!("measurement: invalid line \"nonsense\" in --measurements {level} is ignored: \"nonsense\" is not a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm; a valid line is POWER or receiver POWER; "));
     let meter = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
     // Notation of a spectrum analyser.
     let tx_dbm = format!("{} dBm", 10.0 * f64::log10(tx_w) + 30.0);
@@ -255,7 +255,7 @@ fn a_running_station_uploads_and_keeps_running() {
     first.line("flown: 1 of 1 relays fly version 2 of the mission, as relay 1 reports for the present members of the chain (view ");
     relay.line("adopted: the chain flies version 2");
     write(&level, "1e-9\n");
-    first.line("measurement: 1.000e-9 W from ");
+    first.line("measurement: measured interference 1.000e-9 W, from ");
     first.stopped();
     let said = std::fs::metadata(capture).unwrap().len();
     assert!(said > 500, "{said} bytes in the capture");

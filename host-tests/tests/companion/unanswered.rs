@@ -22,7 +22,7 @@ impl Unanswered {
         let files = Files::new();
         let socket = files.text("status");
         let mut relay = relay(autopilot, &format!("--status-socket {socket}"));
-        relay.line("autopilot: connected by --autopilot");
+        relay.line("autopilot: opened --autopilot");
         Self { relay, files }
     }
 
@@ -116,7 +116,7 @@ fn a_silent_udp_port_is_logged_once() {
     unanswered.check_report(&[
         "autopilot: no answer at ",
         &local,
-        "Until it restarts, a PX4 sends to the first port",
+        "a PX4 sends only to the first port",
         "udp:HOST:PORT@LOCAL",
     ]);
     unanswered.check_no_repetition();
@@ -129,7 +129,12 @@ fn a_silent_tty_is_logged_once() {
     let pty = Pty::new();
     let path = pty.path().to_str().unwrap();
     let mut unanswered = Unanswered::start(path);
-    unanswered.check_report(&["autopilot: no answer at ", path, "115200 bit/s", "TX"]);
+    unanswered.check_report(&[
+        "autopilot: no bytes received at ",
+        path,
+        "115200 bit/s",
+        "TX",
+    ]);
     unanswered.check_no_repetition();
 }
 
@@ -147,7 +152,7 @@ fn noise_is_distinguished_from_silence() {
     }
     let line = unanswered.relay.line("are not MAVLink 2");
     assert!(line.contains("autopilot: "), "{line}");
-    assert!(!unanswered.relay.has_printed("no answer"), "bytes came");
+    assert!(!unanswered.relay.has_printed("no bytes"), "bytes came");
 }
 
 /// Checks that frames of other systems are reported as not from a PX4 or an ArduCopter.
@@ -159,8 +164,11 @@ fn other_systems_are_distinguished_from_an_autopilot() {
     let mut drone = ports.drone(ports.local);
     drone.order("stranger");
     let mut unanswered = Unanswered::at(ports);
-    let line = unanswered.relay.line("is from a PX4 or an ArduCopter");
-    assert!(line.contains("autopilot: no frame received at "), "{line}");
+    let line = unanswered.relay.line("none from a PX4 or an ArduCopter");
+    assert!(
+        line.contains("autopilot: MAVLink frames are received at "),
+        "{line}"
+    );
     assert!(!unanswered.relay.has_printed("no answer"), "frames came");
     drone.order("vehicle");
     unanswered.relay.line("autopilot: found a PX4");

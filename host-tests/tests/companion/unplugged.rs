@@ -30,7 +30,9 @@ fn a_port_that_vanishes_is_opened_again() {
         flight.drone.order("plug");
         flight.relay.line("is open again");
         // The autopilot is still in GUIDED, and its pilot has to choose that mode again.
-        flight.relay.line("autopilot: cannot be engaged");
+        flight
+            .relay
+            .line("autopilot: setpoint control cannot be engaged");
         flight.drone.order("mode pilot");
         flight.is_engaged();
         flight.drone.receive(ReceivedMessage::is_target);

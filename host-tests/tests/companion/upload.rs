@@ -215,24 +215,26 @@ fn a_useless_upload_file_is_named_and_ignored() {
         (
             damaged,
             Some(
-                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+                "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options",
             ),
         ),
         (
             good[..Upload::LENGTH].to_vec(),
             Some(
-                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+                "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options",
             ),
         ),
         (
             Vec::new(),
             Some(
-                "is damaged, or not an uploaded mission; the relay starts with the mission of its options",
+                "the file is damaged, or not an uploaded mission; the relay ignores the file and starts with the mission of its options",
             ),
         ),
         (
             stored(&high, &new()),
-            Some("is an upload for relays that were loaded with the mission of digest 0x"),
+            Some(
+                "the uploaded mission in this file is for relays with a loaded mission of digest 0x",
+            ),
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();
@@ -259,8 +261,7 @@ fn the_ground_gives_up_after_its_time_limit() {
     let (files, wire) = (Files::new(), Medium::new(1, QUIET));
     let more = format!("--end tx --tty {} --timeout 2", wire.tty(0));
     let line = ground(&files, "7", &more).refused(1);
-    let reports =
-        "--timeout 2: not finished after 2 s: no relay has reported the mission that it flies: ";
+    let reports = "upload not finished within --timeout 2 s: no relay has reported the mission that it flies: ";
     assert!(line.starts_with(reports), "{line}");
     assert!(
         line.ends_with("; 0 received frames were rejected"),
@@ -294,13 +295,15 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         };
         let more = format!("{more} --new-band {altitude},{altitude}");
         let why = format!(
-            "altitude {altitude} m: must be within {range}, the geofence of relays that were loaded with this --altitude and --band"
+            "altitude {altitude} m: must be within {range}, the relays' geofence by --altitude and --band of the mission loaded before flight"
         );
         let far = format!("farthest outside is relay 1, at altitude {altitude}.0 m");
         let line = ground(&chain.files, "5", &more).refused(1);
         assert_eq!(
             line,
-            format!("--version 5: {why}; {far}; --no-fence uploads it nevertheless")
+            format!(
+                "upload of version 5 refused: {why}; {far}; --no-fence uploads the mission nevertheless"
+            )
         );
         let relays = &mut chain.relays;
         assert!(
@@ -308,8 +311,8 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
             "nothing was sent"
         );
         let line = ground(&chain.files, "5", &format!("{more} --no-fence")).refused(1);
-        let by = "relay 1, or a relay behind it, rejects the upload";
-        assert_eq!(line, format!("--version 5: {by}: {why}"));
+        let by = "refused by relay 1, or by a relay beyond it";
+        assert_eq!(line, format!("upload of version 5 {by}: {why}"));
         let own = "upload refused: the mission's altitudes must be within this relay's geofence, ";
         relays[0].line(&format!("{own}{range}"));
         assert!(

@@ -12,7 +12,7 @@ use crate::chain::{Chain, QUICK, simulated};
 use crate::medium::{Medium, QUIET};
 use crate::process::Relay;
 
-/// Returns a chain of three relays on one channel that notices the loss of a relay quickly.
+/// Returns a chain of three relays on one channel, with short timeouts. The loss of a relay is therefore noticed soon.
 fn channel() -> Chain {
     Chain::on_channel(3, Medium::new(3, QUIET)).with(QUICK)
 }
@@ -116,7 +116,7 @@ fn a_useless_view_file_is_named_and_prevents_the_flight() {
     let other = store(&file, &voted(digest(&loaded()) ^ 1, 3, 40, true));
     let mut damaged = good.clone();
     damaged[7] ^= 1;
-    let is_damaged = "is damaged, or not a file of votes: before a new flight remove the file, and start again; in the same flight the relay cannot rejoin the chain";
+    let is_damaged = "the file is damaged, or not a file of votes. Before a new flight, delete the file and start again. In the same flight, the relay cannot rejoin the chain";
     for (bytes, words) in [
         (damaged, is_damaged),
         (good[..good.len() - 1].to_vec(), is_damaged),
@@ -124,8 +124,8 @@ fn a_useless_view_file_is_named_and_prevents_the_flight() {
         (Vec::new(), is_damaged),
         (
             other,
-            "the record of votes was written by a relay that was loaded with another mission: for a new flight remove the file, and start again; in the same \
-             flight start the relay with the mission that it had",
+            "the record of votes was written by a relay that was loaded with another mission. Before a new flight, delete this file and start again. In the same \
+             flight, start the relay with the mission that it had before",
         ),
     ] {
         std::fs::write(&file, &bytes).unwrap();

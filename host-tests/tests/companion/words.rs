@@ -75,7 +75,7 @@ fn reasons_of_rejected_frames_are_logged() {
         (
             "",
             &files.signed("key", "e4"),
-            "are signed, and this relay has no --key-file",
+            "are signed, but this relay has no --key-file",
         ),
     ] {
         let quick = "--probe-after-ms 200 --dead-after-ms 600";
@@ -93,8 +93,7 @@ fn upload_fails(files: &Files, tty: &str, key: &str, more: &str, why: &str) {
     let signed = files.signed(key, "ground");
     let upload = format!("--tty {tty} --end tx --version 3 --yes --timeout 8 {signed}");
     let line = Relay::ground(&format!("{upload} {more}")).refused(1);
-    let reports =
-        "--timeout 8: not finished after 8 s: no relay has reported the mission that it flies: ";
+    let reports = "upload not finished within --timeout 8 s: no relay has reported the mission that it flies: ";
     assert!(line.starts_with(reports), "{line}");
     assert!(line.contains(why), "{more}: {line}");
 }
@@ -118,7 +117,7 @@ fn on_a_wire_the_ground_names_the_likely_cause() {
     fails(
         "key",
         "--altitude 21",
-        "loaded with another mission than this station, whose digest is 0x",
+        "loaded with another mission than this station (digest of this station's mission: 0x",
     );
     fails(
         "key",
@@ -159,6 +158,6 @@ fn on_a_channel_the_ground_names_the_likely_cause() {
     fails(
         "other",
         "",
-        "but none for the transmitter: compare --key-file, --end",
+        "but none addressed to the transmitter: compare --key-file, --end",
     );
 }

@@ -34,7 +34,7 @@ fn setup(case: &Case) -> Setup {
     setup
 }
 
-/// Checks that the relays have the slots of one frame, in order and without overlap or gap.
+/// Checks that the slots of all relays together fill one frame: in order, without overlap and gap.
 fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     let flying = outcome.relays.iter().filter(|relay| relay.killed.is_none());
     let shares: Vec<_> = flying.map(|relay| relay.slot_shares.unwrap()).collect();
@@ -59,7 +59,7 @@ fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     assert_eq!(at, 1.0, "{what}: {slots:?}");
 }
 
-/// Checks the lengths of the slots against the times of the hops by the true SINRs.
+/// Checks that each time slot is as long as its hop needs. The time that a hop needs for its data follows from its true SINR.
 fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
     let places: Vec<Placement> = solved.iter().map(|(at, _)| *at).collect();
     let time = case.time(&places);
@@ -82,7 +82,7 @@ fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
     }
 }
 
-/// Checks that simulated relays agree on the solver's positions and on the shares of one frame.
+/// Checks that simulated relays agree on the solver's positions, and on its time slots in the frame.
 #[test]
 fn a_chain_agrees_on_fitted_places_and_shares() {
     let first = number("SEED", 1);
@@ -108,7 +108,7 @@ fn a_chain_agrees_on_fitted_places_and_shares() {
     }
 }
 
-/// Checks that after the loss of a relay the slots of the remaining ones fill the frame again.
+/// Checks that after the loss of a relay the time slots of the remaining relays fill the frame again.
 #[test]
 fn the_remaining_relays_share_the_frame_after_a_loss() {
     let case = Case::draw(1);

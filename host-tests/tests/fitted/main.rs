@@ -50,8 +50,8 @@ fn check_limits(mission: &Mission, places: &[Placement]) {
     }
 }
 
-/// Checks that the relays' rate along the line is close to the planner's. It must be 0.999 of it in 99.5 % of the
-/// scenes, and 0.98 in all.
+/// Checks that the data rate with relays on the line is close to that of the planner. The rate must be at least 0.999 of the planner's rate
+/// in 99.5 % of the scenes, and at least 0.98 of it in all scenes.
 #[test]
 fn places_on_the_line_carry_what_the_shortest_path_carries() {
     let first = number("SEED", 1);

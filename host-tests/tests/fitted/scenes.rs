@@ -121,7 +121,8 @@ impl Case {
         [there, Vec::new()]
     }
 
-    /// Returns the time of one bit through relays at `places` by the true SINRs, in 1 / bandwidth.
+    /// Returns the total time of one bit through all hops, in units of 1 / bandwidth. The relays are at `places`; the true SINR of each hop
+    /// determines the time.
     pub(crate) fn time(&self, places: &[Placement]) -> f64 {
         self.times(places).iter().flatten().sum()
     }

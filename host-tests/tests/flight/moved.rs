@@ -20,7 +20,7 @@ const OFF_M: f64 = 2.0 * (BIAS_M + HOVER_M);
 
 /// Largest displacement of the receiver along the line, m.
 const ON_M: f32 = 300.0;
-/// Largest displacement of the receiver to the side, m. It turns the line by about 17 degrees.
+/// Largest displacement of Rx perpendicular to the line, m. The displacement turns the line by about 17 degrees.
 const ASIDE_M: f32 = 300.0;
 
 fn flight(seed: u64) -> Setup {

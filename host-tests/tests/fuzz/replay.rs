@@ -8,7 +8,7 @@ use super::corpus;
 /// Largest permitted number of files, and of bytes, of all fuzz corpora together.
 const MOST: (usize, usize) = (200, 200 << 10);
 
-/// Fuzz targets to run under Miri, which is a thousand times slower, and their numbers of short inputs.
+/// Fuzz targets to run under Miri, each with the number of short inputs to run. Miri is about a thousand times slower.
 const FOR_MIRI: [(&str, usize); 4] = [("deframe", 4), ("frame", 6), ("relay", 3), ("mavlink", 2)];
 
 const SHORT: usize = 60;

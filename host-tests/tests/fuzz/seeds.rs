@@ -27,9 +27,9 @@ fn golden() -> Vec<Frame> {
     Vectors::load().unwrap().frames
 }
 
-/// Returns corpus inputs for the target `deframe`: test vectors, and three of them with noise between.
+/// Returns corpus inputs for the target `deframe`: test vectors, with and without noise between them.
 ///
-/// Each input begins with two lengths. The stream is cut into pieces of these lengths in turn.
+/// Each input begins with two lengths, bytes. The rest of the input is cut into pieces of these two lengths in turn.
 fn deframe() -> Vec<Vec<u8>> {
     let wires: Vec<_> = golden().into_iter().map(|frame| frame.wire).collect();
     let cut = |stream: &[u8]| [&[4, 9], stream].concat();

@@ -155,7 +155,7 @@ impl Drone {
 )]
 #[derive(Debug, Default)]
 struct Report {
-    /// Smallest margin so far, m: the distance of two drones minus the distance required of them.
+    /// Smallest margin in the flight so far, m. The margin is the distance of two drones minus the minimum distance required of them.
     margin_m: f64,
     /// Drones with the smallest margin: their indices, their distance in m, and the time in s.
     nearest: Option<(usize, usize, f64, f64)>,

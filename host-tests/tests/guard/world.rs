@@ -242,7 +242,8 @@ fn between(one: [(f64, f64); 3], other: [(f64, f64); 3]) -> f64 {
     }))
 }
 
-/// Returns the smallest distance of two drones, m, that each fly straight from one point to another.
+/// Returns the smallest distance between two moving drones, m. Each of `one` and `other` is the start and the end of a drone's straight
+/// flight.
 fn nearest(one: (Point, Point), other: (Point, Point)) -> f64 {
     let (from, to) = (way(other.0, one.0), way(other.1, one.1));
     let change = way(from, to);

@@ -243,7 +243,7 @@ fn summary(results: &mut [Result]) -> (usize, f64, f64, u32) {
     (near, worst, best, passes)
 }
 
-/// Checks that random chains come near the recorded joint optima: 98 % of them within 0.1 %.
+/// Checks that random chains come near the recorded optimal SIRs of the joint problem. 98 % of the chains must be within 0.1 %.
 #[test]
 fn random_chains_come_near_the_joint_optimum() {
     let count = count(100);

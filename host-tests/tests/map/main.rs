@@ -22,7 +22,7 @@ fn best(scenario: &Scenario, relays: u16) -> Plan {
     plan(scenario, &ask).unwrap()
 }
 
-/// Writes the plan as GeoJSON and KML, and checks both. Returns what other libraries read from them.
+/// Writes the plan as GeoJSON and KML, and checks both files. Returns the values that independent libraries read from the files.
 fn read(scenario: &Scenario, plan: &Plan) -> Value {
     let line = scenario.line.unwrap();
     let map = Map::new(scenario, plan).unwrap();

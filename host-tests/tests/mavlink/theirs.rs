@@ -161,7 +161,7 @@ pub(super) fn by_the_crate(message: &MavMessage, sequence: u8) -> Vec<u8> {
     raw.raw_bytes().to_vec()
 }
 
-/// Draws a message of an autopilot. Returns the message, and what the crate must read from it.
+/// Draws a random message of an autopilot. Returns the message, and the values that this crate must read from the message.
 pub(super) fn random_message(rng: &mut ChaCha8Rng) -> (MavMessage, Incoming) {
     match rng.random_range(0..4) {
         0 => {

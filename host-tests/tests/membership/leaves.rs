@@ -112,7 +112,7 @@ fn a_relay_at_a_wide_gap_is_refused() {
     assert_eq!(freed(&outcome, 3), None);
 }
 
-/// Checks that no relay leaves without a guard, unless the settings allow it.
+/// Checks that a relay without a motion guard may not leave the chain, if the settings do not allow it.
 #[test]
 fn without_a_guard_a_relay_is_refused() {
     let mut setup = departing(8, &[(3, None)]);
@@ -404,7 +404,7 @@ fn worst_share(link: &Link, outcome: &Outcome, moving: [u16; 2]) -> (f64, f64) {
         .unwrap()
 }
 
-/// Result of the replacement of one relay in one scene.
+/// SIRs, times and distances of the replacement of one relay by a spare, in one scene.
 struct Replaced {
     /// Worst SIRs as shares of the optimum of eight relays. The first is with an announced replacement, the second
     /// with a loss without a spare.

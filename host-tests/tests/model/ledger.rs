@@ -206,7 +206,7 @@ impl Ledger {
             .reduce(f64::max);
     }
 
-    /// Checks that a relay never loses its setpoint, and reports each change of it by an event.
+    /// Checks that a relay never loses its setpoint, and reports each change of the setpoint by an event.
     fn follow(&mut self, turn: &Turn) -> Checked {
         let place = turn.relay.setpoint().map(to_f64);
         let told = turn.events.contains(&Event::SetpointChanged);

@@ -173,7 +173,7 @@ impl Wires {
         ended
     }
 
-    /// Discards the incomplete frames at relay `at`, which has just been switched on.
+    /// Discards the incomplete frames in transit to relay `at` (from 0), which has just been switched on.
     pub(crate) fn forget(&mut self, at: usize) {
         for (number, line) in self.lines.iter_mut().enumerate() {
             if end(number).0 == at {
@@ -209,7 +209,7 @@ impl Wires {
         late.extend(flying.pop_front().map(|frame| Flying { due, ..frame }));
     }
 
-    /// Releases the delayed frames that are due by `now`. They arrive before the other frames in transit.
+    /// Delivers the delayed frames whose delay ends by `now`, before the other frames in transit.
     pub(crate) fn hurry(&mut self, now: Instant) {
         for Line { flying, late, .. } in &mut self.lines {
             let due = late.extract_if(.., |frame| frame.due <= now);

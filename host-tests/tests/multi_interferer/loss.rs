@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-5;
 /// Upper limits of the classes by which the relative error of a fitted interferer is reported.
 const CLASSES: [f64; 6] = [0.001, 0.01, 0.03, 0.1, 0.3, 1.0];
 
-/// Relative error of a fitted interferer, and the fraction of the best SIR that a chain loses by it.
+/// Relative error of a fitted single interferer, and its cost. The cost is the fraction of the best SIR that a chain loses by this error.
 struct Outcome {
     error: f64,
     lost: f64,

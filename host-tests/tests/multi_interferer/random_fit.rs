@@ -8,7 +8,7 @@ use uav_relay_scenario::hypothetical::{Raster, fit};
 use super::above;
 use super::scenes::scene;
 
-/// Number of random positions that are tried, in each scene, for one interferer in place of several.
+/// Number of random positions tried in each scene for the single interferer that stands for several.
 const DRAWN: usize = 20_000;
 
 /// Number of best drawn positions of the interferer whose error is computed again on the fine raster.

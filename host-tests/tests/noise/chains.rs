@@ -34,7 +34,8 @@ fn hop_sinrs_agree_with_the_reference() {
     hop_sirs_agree(&mut generator(1101), |rng| drawn(rng, &Style::ANY));
 }
 
-/// Checks that 1 to 50 identical relays in noise are within 1e-4 of the optimum, and not above.
+/// Checks that the SIR of 1 to 50 equal relays with noise is close to the optimum. It may be at most 1e-4 (relative) below the optimal SIR,
+/// and never above it.
 #[test]
 fn the_optimum_is_found_in_noise() {
     let mut rng = generator(1102);

@@ -58,7 +58,7 @@ fn five_drones_settle_like_the_simulation() {
             // The emulator has no clock tree: the firmware keeps running on the HSI.
             let begins = [
                 "started, cause of the reset: unknown",
-                "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be off by 8 %",
+                "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be wrong by 8 %",
             ];
             let begins = begins.map(str::to_owned).into_iter();
             let begins = begins.chain([format!("relay {drone} of 5, network 7")]);
@@ -148,7 +148,7 @@ fn the_smallest_image_refuses_unsupported_methods() {
         [1, 2].iter().all(|drone| {
             let mut lines = lines.iter().filter(|line| line.drone == *drone);
             lines.any(|line| {
-                line.text == "configuration refused: not supported by this image: the method must be Align in a mission with an interference field; in other missions Joint needs the cargo feature `altitude` and at most 100 relays, and Adjust the cargo feature `adjust`"
+                line.text == "configuration refused: not supported by this image: the method cannot be used: a mission with an interference field needs Align; Joint needs the cargo feature `altitude` and at most 100 relays; Adjust needs the cargo feature `adjust`"
             })
         })
     });

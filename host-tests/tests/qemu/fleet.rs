@@ -17,10 +17,10 @@ use uav_relay_tools::provision::block::Flight;
 
 use crate::log::{self, Line};
 
-/// First log lines of every image. They report that the emulated chip has no reset cause and no PLL.
+/// First log lines of every firmware image. The emulated chip reports no reset cause and has no PLL, as these lines state.
 pub(crate) const OF_THE_CHIP: [&str; 2] = [
     "started, cause of the reset: unknown",
-    "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be off by 8 %",
+    "clock 16 MHz, from the internal oscillator: the PLL did not start; do not fly, baud rates may be wrong by 8 %",
 ];
 
 /// Timeout of any step of a test with emulated drones. Each drone adds `PATIENCE_A_DRONE`.
@@ -227,7 +227,7 @@ impl Fleet {
         self.lines.extend(self.new.try_iter());
     }
 
-    /// Collects log lines until `done` is true for them. On a timeout the test fails with all lines.
+    /// Collects log lines until `done` returns true for the lines so far. On a timeout the test fails and shows all lines.
     pub(crate) fn wait(&mut self, what: &str, mut done: impl FnMut(&[Line]) -> bool) {
         let started = Instant::now();
         let drones = u32::try_from(self.drones.len()).unwrap();
@@ -260,7 +260,7 @@ impl Fleet {
         self.lines.iter().filter(move |line| line.drone == drone)
     }
 
-    /// Returns the log lines of one drone without the first ones about its chip.
+    /// Returns the log lines of one drone, without the first lines about the chip (see [`OF_THE_CHIP`]).
     pub(crate) fn after_start(&self, drone: u16) -> impl Iterator<Item = &Line> {
         self.of_drone(drone).skip(OF_THE_CHIP.len())
     }

@@ -123,7 +123,7 @@ fn wired(socket: UnixStream) -> PathBuf {
     PathBuf::from(path)
 }
 
-/// Copies bytes from one end to the other until either is closed.
+/// Copies bytes from `from` to the other stream until one of the two is closed.
 fn carry(mut from: impl Read, mut to: impl Write) {
     let mut bytes = [0; 512];
     while let Ok(count @ 1..) = from.read(&mut bytes) {

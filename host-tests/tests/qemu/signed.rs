@@ -36,7 +36,7 @@ fn five_signing_drones_settle_like_the_simulation() {
             let mut lines = fleet.after_start(drone).skip(1);
             assert_eq!(
                 lines.next().unwrap().text,
-                "frames are signed; epoch 77, a number that must be larger at every start, but cannot be stored: raise it in the configuration block before the next start"
+                "frames are signed; epoch 77 (start counter): this relay cannot store it, so increase the epoch in the configuration block before every start"
             );
         }
     }

@@ -119,14 +119,14 @@ fn a_drone_with_a_bad_configuration_stays_out_and_logs_why() {
         "configuration refused: channel: carrier frequency must be within 1e6 to 1e12 Hz",
         "configuration refused: mission: the altitude band, band.least_m to band.most_m, must be within 0.1 to 1e5 and include common.altitude_m",
         "configuration refused: mission: lateral.least_m must be within -1e5 to 0, lateral.most_m within 0 to 1e5",
-        "configuration refused: the method must be align with an interference field, and otherwise align, joint or adjust",
+        "configuration refused: the method must be align, joint or adjust; with an interference field it must be align",
         "configuration refused: byte 15 of the block, which is 1 if the relay keeps its altitude, must be 0 or 1",
-        "configuration refused: with the method adjust rounds must be within 1 to 65535 and explore_m within 0 to 1e5, with any other method both 0",
-        "configuration refused: samples must be within 100 to 1000000 and i_max_w within 1e-30 to 1e6 W, or both 0",
+        "configuration refused: method adjust: rounds must be within 1 to 65535 and explore_m within 0 to 1e5 m; with another method both must be 0",
+        "configuration refused: measured interference: samples (number for each estimate) must be within 100 to 1000000 and i_max_w (maximum power) within 1e-30 to 1e6 W; without measurements both must be 0",
         "configuration refused: the interference field has more points than the block can hold",
         "configuration refused: the bytes after the last point of the interference field must be 0",
         "configuration refused: it has both an interferer and an interference field: leave one out",
-        "configuration refused: interference field: upsilon_per_w must be within 1e-9 to 1e32",
+        "configuration refused: interference field: upsilon_per_w (mean of 1 / interference power, in 1/W) must be within 1e-9 to 1e32",
     ];
     let mut fleet = Fleet::start(Image::Wires, &blocks, Faults::default(), 1);
     fleet.wait("word from every drone", |lines| {

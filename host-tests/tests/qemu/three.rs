@@ -57,7 +57,7 @@ impl Three {
                 .count()
         };
         let found = count(
-            "autopilot: cannot be engaged: OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
+            "autopilot: setpoint control cannot be engaged: OFFBOARD or GUIDED was chosen before the relay started: choose another mode, then OFFBOARD or GUIDED again",
         );
         if found > self.found {
             self.found = found;
@@ -66,7 +66,7 @@ impl Three {
             self.mavsdk.order("active");
         }
         let last = self.fleet.of_drone(1).last().map(|line| &*line.text);
-        if self.chooses && last == Some("autopilot: ready: its pilot may choose OFFBOARD or GUIDED")
+        if self.chooses && last == Some("autopilot: ready: the pilot may choose OFFBOARD or GUIDED")
         {
             self.chooses = false;
             self.mavsdk.order("mode offboard");

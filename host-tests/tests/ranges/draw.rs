@@ -229,7 +229,7 @@ pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws the settings of one relay: the shared ones, with a profile of its own. `guarded` gives it a motion guard.
+/// Draws the settings of one relay: the settings that all relays share, and a random profile. `guarded` adds a motion guard.
 pub(crate) fn own(
     rng: &mut impl Rng,
     mission: &Mission,

@@ -9,7 +9,7 @@ use embedded_hal::digital::{ErrorKind, ErrorType, OutputPin};
 /// Record of a UART's bytes and of the edges of its driver-enable pin, with times in µs.
 #[derive(Default)]
 pub(crate) struct Bench {
-    /// Simulated present time, µs. It also advances while the driver is polled, as on a real processor.
+    /// Simulated present time, µs. Each poll of the driver also takes simulated time, as on a real processor.
     pub(crate) clock: u64,
     /// Start and end of the transmission of each byte, µs.
     pub(crate) bytes: Vec<(u64, u64)>,

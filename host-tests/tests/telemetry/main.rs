@@ -331,7 +331,7 @@ fn a_lost_relay_and_a_restarted_one() {
     assert!(later.age_s(0.95) <= 10.0, "{}", later.age_s(0.95));
 }
 
-/// Checks that a restarted relay reports again: the station starts a new session with it.
+/// Checks that relays report to a station again after their restart. A restarted relay has a new session with the station.
 #[test]
 fn relays_next_to_the_station_report_again_after_a_restart() {
     for (access, relay) in [(Some(Access::Csma), 1), (Some(Access::Csma), 2), (None, 1)] {

@@ -160,7 +160,8 @@ impl LateralScene {
     }
 }
 
-/// Returns sample points of a range: its ends, equidistant ones, and denser ones around each of `near`.
+/// Returns sample points of the range `low` to `high`. They are its ends, equidistant points, and denser points around each value of
+/// `near`.
 pub(crate) fn marks((low, high): (f64, f64), near: &[f64]) -> Vec<f64> {
     let mut at = vec![low, high];
     for step in 1..12 {

@@ -8,5 +8,5 @@ mod lemmas;
 mod optima;
 mod scene;
 
-/// Largest permitted shortfall from the best SIR, as a fraction of it.
+/// Largest permitted shortfall of an SIR from the best SIR, as a fraction of the best SIR.
 const ALLOWED: f64 = 1e-4;

@@ -16,7 +16,7 @@ fn fitted(base: &Mission) -> MissionConfig {
     }
 }
 
-/// Returns the settings of a relay with the joint method, which may fit slots.
+/// Returns the settings of a relay with the joint method. With a mission of fitted slots the relay fits its time slots.
 fn joint() -> Settings {
     Settings {
         method: Method::Joint,

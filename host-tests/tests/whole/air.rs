@@ -129,8 +129,7 @@ pub(crate) struct Air {
     loss: f64,
     rng: ChaCha8Rng,
     seen: Vec<ObservedState>,
-    /// Largest number of groups of relays at any time so far. The relays of a group use positions of one agreement,
-    /// which no other group uses.
+    /// Largest number of groups of relays at any time so far. A group consists of all relays that use the positions of the same agreement.
     pub(crate) groups: usize,
     /// Simulated time at which the number of groups first reached the maximum in `groups`, µs.
     pub(crate) groups_us: u64,
@@ -139,9 +138,9 @@ pub(crate) struct Air {
     pub(crate) whole_since_us: Option<u64>,
     /// Number of relays that may lack an agreed position while the chain counts as flying (`flown_us`).
     pub(crate) spare: usize,
-    /// Total time in which all relays but at most `spare` have had positions of one agreement, µs.
+    /// Total time in which at most `spare` relays had no position of the common agreement, µs.
     pub(crate) flown_us: u64,
-    /// Time at which all relays but at most `spare` first had positions of one agreement, µs.
+    /// Time at which at most `spare` relays had no position of the common agreement, for the first time, µs.
     pub(crate) first_us: Option<u64>,
     /// Longest time in which more than `spare` relays lacked an agreed position, µs.
     pub(crate) longest_us: u64,
@@ -494,7 +493,7 @@ impl Air {
         }
     }
 
-    /// Adds the time since the last call to the time in `flown_us`, or to the present interruption of it.
+    /// Adds the time since the last call to `flown_us`, or to the present interruption of the chain.
     pub(crate) fn measure(&mut self) {
         let span_us = self.now_us - self.changed_us;
         if self.flies {

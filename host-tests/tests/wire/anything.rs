@@ -316,7 +316,7 @@ fn any_messages_keep_a_relay_in_a_field_in_its_limits() {
     led_by_anything(weak, 1, &[]);
 }
 
-/// Checks the headers of a leader's first frames, and that their counter rises by one.
+/// Checks the headers of the leader's first frames. The frame counter must rise by one from frame to frame.
 #[test]
 fn a_relays_frames_have_its_header_and_a_rising_counter() {
     let mut head = Bench::new(1, 8, Wiring::Pair);

@@ -89,7 +89,7 @@ fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     }
 }
 
-/// Checks that a relay's own frames have no effect on it when a radio returns them.
+/// Checks that a relay's own frames have no effect when a radio returns them to the relay.
 #[test]
 fn its_own_claim_has_no_effect_directly_or_as_an_echo() {
     for (wiring, port) in PORTS {

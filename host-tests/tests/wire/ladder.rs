@@ -12,7 +12,8 @@ fn bits(targets: &[f32]) -> Vec<u32> {
     targets.iter().map(|target| target.to_bits()).collect()
 }
 
-/// Returns the target SIRs of a sweep message by fused multiply-add, which the format forbids.
+/// Returns the target SIRs of a sweep message, computed with fused multiply-add. The wire format forbids fused multiply-add, because the
+/// results differ.
 fn fused(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     let mut gap = f32::from_bits(0x3300_0000 + (u32::from(gap) << 20));
     let mut targets = targets(anchor, 1, 0);

@@ -13,7 +13,7 @@ use super::meaning;
 use super::message::{FORMAT, WireMessage};
 use super::offer::{BYTES, KEPT, kept, mission_id, upload};
 
-/// Returns true if the crate accepts an offer's body. Otherwise the reason must be a value out of range.
+/// Returns true if this crate accepts an offer with the given body. If it is not accepted, the reason must be a value out of range.
 fn is_accepted(body: &[u8]) -> bool {
     match Message::decode(body) {
         Ok(message) => {
@@ -55,7 +55,7 @@ fn an_offer_needs_space_for_its_relays() {
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
 }
 
-/// Returns a mission of eight relays with `channel`. All its other numbers differ from those of the paper.
+/// Returns a mission of eight relays with `channel`. All other parameters differ from those of the paper's mission.
 fn other(channel: Channel) -> MissionConfig {
     MissionConfig {
         relays: 8,

@@ -63,7 +63,7 @@ impl DerefMut for SignedBench {
 }
 
 impl SignedBench {
-    /// Creates the idle relay `own` of `mission`. It has authenticated the nodes of `peers`, each at its port.
+    /// Creates relay `own` of `mission`, which does nothing yet. The relay has authenticated the nodes of `peers`, each at its port.
     pub(crate) fn new(
         mission: Mission,
         own: u16,

@@ -24,7 +24,7 @@ pub(crate) fn mark(view: u32) -> u16 {
     u16::try_from((low + (next << 8) + top) & 0xFFFF).unwrap()
 }
 
-/// Remaining lease of a relay that has just booted: `dead_after`, in units of 0.1 s. Other relays may rely on it for
+/// Remaining lease that a relay states just after its start: `dead_after`, in units of 0.1 s. Other relays may rely on the agreement for
 /// that long.
 pub(crate) const RELIED: u16 = 150;
 

@@ -148,7 +148,7 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     for segment in header.program_headers(endian, elf).map_err(wrong)? {
         let bytes = segment
             .data(endian, elf)
-            .map_err(|()| "an ELF file that is cut short")?;
+            .map_err(|()| "the ELF file is incomplete: its end is missing")?;
         if segment.p_type(endian) == PT_LOAD && !bytes.is_empty() {
             pieces.push(Piece {
                 address: segment.p_paddr(endian),
@@ -158,7 +158,7 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     }
     pieces.sort_by_key(|piece| piece.address);
     if pieces.is_empty() {
-        return Err("an ELF file without loadable segments".into());
+        return Err("the ELF file has no loadable segments".into());
     }
     Ok(pieces)
 }

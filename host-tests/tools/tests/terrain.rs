@@ -413,7 +413,7 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         ),
         (
             format!("{} --dem {hills}", of("deep.toml")),
-            "site.rx.amsl_m = 400: the elevation files have 495.0 m there; allowed: a difference of at most 15 m (heights above the mean sea level; those of a satellite receiver may be above the ellipsoid, up to 100 m away)",
+            "site.rx.amsl_m = 400: the elevation files have 495.0 m there; allowed: a difference of at most 15 m (amsl_m is the height above mean sea level; a satellite receiver may give the height above the ellipsoid, which differs by up to 100 m)",
         ),
         (
             format!("--profile {}", path("p.svg")),

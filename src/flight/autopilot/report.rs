@@ -225,7 +225,7 @@ impl Report {
         None
     }
 
-    /// Sets the numbers to send to the operator: the SIR, dB, and the position; `None` for unknown ones.
+    /// Sets the numbers to send to the operator: the SIR, dB, and the relay's position; `None` for unknown ones.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -302,9 +302,9 @@ pub enum AutopilotEvent {
     Waits(WaitReason),
     /// The pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,
-    /// Refused target: for 3 s the autopilot has reported another target than the one that it was sent.
+    /// The autopilot refuses the target: for 3 s it has reported another target than the sent one.
     ///
-    /// The sent position is outside the autopilot's own fence, or another companion sends targets to it.
+    /// The sent position is outside the autopilot's own fence, or another companion sends targets to the same autopilot.
     Refused,
     /// Report of the autopilot that the drone is outside of the autopilot's fence.
     FenceBreached,
@@ -312,8 +312,8 @@ pub enum AutopilotEvent {
     /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
     /// s in the air.
     OffLine(OffLine),
-    /// Accepted command of the operator that clears the lost relays of one side, because they have landed. It came
-    /// over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
+    /// The link accepted an operator's command that reports the lost relays of one side as landed. The command came over MAVLink.
+    /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.
     LostCleared {
         /// Side of this relay whose lost relays have landed.
         side: Side,
@@ -322,8 +322,8 @@ pub enum AutopilotEvent {
         /// MAVLink address of the sender of the command.
         from: Address,
     },
-    /// Denied command of the operator, which reports lost relays as landed. It does not name exactly the lost relays
-    /// of one side.
+    /// The link denied an operator's command that reports lost relays as landed. The reason: the command does not name exactly all lost
+    /// relays of one side.
     ClearRefused {
         /// Numbers of the relays that the command names, padded with zeros.
         relays: [u16; MOST],

@@ -200,11 +200,11 @@ impl Release {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {
-    /// The autopilot is in its failsafe, which ends when the pilot chooses a mode.
+    /// The autopilot is in its failsafe. The failsafe ends when the pilot chooses a mode.
     Failsafe,
     /// The link from the autopilot is late: its messages are old on arrival.
     Link,
-    /// OFFBOARD or GUIDED was chosen before this link started. Another mode has to be chosen first.
+    /// The autopilot was in OFFBOARD or GUIDED before this link started. The pilot must first choose another mode.
     Found,
     /// No mode change by the pilot has been received since this link started.
     Unseen,

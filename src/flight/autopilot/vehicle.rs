@@ -434,7 +434,8 @@ impl Default for Echo {
 }
 
 impl Echo {
-    /// Derives the tag of this link's TIMESYNC requests from `seed`.
+    /// Sets the number that marks this link's TIMESYNC requests, derived from `seed`. By this number the link recognises the replies to its
+    /// own requests.
     pub(super) const fn seed(&mut self, seed: u32) {
         self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
     }
@@ -589,8 +590,7 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 /// Maximum age of a reported position too far from the line Tx to Rx; an older one counts as unknown.
 const STALE_OFF_LINE: Duration = Duration::from_millis(3_000);
 
-/// Position of a drone too far from the line Tx to Rx for the mission's coordinates. It includes the distance of the
-/// drone from that line.
+/// Position of a drone that is too far from the line Tx to Rx for the mission's coordinates. Also has the drone's distance from the line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct OffLine {
@@ -647,7 +647,7 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx-Rx again, which permits a new report on the ground.
+    /// Records that the drone is near the line Tx-Rx again. After that a new departure from the line on the ground is reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;

@@ -213,7 +213,7 @@ impl Node {
         }
     }
 
-    /// Records that the neighbour at `side` was alive at time `at`. It has replied to a message sent then.
+    /// Records that the neighbour at `side` was alive at time `at`. The neighbour has replied to a message that was sent at that time.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
@@ -324,7 +324,7 @@ impl Node {
         }
     }
 
-    /// Returns true on a shared channel. There a relay receives many nodes and must search for its neighbours.
+    /// Returns true on a shared channel: there a relay receives many nodes, and searches for its neighbours.
     pub(super) fn searches(&self) -> bool {
         self.member.settings.wiring == Wiring::Shared
     }

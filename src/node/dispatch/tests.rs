@@ -121,7 +121,7 @@ fn proposal(mission_id: MissionId) -> Message {
     })
 }
 
-/// Returns a valid mission offer to `node`. It repeats the number of a hello that `node` sends at `NOW`.
+/// Returns a valid mission offer to `node`. The offer has the number of a hello that `node` sends at `NOW`.
 fn offer(node: &mut Node, upload: Upload) -> Message {
     let offer_number = node.layers.update.next_offer_number(NOW, &node.member);
     Message::Offer {

@@ -113,8 +113,7 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link, which had `losses` recent losses before. The loss is added to them only if
-    /// `counted` is true.
+    /// Records a loss of the link. `losses` is the number of recent losses before it. If `counted` is false, the number stays the same.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -213,15 +212,15 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour, which began at `since`. It returns false
-    /// until `probe_after` has passed.
+    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false until `probe_after` after that
+    /// time.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the loss counts of all links on this side to that of the link lost last. They were lost together,
-    /// because all cross the same gap in the chain.
+    /// Raises the loss counts of all links on this side to the count of the link lost last. These links were lost together, because all
+    /// cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);

@@ -38,7 +38,7 @@ pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
 
 /// Returns the interval between heartbeat requests while many relays have no agreement yet.
 ///
-/// It is longer than usual, because all of them search on one channel, but short enough for three requests between
+/// The interval is longer than usual, because all these relays search on one channel. It is still short enough for three requests between
 /// `probe_after` and `dead_after`.
 pub(crate) fn patient_tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, third(waiting(settings)))
@@ -96,8 +96,8 @@ pub(crate) struct Liveness {
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests before a reply. It measures the channel's losses. It
-    /// starts at [`MIN_REQUESTS`] and decays with each reply.
+    /// Longest recent run of unanswered heartbeat requests before a reply: a measure of the channel's losses. The number starts at
+    /// [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
 }
 

@@ -540,7 +540,7 @@ impl Neighbour {
         self.agreed.agree(0);
     }
 
-    /// Records that a view proposal was refused. This side requests no new view until its neighbour changes.
+    /// Records that a view proposal was refused. This side then requests no new view until its neighbour changes.
     pub(crate) const fn refuse(&mut self) {
         self.agreed.refuse(self.node);
     }

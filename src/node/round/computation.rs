@@ -376,7 +376,7 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if the method of the settings ends with this search, and no other algorithm follows.
         last: bool,
-        /// True for a search at the configured altitudes. Those of the joint method gave no feasible target.
+        /// True while the relays search at the configured altitudes, because the joint method's altitudes have no feasible target.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.
@@ -553,8 +553,8 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// Starts the search for the target SIR at the configured lateral offset and altitude. It is used if no target is
-    /// feasible with those of the joint method.
+    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if no target is feasible
+    /// at those of the joint method.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }

@@ -63,7 +63,7 @@ pub(crate) enum Action {
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view (membership). This relay cannot take part in the leader's pass along the chain.
+    /// Request a new view (membership), because this relay cannot take part in the leader's present pass.
     Foreign,
 }
 

@@ -102,8 +102,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay agrees on its position for
-    /// it. Otherwise the leader continues its search.
+    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay agrees on its position for that target. Otherwise
+    /// the leader continues its search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;
@@ -153,7 +153,7 @@ impl Computation {
         Action::Work
     }
 
-    /// Completes the agreement on a target SIR, unless another algorithm follows in the settings' method.
+    /// Completes the agreement on a target SIR, or starts the next algorithm of the settings' method.
     pub(super) fn agree(&mut self, context: &Context<'_>) -> Action {
         self.state.hold();
         if let LeaderTask::Searching { last: false, .. } = self.task {
@@ -183,7 +183,7 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay of this pass has a power or fixed altitude other than the common ones.
+    /// True if a later relay on this pass has its own power or fixed altitude, other than the mission's.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.

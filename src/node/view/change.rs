@@ -112,8 +112,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it, which a pass in that view shows. Ignored unless `view` is
-    /// the one that this relay has accepted last.
+    /// Records that all members of `view` have accepted it, as a pass in that view proves. Ignored if `view` is not the view that this
+    /// relay has accepted last.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -644,7 +644,7 @@ impl ViewRequest {
         true
     }
 
-    /// Returns the wait until the next view request. It doubles with each call, up to `probe_after`.
+    /// Returns the waiting time before the next view request. The time doubles with each call, up to `probe_after`.
     fn patience(&mut self, settings: &Settings) -> Duration {
         let wait = settings.hop_time.times(8 << self.tries.min(12));
         self.tries = self.tries.saturating_add(1);

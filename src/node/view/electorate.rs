@@ -78,7 +78,7 @@ impl Electorate {
         }
     }
 
-    /// Returns the latest view proposal that this relay has promised, as in Paxos. It accepts no earlier one.
+    /// Returns the latest view proposal that this relay has promised, as in Paxos. The relay accepts no earlier proposal.
     pub(crate) const fn promised(&self) -> ViewId {
         self.promised
     }
@@ -171,7 +171,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes the votes on proposals for which `is_decided` returns true. These can no longer become views.
+    /// Removes the votes on proposals for which `is_decided` returns true. Such proposals can no longer become views.
     fn forget(&mut self, is_decided: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !is_decided(**voted));
@@ -249,7 +249,7 @@ impl Electorate {
         self.member = true;
     }
 
-    /// Returns true if this relay has voted on `proposal`, whose decision is not known yet.
+    /// Returns true if this relay has voted on `proposal` and does not know the decision yet.
     pub(super) fn has_voted(&self, proposal: ViewId) -> bool {
         self.voted.contains(&proposal)
     }

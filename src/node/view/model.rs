@@ -243,7 +243,7 @@ pub(super) enum ModelEvent {
     Moves(usize),
 }
 
-/// Inserts `one` into the sorted list `all`, unless it is there already.
+/// Inserts `one` into the sorted list `all`; does nothing if the list already contains `one`.
 pub(super) fn insert_sorted<T: Ord>(all: &mut Vec<T>, one: T) {
     if let Err(at) = all.binary_search(&one) {
         all.insert(at, one);

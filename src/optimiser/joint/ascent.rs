@@ -10,8 +10,8 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// Initial limit of a relay's move in one iteration of the joint method. It is a fraction of the relay's distance
-/// from the interferer. The same number limits the change of ln(target SIR).
+/// First limit of a relay's move in one iteration of the joint method. The unit is the relay's distance from the interferer. The same
+/// number limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
 /// Minimum limit of a relay's move at which the final target SIR of a chain's improvement is predicted. A smaller
@@ -26,18 +26,18 @@ const LEAST_TRUST: f32 = 1e-4;
 /// per ln(SIR). The computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which a chain's limit of the target SIR is raised, in ln(SIR). It is raised when the chain reaches
-/// the limit but misses the upper bound of all chains.
+/// First amount by which the limit of a chain's target SIR is raised, in ln(SIR). The limit is raised when the chain's target has reached
+/// it and is still below the upper bound for all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above the
-/// cap does not count, so that it cannot outweigh a penalty.
+/// First cap on the chain's slack, as a fraction of the distance from Tx to Rx. Slack above the cap does not count, so that it cannot
+/// outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. Spare length above
-/// the cap does not count, so that it cannot outweigh a penalty.
+/// Smallest cap on the chain's slack, as a fraction of the distance from Tx to Rx. Slack above the cap does not count, so that it cannot
+/// outweigh a penalty.
 const LEAST_SPARE: f32 = 4e-5;
 
-/// Weight of missing length relative to spare length when two chains are compared.
+/// Weight of a negative slack relative to a positive slack, when two chains are compared.
 const SHORT: f32 = 2.0;
 
 /// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
@@ -69,7 +69,7 @@ pub(crate) enum AscentStep {
     /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
     /// first.
     Again,
-    /// End the improvement of this chain, unless a lower cap on its spare length at Rx may help.
+    /// End the improvement of this chain, or repeat it with a lower cap on its slack if that may help.
     Over,
 }
 
@@ -86,13 +86,13 @@ pub(crate) struct Ascent {
     limit: f32,
     /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
     excess: f32,
-    /// Cap on the chain's spare length at Rx, as a fraction of the distance from Tx to Rx. It is lowered if relays
-    /// are too near the interferer, so that spare length cannot outweigh the penalty for that.
+    /// Cap on the chain's slack, as a fraction of the distance from Tx to Rx. The cap is lowered if relays are too near the interferer,
+    /// because a large slack would outweigh the penalty for their positions.
     spare: f32,
-    /// Penalty for relays too near the interferer, m. It is subtracted from the chain's spare length at Rx.
+    /// Penalty for relays too near the interferer, m. It is subtracted from the chain's slack.
     pub(crate) penalty: f32,
     distance_m: f32,
-    /// Change of the chain's spare length at Rx per unit of ln(target SIR), m; below 0.
+    /// Change of the chain's slack per unit of ln(target SIR), m; below 0.
     pub(crate) slope: f32,
     linear: f32,
     square: f32,
@@ -112,8 +112,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain. It has the spare length `slack` at Rx, m, for the target `sigma`. Targets
-    /// are in ln(SIR), and never fall below `floor`.
+    /// Starts the improvement of a chain. `slack` is the chain's slack, m, for the target `sigma`. Targets are in ln(SIR), and never fall
+    /// below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -149,18 +149,17 @@ impl Ascent {
         self.limit
     }
 
-    /// Returns the cap on the chain's spare length at Rx, m. Spare length above the cap does not count when chains
-    /// are compared.
+    /// Returns the cap on the chain's slack, m. Slack above the cap does not count when chains are compared.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the spare length at Rx.
+    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the chain's slack (see there).
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the cap on the spare length at Rx if relays are too near the interferer. Returns true if it did.
+    /// Lowers the cap on the chain's slack if relays are too near the interferer. Returns true if the cap was lowered.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -169,8 +168,8 @@ impl Ascent {
         true
     }
 
-    /// Continues after the cap on the chain's spare length was lowered; returns the next action. `slack` is the spare
-    /// length at Rx under the new cap, m.
+    /// Continues after the cap on the chain's slack was lowered; returns the next action. `slack` is the chain's slack under the new cap,
+    /// m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -178,7 +177,7 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the chain meets the limit of its target SIR. It must then be checked against the upper bound.
+    /// Returns true if the target SIR has reached its limit. The target must then be compared with the upper bound for all chains.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
@@ -196,8 +195,8 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the
-    /// expected gains of the relays' moves, and the change of spare length with the target.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. The results are the expected gains of
+    /// slack by the relays' moves, and the change of slack with the target.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -225,7 +224,8 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) is expected to change by less than `by`, by spare length and moves.
+    /// Returns true if ln(target SIR) is expected to change by less than `by`. The expected change follows from the chain's slack and from
+    /// the gain of the relays' moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -236,8 +236,8 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a
-    /// chain is improved again, with a lower cap on its spare length.
+    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a chain is improved again,
+    /// with a lower cap on its slack.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
@@ -274,14 +274,14 @@ impl Ascent {
         }
     }
 
-    /// Returns the merit of a chain: the target, as ln(SIR), at which it would just reach Rx. At the target `sigma`
-    /// its spare length is `slack`, m; a missing length counts twice.
+    /// Returns the merit of a chain: the target, as ln(SIR), at which the chain would just reach Rx. `slack` is the chain's slack at the
+    /// target `sigma`, m. A negative slack counts twice.
     fn merit(&self, sigma: f32, slack: f32) -> f32 {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current one. At the target `sigma`, as ln(SIR), its spare
-    /// length at Rx is `slack`, m.
+    /// Returns true if a trial chain is better than the current one. `slack` is the trial chain's slack, m, at the target `sigma`, as
+    /// ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;
@@ -290,8 +290,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the action after a trial that did not improve the chain. It is a smaller fraction of the moves, or a
-    /// smaller limit of them.
+    /// Returns the next action after a trial that did not improve the chain. The next trial makes a smaller fraction of the computed moves.
+    /// After the smallest fraction the moves are computed anew, with a lower maximum length of each move.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -304,8 +304,8 @@ impl Ascent {
         turn
     }
 
-    /// Makes the trial with the fraction `share` of the moves the current chain; returns the next action. It has the
-    /// spare length `slack` at Rx, m, for the target `sigma`, in ln(SIR).
+    /// Accepts the trial chain, in which the relays made the fraction `share` of their computed moves. Returns the next action. `slack` is
+    /// the chain's slack, m, for the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -324,8 +324,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR). Returns the next action.
-    /// `slack` is the chain's spare length at Rx for it, m.
+    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR). Returns the next action. `slack` is the chain's
+    /// slack for this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

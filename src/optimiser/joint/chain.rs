@@ -100,8 +100,8 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the spare length of the last hop for `target`, m, and its derivatives. The spare length is the hop's
-    /// maximum length less its length. The last relay is at `at`; the derivatives are by its position.
+    /// Returns the last hop's maximum length for `target` less its length, m, and the derivatives. This difference is the chain's slack.
+    /// The last relay is at `at`; the derivatives are by its coordinates.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
         site::tail(self.mission, power_w, room, target, at)
@@ -153,17 +153,15 @@ pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of one segment (ten relays) of the chain. It has the x before it, and derivatives of the chain's
-/// spare length at its last relay.
+/// Stored state at the begin of one segment (ten relays): x of the previous relay, and derivatives. The derivatives are those of the
+/// chain's slack by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's spare length at Rx, m/m. They are by the position of the segment's last
-    /// relay.
+    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's spare length at Rx, 1/m. They are by the position of the segment's last
-    /// relay. The order is xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

@@ -114,7 +114,7 @@ struct Spot {
     quiet: f32,
 }
 
-/// Position that is tried for one relay, and the shortest total time of the hops up to it.
+/// Position tried for one relay, and the shortest total time of the hops from Tx up to that relay.
 #[derive(Clone, Copy, Debug)]
 struct State {
     spot: Spot,
@@ -542,7 +542,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains. It is larger if relays may choose lateral offsets or altitudes.
+/// Returns the number of initial chains. More chains are tried if relays may choose lateral offsets or altitudes.
 fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {

@@ -11,21 +11,21 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's spare length at Rx by one relay's position. It is a quadratic
-/// model. It assumes that the relays after it react optimally.
+/// Value function of the joint method: the chain's slack as a function of one relay's position. The function is a quadratic model, and
+/// assumes that the relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives of the slack (spare length at Rx) by the relay's x, y and h, m per m.
+    /// First derivatives of the slack by the relay's x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// Second derivatives of the slack (spare length at Rx) by the relay's x, y and h, 1/m; symmetric.
+    /// Second derivatives of the slack by the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative of the slack (spare length at Rx) by the target in ln(SIR), m.
+    /// Derivative of the slack by the target in ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the spare length at Rx gained by the relays' moves, a f + b f^2, m. f is the fraction of
-    /// their computed moves that the relays toward Rx make.
+    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of their computed moves that this relay
+    /// and the relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient b of the spare length at Rx gained by the relays' moves, a f + b f^2, m. f is the fraction of
-    /// their computed moves that the relays toward Rx make.
+    /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of their computed moves that this relay
+    /// and the relays toward Rx make.
     pub(crate) square: f32,
 }
 
@@ -71,9 +71,9 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (chain's spare length) of a hop's receiver to that of its sender. Returns the
-    /// receiver's policy. The policy is a move of the receiver in two coordinates, within [`low`, `high`], m,
-    /// relative to its current position. The third coordinate, `axis`, then follows from the hop's maximum length.
+    /// Converts the value function (chain's slack) of a hop's receiver to that of the hop's sender. Returns the receiver's policy: its move
+    /// in two coordinates, within [`low`, `high`], m, relative to its present position. The third coordinate, `axis`, then follows from the
+    /// hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -164,8 +164,8 @@ pub(crate) struct Policy {
     pub(super) rising: bool,
     /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
-    /// Additional move of the relay in each free coordinate per metre of the sending relay's move. That is in x, y
-    /// and h.
+    /// Change of the relay's move in each of its free coordinates, per metre of the sender's move. The three numbers of a triple belong to
+    /// the sending relay's move along x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
@@ -279,7 +279,7 @@ fn concave([yy, yh, hh]: [f32; 3]) -> [f32; 3] {
     [mean + half * cos, half * sin, mean - half * cos]
 }
 
-/// Compressed [`Policy`] (a relay's move). Three digits of each derivative are stored, which is sufficient.
+/// Compressed [`Policy`] (a relay's move). Each derivative is stored with three decimal digits, which is accurate enough.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Brief {
     axis: Coordinate,

@@ -505,11 +505,10 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Returns the spare length of the last hop for `target`, m, and its derivatives.
+/// Returns the last hop's maximum length for `target` less its length, m, and the derivatives.
 ///
-/// The spare length is the hop's maximum length less its length. The derivatives are by the position of the last
-/// relay, which is at `at`, with `power_w` watts. `room` has the lateral offsets and altitudes that it may choose
-/// from.
+/// This difference is the chain's slack. The derivatives are by the position of the last relay, which is at `at`, with `power_w` watts.
+/// `room` has the lateral offsets and altitudes from which the relay may choose.
 pub(super) fn tail(
     mission: &Mission,
     power_w: f32,
@@ -532,8 +531,8 @@ pub(super) fn tail(
     (slack, outlook)
 }
 
-/// Weight of the penalty for a violated minimum separation, in units of the distance from Tx to Rx. It is so large
-/// that no gain of spare length at Rx is worth a violation.
+/// Weight of the penalty for a violated minimum separation. The unit is the distance from Tx to Rx. The weight is so large that no gain of
+/// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
 /// Distance from a limit of its allowed range at which a relay counts as at that limit. It is a fraction of the
@@ -566,8 +565,8 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty for a relay at `to` that is too near the interferer, m; 0 if it is not. The penalty is
-    /// subtracted from the chain's spare length at Rx.
+    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if its distance suffices. The penalty is subtracted from the
+    /// chain's slack.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)

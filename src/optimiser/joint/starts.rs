@@ -139,7 +139,7 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the lateral offset and altitude of a relay on a spiral. The relay that sends to it is at `from`. `c` is
+    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer. The relay that sends to it is at `from`. `c` is
     /// target SIR over gain, which determines the length of the hop; `room` has the allowed ranges.
     pub(super) fn around(
         self,

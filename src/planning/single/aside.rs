@@ -314,7 +314,7 @@ impl Plane {
         low
     }
 
-    /// Returns the point on a circle about Rx at which the first hop has its largest SIR, with noise. `s` is the
+    /// Returns the point on a circle about Rx at which the first hop has its largest SIR, with noise. The point is (x, y), m. `s` is the
     /// radius of the circle, m.
     fn loudest_in_noise(&self, s: f64) -> (f64, f64) {
         let at = |w: f64| (self.d - s * libm::cos(w), s * libm::sin(w));

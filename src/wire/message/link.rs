@@ -132,8 +132,8 @@ impl Hello {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node; of two nodes with one node number, the larger one wins. It is drawn at
-    /// the node's start, and raised at most once while the node is active.
+    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim number wins. A node
+    /// draws the number at its start, and raises it at most once while it is active.
     pub number: u32,
     /// Last claim number received from another node with the claiming node's node number; 0 for none.
     pub other_number: u32,

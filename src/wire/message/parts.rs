@@ -89,8 +89,8 @@ pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageEr
     }
 }
 
-/// Maximum of the x values and of the chain's spare lengths in a message, m. It is twice the 1e9 m to which the last
-/// hop is limited, so that the sum of a position (at most 1e6 m) and this hop is in range.
+/// Maximum of the x values and of the chain's slacks in a message, m. The last hop is limited to 1e9 m; twice this value leaves room for
+/// the sum of a position (at most 1e6 m) and that hop.
 pub(super) const FARTHEST_M: f32 = 2e9;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]

@@ -139,7 +139,7 @@ pub struct SweepVerdict {
     pub number: u16,
     /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Verdict of the sweep: the chain's spare length for each target, and the committed target, if any.
+    /// Verdict of the sweep: the chain's slack for each target, and the committed target, if any.
     pub verdict: Verdict,
     /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
     /// x that it has reported for this target.

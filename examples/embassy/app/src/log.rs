@@ -39,12 +39,12 @@ pub(crate) fn unsigned() {
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
         info!(
-            "frames are signed; epoch {}, a number that is larger at every start",
+            "frames are signed; epoch {} (start counter, larger at every start)",
             epoch
         );
     } else {
         error!(
-            "frames are signed; epoch {}, a number that must be larger at every start, but cannot be stored: raise it in the configuration block before the next start",
+            "frames are signed; epoch {} (start counter): this relay cannot store it, so increase the epoch in the configuration block before every start",
             epoch
         );
     }

@@ -39,7 +39,7 @@ pub fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// Returns Embassy's clock settings for the frequencies `clocks`, which the chip has reached before.
+/// Returns Embassy's description of the chip's clocks, which already run at the frequencies `clocks`.
 fn tree(hardware: &ClockHardware, clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
     let (Some(source), Some(crystal)) = (clocks.pll, hardware.crystal) else {

@@ -37,7 +37,7 @@ pub(super) struct Peer {
     stamp: u64,
     /// Newest signed frames of the simulated autopilot, for replays.
     history: Vec<Vec<u8>>,
-    /// Clock of the tested link as a signature time stamp. It was read at the instant in the field `at`.
+    /// Clock of the tested link, as a MAVLink signature time stamp. The clock was read at the instant in the field `at`.
     time: u64,
     at: Instant,
     /// Senders that the tested link should remember, with the time stamps of their last frames.

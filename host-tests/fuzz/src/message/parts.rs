@@ -24,7 +24,7 @@ pub struct RelayState {
     ///
     /// Each relay draws a random number for the session with its neighbour.
     pub association: u16,
-    /// Number in the tested relay's last hello, which a mission offer has to repeat; 0 for none.
+    /// Number in the last hello of the tested relay; 0 for none. A mission offer to this relay must repeat the number.
     pub offer_number: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
@@ -118,8 +118,8 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends a relay's index to the message: mostly that of a relay in a short chain, 0 to 5, else any.
-    /// Appends the end of a lease renewal: `in_place`, and the nodes that leave and join unless both are 0.
+    /// Appends the last part of a lease renewal to the message. That part is the flag `in_place` and, in half of the messages, the nodes
+    /// that leave and join, not both 0.
     pub(super) fn renewal_nodes(&mut self) {
         self.small(0, 1);
         if self.small(0, 1) == 1 {
@@ -212,10 +212,8 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission.
-    ///
-    /// It is the newest mission that the tested relay has stored, the one loaded into the relay before flight, or
-    /// another one, which is newer, older or arbitrary.
+    /// Returns version and digest of a mission. The mission is the newest one stored by the tested relay, the one loaded into that relay
+    /// before flight, or another one with a newer, older or arbitrary version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {

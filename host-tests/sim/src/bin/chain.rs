@@ -189,7 +189,7 @@ impl Progress {
         }
     }
 
-    /// Writes `text` to the progress line, unless the run is too short or the last update too recent.
+    /// Writes `text` to the progress line. Does nothing in a short run, and shortly after the last update.
     fn show(&mut self, text: impl FnOnce() -> String) {
         let elapsed = self.started.elapsed();
         let is_due = self.shown.is_none_or(|shown| shown.elapsed() >= EVERY);

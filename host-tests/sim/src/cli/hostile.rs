@@ -207,7 +207,7 @@ impl Hostile {
             .chain(self.flight.begins());
         match all.find(|(_, at)| *at >= end) {
             Some((option, _)) => Err(Failure::input(format!(
-                "{option}: has no effect, because --soak {} ends the run by then",
+                "{option}: has no effect, because --soak {} ends the run before that time",
                 seconds(end)
             ))),
             None => Ok(()),

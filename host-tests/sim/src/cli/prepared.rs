@@ -140,10 +140,9 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Runs the simulation of `setup` and returns the chain at its end. `watch` runs a chain until it settles.
+    /// Runs the simulation of `setup` and returns the chain at its end. `watch` runs a chain until the relays keep their positions.
     ///
-    /// With `--closed-loop`, the relays then measure the interference and agree on positions again, the requested
-    /// number of times.
+    /// With `--closed-loop`, the relays then measure the interference and agree on positions again, the requested number of times.
     ///
     /// # Errors
     /// A setting that a relay rejects, or an error of `watch`.

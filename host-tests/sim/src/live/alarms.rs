@@ -124,7 +124,7 @@ mod tests {
         let all = alarms.all();
         assert_eq!(
             all[0].text,
-            "last agreement expired, setpoint kept: relay 2"
+            "relay 2: last agreement on positions expired, setpoint kept"
         );
         assert_eq!(all[0].cleared_s, None);
         alarms.observe(&moment(7, 2, TimelineEvent::Converged, 0));

@@ -69,7 +69,7 @@ impl HopSlots {
         .collect()
     }
 
-    /// Returns the slots of all hops from those that the relays of a chain have agreed on, relay 1 first.
+    /// Returns the time slots of all hops. They follow from the time slots on which the relays have agreed, relay 1 first.
     pub fn agreed(relays: &[SlotShares]) -> Vec<Self> {
         let last = relays.last().map(|last| (last.to_rx, last.from_rx));
         let hops = relays.iter().map(|own| (own.from_tx, own.to_tx));

@@ -26,7 +26,7 @@ pub struct BelievedReport {
     pub y_m: f32,
 }
 
-/// Quality of the relays' interference estimate, and of the positions chosen with it.
+/// Quality of the relays' interference estimate, and of the positions chosen by it.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct SensingReport {
     /// Interferer as relay 1 estimates it at the end of the run; absent without an estimate.

@@ -271,7 +271,7 @@ impl Group {
         match one.what {
             "silent" => format!("{who} went silent"),
             "switched on" => format!("{who} switched on again"),
-            "lost" => format!("{who} lost relay {other}"),
+            "lost" => format!("{who}: relay {other} lost (no reply)"),
             "found" if many => format!("{who} became neighbours"),
             "found" => format!("{who} became a neighbour of relay {other}"),
             "view accepted" => format!(
@@ -279,7 +279,7 @@ impl Group {
                 count(one.relays.unwrap_or_default().into()),
                 one.view.unwrap_or_default()
             ),
-            "lease expired" => format!("{who}: last agreement expired, setpoint kept"),
+            "lease expired" => format!("{who}: last agreement on positions expired, setpoint kept"),
             "not received by" => format!("relay {other} does not receive {who}"),
             "mission mismatch" => format!("{who}: relay {other} has another mission"),
             "key mismatch" => format!("{who}: relay {other} signs with another key"),
@@ -288,7 +288,7 @@ impl Group {
                     "{who}: relay {other} started with an old epoch (start counter), so its frames are rejected"
                 )
             }
-            "duplicate index" => format!("{who}: duplicate relay number {other}"),
+            "duplicate index" => format!("{who}: another node also has the number {other}"),
             "engaged" => format!("{who}: setpoint control engaged"),
             "released" => format!("{who} released: the pilot took control"),
             "blind" => format!("{who}: the autopilot reports no position"),

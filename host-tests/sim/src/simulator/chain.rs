@@ -103,7 +103,7 @@ impl Chain {
         }
     }
 
-    /// Returns the setpoints of all relays; `None` unless every relay has one.
+    /// Returns the setpoints of all relays, relay 1 first; `None` if any relay has no setpoint.
     pub fn setpoints(&self) -> Option<Vec<Placement>> {
         self.members
             .iter()

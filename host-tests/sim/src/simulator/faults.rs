@@ -38,7 +38,7 @@ pub struct Injected {
 pub struct Arrival {
     /// Bytes of the frame as received, with changes by faults.
     pub bytes: Vec<u8>,
-    /// Delay of the frame by faults; the unit is the time that the longest message takes for one hop.
+    /// Delay of the frame by simulated faults. The unit is the longest time that a message needs for one hop.
     pub late: u64,
 }
 
@@ -108,7 +108,7 @@ impl Faults {
 /// In the bad state it loses all frames, in the good state none.
 #[derive(Debug)]
 pub struct Bursts {
-    /// Mean fraction of lost frames. It equals the fraction of frames that find the link in the bad state.
+    /// Mean fraction of frames that the link loses, 0 to 1. It equals the fraction of time in which the link is in its bad state.
     share: f64,
     /// Probability that a link in the good state is in the bad state for the next frame.
     worsens: f64,

@@ -285,7 +285,7 @@ impl OnAir {
         self.ends > now && self.hearers.iter().any(|(by, _)| *by == node)
     }
 
-    /// Marks the frame as lost at `node` for the reason `how`, unless it has ended or was lost before.
+    /// Marks the frame as lost at `node`, for the reason `how`. Does nothing if the reception has ended, or was marked as lost before.
     fn spoil(&mut self, node: usize, now: Instant, how: Reception) {
         if self.ends <= now {
             return;

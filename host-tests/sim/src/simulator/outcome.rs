@@ -85,7 +85,7 @@ pub enum TimelineEvent {
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
-    /// The relay has told another one, outside of the chain, that its drone may fly away.
+    /// This relay has informed a node outside of the chain that the node's drone may fly away.
     MayLeaveTold,
 }
 

@@ -41,7 +41,7 @@ pub const SECOND: f64 = 1e12;
 /// Longest time that a hop may take for one packet, ps: 1000 s. A slower hop counts as broken.
 const SLOWEST: f64 = 1e15;
 
-/// Distance, m, that a drone has to move before its new position is recorded.
+/// Distance, m, by which a drone must have moved before its new position is recorded.
 const MOVED_M: f64 = 0.1;
 
 /// Distance of a drone from its agreed position, m, below which it has arrived.
@@ -95,7 +95,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// Records the state of relay `relay` (from 0) at time `at`, unless it is like the last recorded one.
+    /// Records the state of relay `relay` (from 0) at time `at`. Does nothing if the state equals the relay's last recorded state.
     pub fn see(&mut self, at: Instant, relay: usize, state: RelayState) {
         let known = self.latest.get(&relay);
         if known.is_none_or(|known| !known.is_like(&state)) {
@@ -324,7 +324,8 @@ pub struct Route {
     /// Periods with a constant view, state of the chain and promised data rate, in order of time. A view is a
     /// membership of the chain. At least one.
     pub periods: Vec<Period>,
-    /// Data rates at the positions of the first agreement, bit/s: to Rx, then back to Tx.
+    /// Data rates that the planner's formula gives at the first agreed positions, bit/s. First the rate from Tx to Rx; second, for data
+    /// both ways, the rate from Rx to Tx.
     pub promised_bps: Vec<f64>,
 }
 
@@ -440,7 +441,7 @@ pub struct DataLink {
 }
 
 impl DataLink {
-    /// Returns the time of one packet on a hop of this data rate; `None` if the hop carries no data.
+    /// Returns the transmission time of one packet on a hop with the data rate `rate_bps`, ps. `None` if the hop carries no data.
     fn packet(&self, rate_bps: f64) -> Option<Ps> {
         let time = self.packet_bits / rate_bps * SECOND;
         #[expect(
@@ -586,7 +587,8 @@ pub fn route(
 }
 
 impl Route {
-    /// Adds `stage`, with the hops between `members`, to the route, unless there is no agreement yet.
+    /// Adds `stage`, a period in which no hop changes, to the route. The stage gets the hops between the relays `members`. Does nothing
+    /// before the first agreement on positions.
     fn add(
         &mut self,
         mut stage: Stage,

@@ -89,7 +89,7 @@ pub struct Packets {
     pub lost: u64,
 }
 
-/// Packets of a period and the delays of the delivered ones.
+/// Counts of the packets of one period, and the delays of the delivered packets.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Delivery {
     /// Numbers of packets offered, delivered, dropped and lost in the period.
@@ -254,7 +254,8 @@ struct Queue {
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
     number: u32,
-    /// Sum of the queue's length over time until `counted`, packets times ps. It gives the mean length.
+    /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean length of the queue from
+    /// it.
     sum: u128,
     counted: Ps,
     most: usize,
@@ -414,7 +415,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Moves the first packet of `node` to its receiver, unless transmission `number` is out of date.
+    /// Moves the first packet of `node` to the packet's receiver. Does nothing if transmission `number` is no longer the current one.
     fn arrive(&mut self, at: Ps, node: usize, number: u32) {
         let Some(queue) = self.queues.get_mut(node) else {
             return;

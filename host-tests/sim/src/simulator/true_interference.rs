@@ -156,7 +156,8 @@ impl TrueInterference {
         Gamma::new(samples, 1.0 / samples).map_or(1.0, |shape| shape.sample(rng))
     }
 
-    /// Returns the shadowing at `at`, in standard deviations. It is equal within a cube of edge [`SHADOW_M`].
+    /// Returns the shadowing of the interference at `at`, in standard deviations. All points of a cube of edge [`SHADOW_M`] have the same
+    /// value.
     #[expect(clippy::cast_possible_truncation, reason = "a number of a cell")]
     fn shadow(&self, at: Place) -> f64 {
         use rand::SeedableRng as _;

@@ -404,7 +404,7 @@ pub fn without_other_relays(setup: &Setup, nodes: &[u16], version: u16) -> Optio
     Some(clean)
 }
 
-/// Returns the final positions of a run, relay 1 first; `None` unless the run settled.
+/// Returns the final positions of a run, relay 1 first; `None` if the relays did not settle.
 pub fn places_of(outcome: &Outcome) -> Places {
     let places = outcome.relays.iter().map(|relay| relay.setpoint.map(point));
     (outcome.ending == Ending::Settled).then(|| places.collect())?

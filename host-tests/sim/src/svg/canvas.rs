@@ -372,7 +372,7 @@ impl Labels {
         self.taken.push(area);
     }
 
-    /// Marks a line as occupied, so that no label is placed on it.
+    /// Marks the area of a line as occupied, so that no label is placed over that line.
     pub(super) fn take_line(&mut self, line: [Point; 2]) {
         self.lines.push(line);
     }

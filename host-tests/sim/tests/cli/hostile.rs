@@ -67,7 +67,7 @@ fn the_timeline_of_a_loss_has_a_line_per_event() {
         "with 7 of 8 relays by `align`",
         "one radio channel",
         "20.000 s  relay 4 went silent",
-        " s  relays 3 and 5 lost relay 4",
+        " s  relays 3 and 5: relay 4 lost (no reply)",
         " s  relays 3 and 5 became neighbours",
         " s  membership agreed: 7 relays (view ",
         " s  positions agreed: 7 relays, SIR 2.312",

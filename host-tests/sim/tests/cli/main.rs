@@ -319,7 +319,7 @@ fn an_option_that_would_be_ignored_is_refused() {
     insta::assert_snapshot!(refusals(IGNORED));
 }
 
-/// Checks that options are accepted where they have an effect. They are refused where they have none.
+/// Checks that an option is accepted where it has an effect, and refused where it has none.
 #[test]
 fn a_useful_option_is_accepted() {
     for arguments in [

@@ -197,11 +197,15 @@ fn unusable_files_and_places_are_named() {
         (&["zurich.hgt"], &["zurich.hgt: its name must begin with"]),
         (
             &["decimetres.tif"],
-            &["decimetres.tif: has heights with the scale 0.1 (tag 42112); allowed: plain metres"],
+            &[
+                "decimetres.tif: has heights with the scale 0.1 (tag 42112); allowed: heights in metres, without scale or offset",
+            ],
         ),
         (
             &["feet.tif"],
-            &["feet.tif: has heights with the unittype ft (tag 42112); allowed: plain metres"],
+            &[
+                "feet.tif: has heights with the unittype ft (tag 42112); allowed: heights in metres, without scale or offset",
+            ],
         ),
         (
             &["swiss.tif"],

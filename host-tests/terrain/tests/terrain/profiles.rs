@@ -181,7 +181,7 @@ fn sites_that_contradict_the_terrain_are_named() {
     let wrong = line([site(47.05, 8.01, 500.0), site(47.05, 8.09, 420.0)]);
     assert_eq!(
         wrong,
-        "site.rx.amsl_m = 420: the elevation files have 500.0 m there; allowed: a difference of at most 15 m (heights above the mean sea level; those of a satellite receiver may be above the ellipsoid, up to 100 m away)"
+        "site.rx.amsl_m = 420: the elevation files have 500.0 m there; allowed: a difference of at most 15 m (amsl_m is the height above mean sea level; a satellite receiver may give the height above the ellipsoid, which differs by up to 100 m)"
     );
     let outside = line([site(47.05, 8.01, 500.0), site(47.05, 8.12, 500.0)]);
     assert!(

@@ -94,7 +94,10 @@ fn of_block(board: &Board, block: &Path) -> Result<(String, Vec<Piece>), Failure
     let named = |what: String| Failure::input(format!("--block {}: {what}", block.display()));
     let bytes = std::fs::read(block).map_err(|error| named(error.to_string()))?;
     if bytes.len() != LEN {
-        return Err(named(format!("{} bytes; a block has {LEN}", bytes.len())));
+        return Err(named(format!(
+            "has {} bytes, but a block has {LEN} bytes",
+            bytes.len()
+        )));
     }
     let stem = block.file_stem().unwrap_or_default().to_string_lossy();
     let pieces = vec![Piece {

@@ -345,7 +345,7 @@ fn terrain(
     let missed = match number {
         Number::Meeting(target) if report.terrain_sir < target * (1.0 - options.tolerance) => {
             Some(format!(
-                "the worst hop has {:.2} dB with terrain, below the target of {:.2} dB, which --target-sir finds without terrain: give --uavs and --altitude terrain",
+                "with terrain the worst hop has {:.2} dB, below the target of {:.2} dB, because --target-sir searches without terrain: give --uavs and --altitude terrain",
                 report.terrain_sir_db,
                 db(target)
             ))

@@ -440,7 +440,7 @@ fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), St
     let in_range = options.in_range.unwrap_or(uavs).min(uavs);
     command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after).map_err(|error| {
         format!(
-            "{error}; if fewer receive each other, give --in-range, or --wires for separate links"
+            "{error}; if fewer relays receive each other, give --in-range, or --wires for separate links"
         )
     })
 }

@@ -211,9 +211,9 @@ fn gains(
         .collect())
 }
 
-/// Returns what `reading` averages (SIR, dB or rate) for four positions of the relay at one altitude.
+/// Returns a mean value (`reading`: SIR, dB or rate) for four positions of the relay at one altitude.
 ///
-/// The positions are the best one, a random one, the one that ignores interference, and the middle.
+/// The positions are the best one, a random one, the best one without interference, and the middle of the line.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),

@@ -229,7 +229,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// x of the receiver, within `to`, that a sender reaches from the smallest x.
+    /// Largest x of a receiver that a sender at the smallest x reaches, within `to`, m.
     farthest: f64,
 }
 

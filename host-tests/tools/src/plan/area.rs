@@ -44,7 +44,7 @@ const ROUNDS: u32 = 8;
 /// Factor on the SIR of a hop whose way crosses a no-fly area: other chains come first.
 const CROSSING: f64 = 1e-30;
 
-/// Depth in a no-fly area, and length of a way in it, that is rounding, m.
+/// Tolerance for rounding, m: depth in a no-fly area, or length of a path in it, that does not count.
 const ROUNDING_M: f64 = 0.01;
 
 /// Number of x, y and altitudes of the first grid, where they are free.
@@ -169,7 +169,7 @@ fn best(
         }
         None if relays > MOST_SEARCHED => {
             return Err(NoPlan::Wrong(format!(
-                "--uavs {relays}: with interferer.area or [[no_fly]] the search is for 1 to {MOST_SEARCHED} relays, except for relays at one altitude, one direction and no no-fly areas"
+                "--uavs {relays}: must be within 1 to {MOST_SEARCHED} with interferer.area or [[no_fly]]; more relays are possible only at one common altitude, with traffic in one direction and without [[no_fly]]"
             )));
         }
         None => {

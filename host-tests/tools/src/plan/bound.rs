@@ -36,7 +36,7 @@ const MOST_RELAYS: usize = 200;
 /// Allowance for rounding errors in squared lengths, as a fraction of the squared length.
 const ROUNDING: f64 = 1e-9;
 
-/// Target SIRs, linear, that every hop has to meet: in the direction to Rx and in that to Tx.
+/// Target SIRs, linear, that every hop must meet. First the target in the direction to Rx, second that in the direction to Tx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Targets {
     /// Target SIR of each hop in the direction to Rx, linear, above 0.
@@ -244,7 +244,7 @@ mod tests {
     use uav_relay_scenario::Scenario;
     use uav_relay_scenario::scene::Scene;
 
-    /// Checks that `excludes` rejects targets just above the planner's optimum, and no lower ones.
+    /// Checks that `excludes` rejects targets just above the planner's optimal SIR, and no lower targets.
     #[test]
     fn a_target_above_the_optimum_is_excluded_and_no_other() {
         let mut scenario = Scenario {

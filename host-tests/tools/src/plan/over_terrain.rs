@@ -36,7 +36,8 @@ const POINTS: f64 = 800.0;
 /// Number of finer grids, each with cells half as large.
 const REFINEMENTS: i32 = 5;
 
-/// Factor on the gain of a blocked hop: a chain without blocked hops is better than one with any.
+/// Factor on the gain of a hop that the terrain blocks. The factor is so small that every chain with a blocked hop ranks behind all chains
+/// without one.
 const BLOCKED: f64 = 1e-30;
 
 /// Grid points on each side of a relay in a finer grid.
@@ -454,7 +455,7 @@ pub fn best(
 ) -> Result<Plan, NoPlan> {
     if relays > MOST_RELAYS {
         return Err(NoPlan::Wrong(format!(
-            "--altitude terrain: must be with --uavs 1 to {MOST_RELAYS}, not {relays}"
+            "--altitude terrain: needs --uavs within 1 to {MOST_RELAYS}, not {relays}"
         )));
     }
     let scene = Scene::new(scenario, relays).ok_or_else(|| {

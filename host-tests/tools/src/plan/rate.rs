@@ -62,7 +62,8 @@ impl Rate {
         }
     }
 
-    /// Returns the SIRs of all hops, linear, to Rx and then to Tx; `None` for a plan of one direction.
+    /// Returns the linear SIRs of all hops. First those in the direction to Rx, then those in the direction to Tx; `None` for a plan of one
+    /// direction.
     fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
         plan.back?;
         let relays = u16::try_from(plan.places.len()).ok()?;

@@ -35,8 +35,8 @@ pub struct HypotheticalReport {
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
     /// against all interferers.
     pub kept: bool,
-    /// SIR lost by the positions for the hypothetical interferer, as a fraction of the plan's SIR. It is 0 if the
-    /// plan has these positions. It is the data rate lost if the relays fit their slots.
+    /// SIR lost by the use of the positions for the hypothetical interferer, relative to the plan's SIR. 0 if the plan's own positions are
+    /// the same. With fitted slots the value is the lost data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
     /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer. It is the
@@ -231,7 +231,7 @@ pub struct WayBack {
     pub worst_back: f64,
     /// SIR of the worst hop in the direction from Rx to Tx, dB.
     pub worst_back_db: f64,
-    /// Fraction of the SIR to Rx that suffices toward Tx; absent if relays are placed for one direction.
+    /// Fraction of the SIR to Rx that the hops toward Tx must have; absent in a plan for one direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reverse: Option<f64>,
     /// SIR of the worst hop of both directions, linear; an SIR toward Tx is first divided by `reverse`.

@@ -28,7 +28,7 @@ const CELLS: u16 = 800;
 /// Least relative decrease of a chain's time for one bit that the search looks for.
 const GAIN: f64 = 2e-5;
 
-/// Relative difference of two chains' times for one bit that the search neglects. Of two such chains it keeps the one
+/// Relative difference up to which the search treats two chains' times for one bit as equal. Of two such chains the search keeps the one
 /// whose last relay is farther from Tx.
 const SAME: f64 = 1e-4;
 
@@ -45,7 +45,7 @@ const HALVINGS: u8 = 40;
 struct Label {
     point: Point,
     time: f64,
-    /// Index of the chain up to the previous relay, in the list of such chains, that this one continues.
+    /// Index, in the list of chains that end at the previous relay, of the chain that this chain continues.
     before: usize,
 }
 
@@ -70,7 +70,7 @@ struct Search<'a> {
     grid: Vec<f64>,
     /// Width of a cell of the line, m.
     width: f64,
-    /// Time for one bit that a chain must stay below, s Hz: the time in s for a bandwidth of 1 Hz.
+    /// Upper limit on a chain's time for one bit, s Hz: the time in s for a bandwidth of 1 Hz.
     below: f64,
 }
 
@@ -398,7 +398,7 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the start, m, of the interval of x that ends at `point` and has no better position than it.
+    /// Returns the start, m, of the interval of x that ends at `point` without a better position.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

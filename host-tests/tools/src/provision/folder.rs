@@ -66,7 +66,7 @@ pub fn write(dir: &Path, files: &[(String, Vec<u8>)], force: bool) -> Result<(),
     Ok(())
 }
 
-/// Writes `content` to a temporary file in `dir`, which is deleted unless it is renamed.
+/// Writes `content` to a temporary file in `dir`. The file is deleted if the caller does not rename it.
 fn stage(dir: &Path, content: &[u8]) -> Result<NamedTempFile, std::io::Error> {
     let mut file = NamedTempFile::new_in(dir)?;
     file.write_all(content)?;

@@ -118,7 +118,7 @@ fn an_invalid_image_is_refused_in_one_line() {
             .starts_with("not a 32-bit ELF file")
     );
     let nothing = pieces(&elf(&[])).unwrap_err();
-    assert_eq!(nothing, "an ELF file without loadable segments");
+    assert_eq!(nothing, "the ELF file has no loadable segments");
     let twice = elf(&[(0, 0, &[1; 8]), (4, 4, &[2; 8])]);
     let twice = flat(&pieces(&twice).unwrap()).unwrap_err();
     assert_eq!(twice, "two segments of the image overlap at 0x00000004");
@@ -149,7 +149,7 @@ fn a_block_becomes_files_and_an_invalid_one_is_refused() {
     for (arguments, says) in [
         (
             &*format!("--board pico2 --block {}", path("short.bin")),
-            "7 bytes; a block has 392",
+            "has 7 bytes, but a block has 392",
         ),
         ("--board pico3", "one of stm32f405"),
         ("--board pico2 --block nowhere.bin", "nowhere.bin"),

@@ -28,7 +28,7 @@ pub(crate) struct Chain {
     pub(crate) loss: [f64; 2],
     /// Noise power of every receiver, W.
     pub(crate) noise_w: f64,
-    /// Required rate from Rx to Tx, as a fraction of the rate to Rx; 0 for one direction.
+    /// Required data rate from Rx to Tx, as a fraction of the data rate from Tx to Rx; 0 for one direction.
     pub(crate) reverse: f64,
     /// True if each time slot is as long as its hop needs; false if all slots are equally long.
     pub(crate) fitted: bool,
@@ -36,7 +36,7 @@ pub(crate) struct Chain {
     pub(crate) model: Model,
 }
 
-/// Number of grid points along the whole line. There are more, dense ones near Tx, Rx and the interferer.
+/// Number of equidistant grid points along the whole line. The grid has additional dense points near Tx, Rx and the interferer.
 const EVEN: usize = 171;
 
 /// Number of equal cells of the line whose edges the search tries, too, for a radio with rate steps.

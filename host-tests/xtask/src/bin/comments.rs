@@ -37,7 +37,7 @@ const EXEMPT: [&str; 0] = [];
 /// Only words that nothing else uses are in the list.
 const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
 
-/// Files that may contain old names of items: the list of them, and the table of old and new names.
+/// Files in which old names of items are allowed. They are the list of the old names, and the table of old and new names.
 const WITH_OLD_NAMES: [&str; 2] = ["host-tests/xtask/data/old_names.txt", "CHANGELOG.md"];
 
 /// Doc comment in a source file: number of its first line, from 1, and its first paragraph.

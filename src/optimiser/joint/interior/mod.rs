@@ -284,8 +284,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Stores two lengths for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. They
-    /// overwrite a hop's levels, so that they are lost when the interior-point method runs.
+    /// Stores two lengths for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. The interior-point method later
+    /// overwrites these lengths.
     pub(super) fn note(&mut self, index: u16, lengths_m: [f32; 2]) {
         if let Some(node) = self.node(index) {
             node.hop.level = lengths_m;
@@ -525,8 +525,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`, and limits the Lagrange multipliers of the hop to it. They stay within
-    /// the factor [`APART`] of their values at the optimum.
+    /// Stores the new position of relay `k`, and limits the Lagrange multipliers of the hop to relay `k`. The multipliers stay within the
+    /// factor [`APART`] of their optimal values.
     fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
         let relays = chain.mission.relays();
         if self.share > 0.0 && k <= relays {

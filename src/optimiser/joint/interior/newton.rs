@@ -32,8 +32,8 @@ const LEAST_PIVOT: f32 = 1e-6;
 /// Curvature of a coordinate whose two limits are equal. It is so large that the Newton step does not move it.
 const STIFF: f32 = 1e18;
 
-/// Equations of the Newton system for one relay, after the elimination of all relays before it. They lack the hop to
-/// the next relay.
+/// Equations of the Newton system for one relay, after the elimination of all previous relays. The hop to the next relay is still missing
+/// in them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,

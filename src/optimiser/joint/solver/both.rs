@@ -160,7 +160,7 @@ enum Work {
     Interior,
 }
 
-/// Progress of Algorithm 1 for one target. It has a pass over the relays to Rx, and a pass back to Tx.
+/// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
     /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass

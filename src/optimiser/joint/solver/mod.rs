@@ -82,7 +82,7 @@ enum Purpose {
     Start,
     /// The search raises the target as far as the current chain meets it without moves of its relays.
     Raise,
-    /// The work computes the chain's spare length at Rx again, after the cap on this length was lowered.
+    /// The chain's slack is computed again, after the cap on the slack was lowered.
     Tighten,
     /// The search finds the highest target of an improved chain, with the improvement's margins. It does not compute
     /// hops as the relays do.
@@ -121,18 +121,16 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target at which the improvement of the best chain ended, in ln(SIR). The final search for the best chain's
-    /// highest target starts there, so that the improvement is not repeated. `None` if a repetition would give
-    /// another chain.
+    /// Target, as ln(SIR), at which the improvement of the best chain ended. The last search starts from this target and need not improve
+    /// the chain again. `None` if the improvement was stopped early, because the target is then not final.
     best_judged: Option<f32>,
     /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
     /// before the end, and if the improvement was cut short.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was cut short. It is if the chain is not expected to become the
-    /// best. If true, a repetition gives the same chain, so it can be omitted.
+    /// True if the current chain's improvement ran to its end. False if it was stopped early, because the chain was not expected to become
+    /// the best one.
     is_whole: bool,
-    /// True in the last phase, which improves the best chain. Its highest target is searched more finely, and single
-    /// relays try other positions.
+    /// True in the last phase, which improves the best chain: a finer search for its highest target, and other positions of single relays.
     again: bool,
     ascent: Ascent,
     work: Work,

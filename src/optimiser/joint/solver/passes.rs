@@ -198,9 +198,8 @@ const PLAIN: u16 = 20;
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues a pass over the relays that computes only their x, for the target `sigma` = ln(SIR). Lateral offsets
-    /// and altitudes stay. Stores the chain if `kept`. Ready with the spare length at Rx, m, or with `None` if a hop
-    /// cannot meet the target.
+    /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and altitudes stay. Stores the
+    /// chain if `kept`. At the end of the pass returns the chain's slack, m, or `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &SolverContext<'_, impl Fn(u16) -> Seat>,

@@ -44,7 +44,7 @@ impl ErrorType for Pipe {
 }
 
 impl Read for Pipe {
-    /// Reads the available bytes, or waits. It needs no waker, because the bench polls every millisecond.
+    /// Reads the available bytes, or waits for bytes. No waker is needed, because the test bench polls every millisecond.
     async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.take(into) {
             0 => Poll::Pending,
@@ -55,7 +55,7 @@ impl Read for Pipe {
 }
 
 impl Write for Pipe {
-    /// Writes all bytes, unless the writer hangs. It needs no waker, because the bench polls every millisecond.
+    /// Writes all bytes; never completes if the simulated writer hangs. No waker is needed, because the test bench polls every millisecond.
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.stall_ms.get() {
             0 => Poll::Ready(()),

@@ -15,8 +15,7 @@ const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
 const SEED: u64 = 2021;
 
-/// Returns the scenario with this number, which is below [`COUNT`]. It has 1 to 100 relays; its numbers are rounded
-/// to f32.
+/// Returns the random scenario with the number `number`, below [`COUNT`]. The scenario has 1 to 100 relays; its numbers are rounded to f32.
 pub fn numbered(number: u32) -> Scenario {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     rng.set_stream(number.into());

@@ -3,7 +3,7 @@
 use super::link::StochasticLink;
 use crate::reference::link::Relay;
 
-/// Chain built from Rx back toward Tx for a target SIR, with that target.
+/// Chain of relays built from Rx back toward Tx, and the target SIR that it meets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Backward {
     /// Target SIR (linear). Every hop except the first is as long as this target allows.
