@@ -63,7 +63,7 @@ impl Page {
         request["time_s"] = json!(self.newest()["time_s"].as_f64().unwrap() - 6.0);
         let refused = self.post("/upload", &request);
         assert!(
-            refused.0 == 409 && refused.1.contains("must be at most 5 s"),
+            refused.0 == 409 && refused.1.contains("at most 5 s are allowed"),
             "{refused:?}"
         );
     }

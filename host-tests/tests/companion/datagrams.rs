@@ -151,7 +151,7 @@ fn an_unavailable_local_port_is_named() {
         (
             &own,
             [
-                "is this program's own port",
+                "is this program's own address and port",
                 "LOCAL in udp:HOST:PORT@LOCAL must differ from PORT",
             ],
         ),

@@ -263,7 +263,7 @@ fn a_running_station_uploads_and_keeps_running() {
     let (mut second, ..) = station("1", "second");
     second.line("back: relay 1 and this station receive each other");
     second.line(
-        "not flown: --version 1: must be within 3 to 65535, because the relays have version 2",
+        "not flown: --version 1: must be within 3 to 65535, because the relays have version 2 of the mission",
     );
     second.signal(Signal::TERM);
     assert_eq!(second.end().status, Some(0), "it stood on");

@@ -69,7 +69,7 @@ fn an_upload_reaches_two_relays_and_outlives_their_processes() {
             assert!(!relay.has_printed("uploaded: ") && !relay.has_printed("adopted: "));
         }
         let line = ground(&chain.files, "2", &ends).refused(1);
-        let held = "--version 2: must be within 4 to 65535, because the relays have version 3";
+        let held = "--version 2: must be within 4 to 65535, because the relays have version 3 of the mission";
         assert_eq!(line, held);
     }
 }

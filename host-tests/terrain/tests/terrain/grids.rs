@@ -224,7 +224,10 @@ fn unusable_files_and_places_are_named() {
         ),
         (
             &["a.tif", "shifted.tif"],
-            &["shifted.tif: its origin, 8.100083", "is not at a node"],
+            &[
+                "shifted.tif: its origin, 8.100083",
+                "is not at a grid point of the other file",
+            ],
         ),
     ] {
         let line = load(names);
