@@ -306,8 +306,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x, m, up to `most_m`, at which this relay receives the previous relay of the pass. The previous relay may be
-    /// anywhere up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x at which this relay receives the previous relay of the pass, m. The result is at most `most_m`. The previous
+    /// relay may be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),

@@ -10,7 +10,7 @@ use super::search::{Infeasible, Schedule, Search};
 use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 
-/// Target SIR on which the chain has agreed, and the ladder (list of targets) of the last pass that contained it.
+/// Target SIR on which the chain has agreed, and the ladder (list of targets) of the last pass.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {

@@ -225,7 +225,7 @@ impl Report {
         None
     }
 
-    /// Sets the numbers to send to the operator: the SIR, dB, and the relay's position; `None` for unknown ones.
+    /// Sets the numbers to send to the operator; `None` for unknown ones. They are the SIR, dB, and the relay's position.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),

@@ -127,7 +127,7 @@ impl Streams {
         }
     }
 
-    /// Schedules new requests for each kind of message that arrives at less than half of the requested rate.
+    /// Schedules new requests for messages that arrive at less than half of the requested rate.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         let passed = now.since(self.since);
         if passed < WINDOW {

@@ -324,7 +324,7 @@ impl Node {
         }
     }
 
-    /// Returns true on a shared channel: there a relay receives many nodes, and searches for its neighbours.
+    /// Returns true on a shared channel. There a relay receives many nodes, and searches for its neighbours.
     pub(super) fn searches(&self) -> bool {
         self.member.settings.wiring == Wiring::Shared
     }

@@ -96,7 +96,7 @@ pub(crate) struct Liveness {
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests before a reply: a measure of the channel's losses. The number starts at
+    /// Longest recent run of unanswered heartbeat requests before a reply. It is a measure of the channel's losses. The number starts at
     /// [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
 }

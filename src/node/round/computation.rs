@@ -376,7 +376,7 @@ pub(crate) enum LeaderTask {
         search: Search,
         /// True if the method of the settings ends with this search, and no other algorithm follows.
         last: bool,
-        /// True while the relays search at the configured altitudes, because the joint method's altitudes have no feasible target.
+        /// True while the relays search at the configured altitudes. Reason: the joint method's altitudes have no feasible target.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.

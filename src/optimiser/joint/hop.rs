@@ -66,7 +66,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Derivatives of a hop's end that is fixed, because it is at the x of Rx or at the farthest x of the hop. All derivatives are 0.
+    /// Derivatives of a hop's end that is fixed. The end is at the x of Rx, or at the farthest x of the hop. All derivatives are 0.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],

@@ -130,7 +130,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// True if the current chain's improvement ran to its end. False if it was stopped early, because the chain was not expected to become
     /// the best one.
     is_whole: bool,
-    /// True in the last phase, which improves the best chain: a finer search for its highest target, and other positions of single relays.
+    /// True in the last phase, which improves the best chain. This phase has a finer search for the chain's highest target, and other
+    /// positions of single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
