@@ -121,6 +121,11 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
     /// fly away.
     MayLeave,
+    /// The drone's endurance is unknown: `Relay::handle_endurance` got an invalid value, or none for 10 s.
+    ///
+    /// The last valid one counts on, less the time since. The relay does not cancel a departure meanwhile. The pilot watches the
+    /// battery. Not raised again before a valid value.
+    EnduranceUnknown,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
@@ -164,6 +169,7 @@ const POLLED_LAST: &[Event] = &[
     Event::InterfererUnclear,
     #[cfg(feature = "departures")]
     Event::MayLeave,
+    Event::EnduranceUnknown,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.

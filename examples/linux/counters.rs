@@ -31,6 +31,7 @@ pub fn counted(stats: &Stats) -> Value {
         "views": stats.views,
         "stale": stats.stale,
         "samples_rejected": stats.samples_rejected,
+        "endurance_unknown": stats.endurance_unknown,
     })
 }
 

@@ -300,6 +300,22 @@ impl Companion {
         }
     }
 
+    /// Sends a text to the operator's ground station.
+    pub(crate) fn send_text(&mut self, text: &str) {
+        self.link.send_text(text);
+    }
+
+    /// Sets the place beside the line for a drone that may leave; `None` for the relay's setpoint.
+    pub(crate) const fn set_exit(&mut self, exit: Option<Placement>) {
+        self.link.set_exit(exit);
+    }
+
+    /// Commands the autopilot to return. Returns false if the relay does not control the drone.
+    pub(crate) fn return_home(&mut self, now: Instant) -> bool {
+        self.link.return_home(now);
+        self.link.state() == State::Engaged
+    }
+
     /// Shows an event of the relay on the operator's ground station.
     pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);

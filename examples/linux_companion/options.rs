@@ -14,6 +14,7 @@ use uav_relay_scenario::endpoint::{Endpoint, FORM};
 use uav_relay_scenario::key;
 
 use crate::autopilot::{AutopilotPlan, AutopilotPort, SigningKey};
+use crate::battery::BatteryPlan;
 use uav_relay_linux::command::{self, named, number, whole};
 use uav_relay_linux::config::{self, FileOnlySettings, FileOptions, Override};
 use uav_relay_linux::log::LogOptions;
@@ -79,7 +80,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep drones apart.
-    /// With --listen a line may end with the interference measured there, in W, or in dBm with that unit
+    /// A line `endurance SECONDS` gives the remaining time of flight. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
     pub(crate) positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
@@ -101,7 +102,7 @@ pub(crate) struct Options {
     autopilot_key_file: Option<PathBuf>,
     /// Maximum speed of the drone, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
-    speed: f32,
+    pub(crate) speed: f32,
     /// Neighbour that a directional antenna points to, forward on the drone: the targets have that heading. Without it the autopilot
     /// chooses the heading
     #[arg(long, value_name = "SIDE", value_enum, requires = "autopilot")]
@@ -123,6 +124,8 @@ pub(crate) struct Options {
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
+    #[command(flatten)]
+    pub(crate) battery: BatteryOptions,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The command `clear-lost N`
     /// reports that the lost relay N has landed, so that this relay need not keep clear of it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
@@ -166,18 +169,53 @@ impl ListenOptions {
         } else {
             Listen::default()
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "1e4 to 1e18"
-        )]
-        let micros = |seconds: f32| Duration::from_micros((f64::from(seconds) * 1e6) as u64);
         self.listen.then(|| Listen {
             every: self.listen_every.map_or(default.every, micros),
             half_life: self.listen_half_life.map_or(default.half_life, micros),
             relative_error: self.listen_error.unwrap_or(default.relative_error),
         })
     }
+}
+
+/// Options of the battery: when the drone leaves the chain, and how.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Battery")]
+pub(crate) struct BatteryOptions {
+    /// Reserve of the remaining time of flight, s, 0 to 3600. The relay asks to leave the chain when the time left is the way home,
+    /// this reserve, and twelve times --dead-after-ms for the replacement
+    #[arg(long, value_name = "S", default_value_t = 180.0, allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
+    reserve: f32,
+    /// Place beside the line to which a drone flies that may leave, m to the right of its place
+    ///
+    /// -1000 to 1000, negative to the left; at least the separation away. Only for the method align. Without it the drone holds its position
+    #[arg(long, value_name = "M", requires = "autopilot", allow_negative_numbers = true, value_parser = number([-1_000.0, 1_000.0]))]
+    exit: Option<f32>,
+    /// Command to the autopilot of a drone that may leave and is clear of the line: none or rtl
+    ///
+    /// With none the pilot flies it; rtl is return and land. Set other return altitudes in each autopilot
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = Return::None, requires = "autopilot")]
+    r#return: Return,
+    /// Wait outside of the chain as a spare until the leader calls this relay. Not for relay 1, and only with --shared
+    #[arg(long, requires = "shared")]
+    pub(crate) spare: bool,
+}
+
+impl BatteryOptions {
+    pub(crate) fn plan(&self) -> BatteryPlan {
+        BatteryPlan {
+            exit_m: self.exit,
+            returns: self.r#return == Return::Rtl,
+        }
+    }
+}
+
+/// Command to the autopilot of a drone that may leave.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+enum Return {
+    /// The pilot flies the drone.
+    None,
+    /// Return to the launch position, and land there.
+    Rtl,
 }
 
 /// Direction of a directional antenna.
@@ -208,6 +246,15 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 1e18"
+)]
+fn micros(seconds: f32) -> Duration {
+    Duration::from_micros((f64::from(seconds) * 1e6) as u64)
+}
+
 /// Adds the options that the file's sections `[network]` and `[companion]` give.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
@@ -223,6 +270,10 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.value("--autopilot-baud", own.autopilot_baud);
     given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
     given.value("--speed", own.speed_m_s);
+    given.value("--reserve", own.reserve_s);
+    given.value("--exit", own.exit_m);
+    given.value("--return", own.r#return.as_ref());
+    given.flag("--spare", own.spare);
     given.path("--positions", own.positions.as_ref());
     given.value("--position-error", own.position_error_m);
     given.flag("--json", own.json);
@@ -273,8 +324,10 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         hop_time: load.hop_time(options.baud, LATENCY),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
+        reserve: micros(options.battery.reserve),
         ..Settings::default()
     };
+    check_battery(&options, &mission)?;
     let key = options.key_file.as_deref();
     let key = key.map(|file| key::load("--key-file", file));
     Ok(Plan {
@@ -290,6 +343,30 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         overrides: file_only.overrides,
         options,
     })
+}
+
+/// Checks the options of a drone that leaves, or waits as a spare.
+fn check_battery(options: &Options, mission: &Mission) -> Result<(), String> {
+    let least_m = mission.config().min_separation_m;
+    if let Some(exit_m) = options.battery.exit {
+        if options.method != Method::Align {
+            return Err(format!(
+                "--exit {exit_m}: needs --method align, with which no relay is beside or above another one"
+            ));
+        }
+        if exit_m.abs() < least_m {
+            return Err(format!(
+                "--exit {exit_m}: must be within -1000 to -{least_m} or {least_m} to 1000, at least the separation away"
+            ));
+        }
+    }
+    if options.battery.spare && options.index == mission.leader() {
+        return Err(format!(
+            "--spare: relay {} is the first leader, which cannot wait as a spare",
+            options.index
+        ));
+    }
+    Ok(())
 }
 
 fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {

@@ -7,6 +7,7 @@ use serde_json::json;
 use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, ViewRecord};
 
 use crate::autopilot::{Companion, SigningKey};
+use crate::battery::Battery;
 use crate::hold_reasons::HoldReasonLog;
 use crate::lost::Lost;
 use crate::options::Plan;
@@ -34,6 +35,7 @@ struct Flight {
     rejections: RejectionReasons,
     hold_reasons: HoldReasonLog,
     lost: Lost,
+    battery: Battery,
     signs: bool,
 }
 
@@ -78,7 +80,7 @@ impl Flight {
         let listens = plan.settings.listen.is_some();
         let positions = options.positions.as_deref();
         let positions = positions
-            .map(|path| Positions::open(path, listens))
+            .map(|path| Positions::open(path, listens, options.speed))
             .transpose()?;
         let autopilot = plan
             .autopilot
@@ -93,6 +95,9 @@ impl Flight {
         let now = service.now();
         let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now)
             .map_err(|error| error.to_string())?;
+        if options.battery.spare {
+            relay.wait_as_spare(now);
+        }
         let file = options.upload_file.as_deref();
         let resumed =
             file.is_some_and(|file| records::resume_upload(file, &plan.mission, &mut relay, &log));
@@ -139,6 +144,7 @@ impl Flight {
             rejections: RejectionReasons::default(),
             hold_reasons: HoldReasonLog::default(),
             lost: Lost::new(plan.identity.index, plan.mission.relays()),
+            battery: Battery::new(plan.options.battery.plan()),
             signs: auth.is_some(),
         })
     }
@@ -151,8 +157,12 @@ impl Flight {
         let mut drone = None;
         if let Some(positions) = &mut self.positions {
             let mut on_sample = |sample| relay.handle_sample(time, sample);
-            if let Some(place) = positions.newest(time, log, &mut on_sample) {
+            let (place, endurance_s) = positions.newest(time, log, &mut on_sample);
+            if let Some(place) = place {
                 relay.handle_position(time, place, time);
+            }
+            if let Some(left_s) = endurance_s {
+                relay.handle_endurance(time, left_s, 0.0, positions.home_s());
             }
             drone = positions.place(time);
         }
@@ -181,6 +191,8 @@ impl Flight {
             self.lost.handle_event(event);
             self.report.event(time, event, relay);
         }
+        let autopilot = self.autopilot.as_mut();
+        self.battery.tend(time, log, relay, autopilot, drone);
         let moves = self.report.log_movement(time, relay, drone);
         let uploads = self.uploads.as_mut();
         let uploads = uploads.and_then(|file| file.tend(time, log));
@@ -203,6 +215,7 @@ impl Flight {
             report,
             ports,
             lost,
+            battery,
             ..
         } = self;
         let (uploads, views) = (self.uploads.as_ref(), self.views.as_ref());
@@ -216,6 +229,7 @@ impl Flight {
                 "program_version": env!("CARGO_PKG_VERSION"),
                 "uptime_s": time.as_micros() / 1_000_000,
                 "relay": status::of_relay(relay, index, lost, |node| report.name(node)),
+                "battery": battery.status(relay, time),
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::invalid_lines),

@@ -74,6 +74,14 @@ pub struct Companion {
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
+    /// Reserve of the drone's remaining time of flight, s, 0 to 3600.
+    pub reserve_s: Option<f32>,
+    /// Distance of the place beside the line to which a drone flies that may leave, m, -1000 to 1000.
+    pub exit_m: Option<f32>,
+    /// Command to the autopilot of a drone that may leave: `none` or `rtl`.
+    pub r#return: Option<String>,
+    /// True to wait outside of the chain as a spare.
+    pub spare: Option<bool>,
     /// FIFO from which the companion reads the drone's own position. Another program writes it.
     pub positions: Option<PathBuf>,
     /// Largest reported position error of a hovering drone, m, 0 to 1000.

@@ -17,7 +17,7 @@ use crate::vehicle::{Target, axis};
 
 /// Creates the only relay of a chain, with a motion guard. The mission has the distance between the Tx and Rx of
 /// `vehicle::sites`.
-fn relay(settings: Settings) -> Relay {
+pub(crate) fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 

@@ -36,6 +36,9 @@ const COMPONENT: u8 = 191;
 /// MAVLink system number of this component until the autopilot's is known: the default of autopilots.
 const SYSTEM: u8 = 1;
 
+/// Time after which the command to return is repeated.
+const RETURN_AGAIN: Duration = Duration::from_millis(2_000);
+
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
 /// Maximum time between two targets to a PX4 that counts as on time. After a longer one the PX4 may have entered its
@@ -87,6 +90,10 @@ pub struct Autopilot {
     bearing: Option<Bearing>,
     /// Side of the neighbour that a directional antenna points to; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
+    /// Position that replaces the relay's setpoint in `exchange`; `None` for none.
+    exit: Option<Placement>,
+    /// Time to send the command to return; `None` if it is not requested.
+    return_at: Option<Instant>,
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
@@ -145,6 +152,8 @@ impl Autopilot {
             setpoint: None,
             bearing: None,
             antenna: None,
+            exit: None,
+            return_at: None,
             target: None,
             stop: None,
             blind_at: None,
@@ -319,6 +328,24 @@ impl Autopilot {
     /// [`exchange`](Self::exchange) then calls [`handle_bearing`](Self::handle_bearing) with [`Relay::bearing`].
     pub const fn point_antenna(&mut self, side: Option<Side>) {
         self.antenna = side;
+    }
+
+    /// Sets a position that [`exchange`](Self::exchange) uses in place of the relay's setpoint.
+    ///
+    /// It is for a drone that may leave ([`Event::MayLeave`]), such as a position beside the line. `None` for none.
+    pub const fn set_exit(&mut self, exit: Option<Placement>) {
+        self.exit = exit;
+    }
+
+    /// Commands the autopilot to return to its home (RTL), if the relay controls the drone.
+    ///
+    /// It is the only change of mode by this link.
+    ///
+    /// The command is repeated every 2 s until the mode changes. The autopilot chooses the altitude of the way home and lands.
+    pub fn return_home(&mut self, now: Instant) {
+        if self.state == State::Engaged && self.return_at.is_none() {
+            self.return_at = Some(self.clock.advance(now));
+        }
     }
 
     /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.
@@ -610,6 +637,12 @@ impl Autopilot {
                 return Some(self.frame(Outgoing::TimeSync { asked }));
             }
         }
+        // The pilot's next choice of a mode ends the command.
+        self.return_at = self.return_at.filter(|_| self.state == State::Engaged);
+        if self.return_at.is_some_and(|at| at <= now) {
+            self.return_at = Some(now + RETURN_AGAIN);
+            return Some(self.frame(Outgoing::ReturnToLaunch));
+        }
         if let Some(frame) = self.next_target(now) {
             return Some(frame);
         }
@@ -734,6 +767,15 @@ impl Autopilot {
         self.noise.take()
     }
 
+    /// Returns the newest remaining time of flight, its error, and the time of the way home, s.
+    ///
+    /// These are the arguments of `Relay::handle_endurance`. NaN is unknown. `None` if there is no new one since the last call, or without the feature `departures`.
+    pub fn poll_endurance(&mut self) -> Option<[f32; 3]> {
+        let [remaining_s, error_s] = self.vehicle.battery.take()?;
+        let home_s = self.vehicle.home_m(&self.axis) / self.pace.speed_m_s;
+        Some([remaining_s, error_s, home_s])
+    }
+
     /// Returns the side whose lost relays have landed by the operator's report, for `Relay::clear_lost`. `None` if
     /// there is no new report since the last call.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
@@ -762,7 +804,7 @@ impl Autopilot {
         let streams = self.streams.next_timeout(now);
         let due = [target, report, self.vehicle.next_timeout(now)]
             .into_iter()
-            .chain([recovered, self.wait_report_due()])
+            .chain([recovered, self.wait_report_due(), self.return_at])
             .chain([self.release.map(|(_, until)| until)])
             .flatten()
             .fold(self.heartbeat_at.min(streams), Instant::min);
@@ -805,7 +847,7 @@ impl Autopilot {
     /// | 1 | relay | link | line between the Tx and Rx positions of an adopted mission | the positions and the setpoint of later steps are along it |
     /// | 2 | | link | timeouts that are due by `now` | an overdue link releases the drone |
     /// | 3 | link | relay | control state | an engaged relay starts from the first position that it receives afterwards |
-    /// | 4 | link | relay | position, sample of the radio's noise, side with cleared lost relays | the relay computes its setpoint from them |
+    /// | 4 | link | relay | position, sample of the radio's noise, endurance, side with cleared lost relays | the relay computes its setpoint from them |
     /// | 5 | relay | link | readiness, hold reasons, setpoint, values for the operator | the link sends the newest ones |
     ///
     /// Call it in each turn of the main loop, after [`handle_bytes`](Self::handle_bytes) and before
@@ -871,11 +913,15 @@ impl Autopilot {
             relay.handle_sample(now, sample);
             is_news = true;
         }
+        if let Some([remaining_s, error_s, home_s]) = self.poll_endurance() {
+            relay.handle_endurance(now, remaining_s, error_s, home_s);
+            is_news = true;
+        }
         if let Some(side) = self.poll_cleared() {
             relay.clear_lost(now, side);
             is_news = true;
         }
-        let setpoint = relay.setpoint();
+        let setpoint = self.exit.or(relay.setpoint());
         self.handle_ready(now, relay.is_ready());
         let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
         self.handle_hold(now, holds);

@@ -49,10 +49,12 @@ pub(super) enum Topic {
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
+    /// Endurance of the drone: it may leave, or its battery is unknown.
+    Battery,
 }
 
 impl Topic {
-    const COUNT: usize = 7;
+    const COUNT: usize = 8;
 }
 
 /// Line of text for the operator. The text is stored in two parts, which are joined when it is sent.
@@ -104,6 +106,15 @@ impl Line {
     /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
+            Event::MayLeave => {
+                return Some(Self::warning(Topic::Battery, ["battery: leave now", ""]));
+            }
+            Event::EnduranceUnknown => {
+                return Some(Self::warning(
+                    Topic::Battery,
+                    ["battery: endurance unknown", ""],
+                ));
+            }
             Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",

@@ -35,7 +35,12 @@ struct RequestedMessage {
     is_vital: bool,
 }
 
-const REQUESTED: [RequestedMessage; 4] = [
+/// Messages that the link requests; those of the battery only with the feature `departures`.
+const REQUESTED: &[RequestedMessage] = MESSAGES
+    .split_at(if cfg!(feature = "departures") { 6 } else { 4 })
+    .0;
+
+const MESSAGES: [RequestedMessage; 6] = [
     RequestedMessage {
         id: id::GLOBAL_POSITION_INT,
         interval: Duration::from_millis(200),
@@ -54,6 +59,16 @@ const REQUESTED: [RequestedMessage; 4] = [
     RequestedMessage {
         id: id::FENCE_STATUS,
         interval: Duration::from_millis(1_000),
+        is_vital: false,
+    },
+    RequestedMessage {
+        id: id::BATTERY_STATUS,
+        interval: Duration::from_millis(1_000),
+        is_vital: false,
+    },
+    RequestedMessage {
+        id: id::HOME_POSITION,
+        interval: Duration::from_millis(2_000),
         is_vital: false,
     },
 ];

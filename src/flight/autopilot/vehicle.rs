@@ -102,6 +102,9 @@ pub(super) struct Vehicle {
     /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
     measured_at: Option<Instant>,
     position: Option<Position>,
+    /// Place to return to: HOME_POSITION, before it the first position.
+    home: Option<Geodetic>,
+    pub(super) battery: Battery,
 }
 
 impl Vehicle {
@@ -132,7 +135,11 @@ impl Vehicle {
         // A gap counts even if no timeout was handled meanwhile.
         self.review_choice(now);
         self.frame_at = Some(now);
-        let heard = self.take(now, message, axis);
+        let heard = if cfg!(feature = "departures") && self.record_battery(now, message) {
+            VehicleUpdate::StateChanged
+        } else {
+            self.take(now, message, axis)
+        };
         if found { VehicleUpdate::Found } else { heard }
     }
 
@@ -312,6 +319,50 @@ impl Vehicle {
         });
     }
 
+    /// Records the battery's state and the home. Returns true for a message about nothing else.
+    fn record_battery(&mut self, now: Instant, message: Incoming) -> bool {
+        match message {
+            Incoming::Battery {
+                battery,
+                percent,
+                remaining_s,
+            } => {
+                let is_flying = self.armed && self.in_air;
+                self.battery
+                    .record(now, battery, percent, remaining_s, is_flying);
+                true
+            }
+            Incoming::Home { at } => {
+                self.home = Some(at).filter(|at| at.is_valid()).or(self.home);
+                true
+            }
+            Incoming::GlobalPosition {
+                lat_e7,
+                lon_e7,
+                amsl_mm,
+                ..
+            } if self.home.is_none() && (lat_e7, lon_e7) != (0, 0) => {
+                self.home = Some(Geodetic {
+                    lat_e7,
+                    lon_e7,
+                    amsl_mm,
+                });
+                false
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns the length of the way home, m; NaN while a position is unknown or far from the line.
+    pub(super) fn home_m(&self, axis: &Axis) -> f32 {
+        let home = self.home.and_then(|home| axis.place(home));
+        let position = self.position.map(|position| position.place);
+        position.zip(home).map_or(f32::NAN, |(from, to)| {
+            let level_m = libm::hypotf(from.x_m - to.x_m, from.y_m - to.y_m);
+            level_m + (from.altitude_m - to.altitude_m).abs()
+        })
+    }
+
     pub(super) fn address(&self) -> Option<Address> {
         self.known.map(|(address, _)| address)
     }
@@ -354,6 +405,117 @@ impl Vehicle {
             .filter(|at| *at > now)
             .min()
     }
+}
+
+/// Age of a BATTERY_STATUS from which on SYS_STATUS counts instead.
+const NO_DETAILS: Duration = Duration::from_millis(10_000);
+
+/// Minimum time between two steps of the percentage for an estimate.
+const SLOPE: Duration = Duration::from_millis(60_000);
+/// Time without an estimate after which a percentage alone counts as unknown.
+const LEARNING: Duration = Duration::from_millis(180_000);
+
+/// Relative error of a remaining time.
+const TIME_ERROR: f32 = 0.1;
+
+/// Rise of the percentage that restarts the estimate.
+const RISE: i8 = 5;
+/// Fall of the percentage in one message that must be repeated before it counts.
+const FALL: i8 = 20;
+
+/// Endurance by the battery's messages. The time that the autopilot reports counts; without one, the slope of the
+/// percentage in flight between two of its steps, at least 60 s and up to 240 s apart.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Battery {
+    detailed_at: Option<Instant>,
+    /// Time of the first percentage of this flight.
+    since: Option<Instant>,
+    lowest: i8,
+    /// True if the last percentage was too low to be believed at once.
+    fell: bool,
+    /// Steps of the percentage: start of the slope, start of the next slope, newest.
+    steps: Option<[(Instant, f32); 3]>,
+    /// Remaining time and its error, s, NaN if unknown; `None` once the link has taken it.
+    newest: Option<[f32; 2]>,
+}
+
+impl Battery {
+    fn record(
+        &mut self,
+        now: Instant,
+        battery: Option<u8>,
+        percent: i8,
+        remaining_s: i32,
+        is_flying: bool,
+    ) {
+        let is_detailed = |at| now.since(at) < NO_DETAILS;
+        match battery {
+            Some(0) => self.detailed_at = Some(now),
+            None if !self.detailed_at.is_some_and(is_detailed) => {}
+            _ => return,
+        }
+        let newest = if remaining_s > 0 {
+            #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
+            let time_s = remaining_s as f32;
+            Some([time_s, TIME_ERROR * time_s])
+        } else if !(0..=100).contains(&percent) {
+            Some([f32::NAN; 2])
+        } else if is_flying {
+            self.estimate(now, percent)
+        } else {
+            (self.since, self.steps) = (None, None);
+            None
+        };
+        self.newest = newest.or(self.newest);
+    }
+
+    /// Returns the endurance by the slope of the percentage; `None` while it is too early to tell.
+    fn estimate(&mut self, now: Instant, percent: i8) -> Option<[f32; 2]> {
+        let since = *self.since.get_or_insert_with(|| {
+            self.lowest = percent;
+            now
+        });
+        let fell = percent < self.lowest.saturating_sub(FALL);
+        if fell && !core::mem::replace(&mut self.fell, fell) {
+            return None;
+        }
+        self.fell = false;
+        if percent > self.lowest.saturating_add(RISE) {
+            (self.since, self.steps) = (None, None);
+            return Some([f32::NAN; 2]);
+        }
+        if percent < self.lowest {
+            self.lowest = percent;
+            let step = (now, f32::from(percent));
+            let [start, middle, _] = self.steps.unwrap_or([step; 3]);
+            self.steps = Some(if now.since(middle.0) >= SLOPE.times(2) {
+                [middle, step, step]
+            } else {
+                [start, middle, step]
+            });
+        }
+        if self.lowest == 0 {
+            return Some([0.0, 0.0]);
+        }
+        let [start, _, last] = self.steps.unwrap_or([(now, 0.0); 3]);
+        let span = last.0.since(start.0);
+        if span < SLOPE {
+            return (now.since(since) >= LEARNING).then_some([f32::NAN; 2]);
+        }
+        let steps = start.1 - last.1;
+        let left_s = last.1 / steps * seconds(span) - seconds(now.since(last.0));
+        let left_s = left_s.max(0.0);
+        Some([left_s, left_s * (TIME_ERROR + 0.5 / steps)])
+    }
+
+    pub(super) const fn take(&mut self) -> Option<[f32; 2]> {
+        self.newest.take()
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "some hours at most")]
+fn seconds(span: Duration) -> f32 {
+    span.as_micros() as f32 / 1e6
 }
 
 /// True if this crate was built with the feature `sensing`.

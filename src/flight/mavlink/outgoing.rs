@@ -41,6 +41,8 @@ pub enum Outgoing<'a> {
         /// Interval requested between two of these messages, µs.
         interval_us: u32,
     },
+    /// COMMAND_LONG 20, NAV_RETURN_TO_LAUNCH: returns home and lands there.
+    ReturnToLaunch,
     /// COMMAND_ACK: reply to a command.
     CommandAck {
         /// Value of `MAV_CMD`, the number of the command.
@@ -97,12 +99,13 @@ mod mask {
 const FRAME_AMSL: u8 = 5;
 
 pub(in crate::flight) const SET_MESSAGE_INTERVAL: u16 = 511;
+const RETURN_TO_LAUNCH: u16 = 20;
 
 impl Outgoing<'_> {
     const fn id(&self) -> u32 {
         match self {
             Self::Heartbeat => id::HEARTBEAT,
-            Self::SetMessageInterval { .. } => id::COMMAND_LONG,
+            Self::SetMessageInterval { .. } | Self::ReturnToLaunch => id::COMMAND_LONG,
             Self::CommandAck { .. } => id::COMMAND_ACK,
             Self::SetPosition { .. } => id::SET_POSITION_TARGET_GLOBAL_INT,
             Self::TimeSync { .. } => id::TIMESYNC,
@@ -152,6 +155,11 @@ impl Outgoing<'_> {
                 }
                 to_frame.bytes(&[0; 20]);
                 to_frame.bytes(&SET_MESSAGE_INTERVAL.to_le_bytes());
+                to_frame.bytes(&[to.system, to.component, 0]);
+            }
+            Self::ReturnToLaunch => {
+                to_frame.bytes(&[0; 28]);
+                to_frame.bytes(&RETURN_TO_LAUNCH.to_le_bytes());
                 to_frame.bytes(&[to.system, to.component, 0]);
             }
             Self::CommandAck {

@@ -145,7 +145,7 @@ impl Node {
         }
     }
 
-    pub(super) fn raise(&mut self, event: Event) {
+    pub(crate) fn raise(&mut self, event: Event) {
         self.telemetry.events.raise(event);
     }
 
@@ -279,6 +279,11 @@ impl Node {
 
     pub(crate) const fn stats(&self) -> &Stats {
         &self.telemetry.stats
+    }
+
+    /// Returns true if this relay is outside of the chain, because it leaves or waits as a spare.
+    pub(crate) const fn is_outside(&self) -> bool {
+        self.layers.leaving.is_outside()
     }
 
     pub(crate) const fn stats_mut(&mut self) -> &mut Stats {

@@ -45,6 +45,10 @@ impl Layers {
 }
 
 impl Node {
+    pub(crate) const fn leave(&self, _: Instant, _: Option<u16>) {}
+
+    pub(crate) const fn stay(&self, _: Instant) {}
+
     pub(super) const fn return_if_expired(&self, _: Instant) {}
 
     pub(super) const fn frees(&self, _: Side, _: u16) -> bool {
