@@ -121,10 +121,10 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
     /// fly away.
     MayLeave,
-    /// The drone's endurance is unknown: `Relay::handle_endurance` got an invalid value, or none for 10 s.
+    /// The drone's endurance is unknown: an invalid value, none for 10 s, or none when the relay takes control.
     ///
-    /// The last valid one counts on, less the time since. The relay does not cancel a departure meanwhile. The pilot watches the
-    /// battery. Not raised again before a valid value.
+    /// The last valid value counts down (`Relay::handle_endurance`). Without any the relay does not leave by itself: the pilot watches
+    /// the battery. Not raised again before a valid value.
     EnduranceUnknown,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
@@ -169,6 +169,7 @@ const POLLED_LAST: &[Event] = &[
     Event::InterfererUnclear,
     #[cfg(feature = "departures")]
     Event::MayLeave,
+    #[cfg(feature = "departures")]
     Event::EnduranceUnknown,
 ];
 

@@ -57,8 +57,6 @@ pub struct Stats {
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or while this relay measures nothing.
     pub samples_rejected: u32,
-    /// Losses of the drone's endurance: invalid values, and ends of valid ones (`Relay::handle_endurance`).
-    pub endurance_unknown: u32,
 }
 
 impl Stats {

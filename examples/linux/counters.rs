@@ -31,7 +31,6 @@ pub fn counted(stats: &Stats) -> Value {
         "views": stats.views,
         "stale": stats.stale,
         "samples_rejected": stats.samples_rejected,
-        "endurance_unknown": stats.endurance_unknown,
     })
 }
 

@@ -1,10 +1,14 @@
 //! Endurance of the drone, and the departure that it causes.
 //!
-//! | state | event | action |
-//! | --- | --- | --- |
-//! | known | invalid value, or none for [`STALE`] | raise `EnduranceUnknown`; the last value counts on |
-//! | any | time left before the way home and the reserve at most that of a replacement, for [`HOLD`] | leave the chain |
-//! | departure requested by this | time left more than [`HYSTERESIS`] longer, and known, for [`HOLD`], still in the chain | stay |
+//! The margin is the remaining time of flight less the time of the way home.
+//!
+//! | event | action |
+//! | --- | --- |
+//! | invalid value; no valid one for [`STALE`]; setpoint control without any | raise `EnduranceUnknown` once; the last valid one counts down |
+//! | margin below the limit: for [`HOLD`], or at once before the relay has taken part in anything | request to leave |
+//! | `Relay::stay` | lower the limit to half of the present margin |
+//! | `Relay::leave` | restore the limit |
+//! | drone on the ground | forget the endurance and the lower limit |
 
 use super::Relay;
 use crate::event::Event;
@@ -14,45 +18,26 @@ use crate::time::{Duration, Instant};
 
 /// Age at which the last value is too old.
 const STALE: Duration = Duration::from_millis(10_000);
-/// Time for which the limit must be crossed before the relay requests to leave, or cancels that.
+/// Time for which the margin must be below the limit before a member requests to leave.
 const HOLD: Duration = Duration::from_millis(5_000);
-/// Distance from the limit at which the relay cancels its request to leave.
-const HYSTERESIS: Duration = Duration::from_millis(60_000);
-/// Maximum time of a replacement, in units of `dead_after`.
-///
-/// It is 8 until the order, and 4 until the view without the relay is in place.
+/// Time after the margin has reached the reserve at which the pilot is told to leave in any case.
+const LAST: Duration = Duration::from_millis(10_000);
+/// Maximum time of a replacement, in units of `dead_after`: 8 until the order, 4 until the view without the relay is in place.
 const REPLACEMENT: u32 = 12;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Endurance {
-    /// Latest known end of the flight, less its error, and time of the way home; `None` at first.
+    /// Last known end of the flight, and the time of the way home; `None` before a valid value.
     end: Option<(Instant, Duration)>,
     /// Time of the last value; `None` if it was invalid or is too old, and before any.
     known_at: Option<Instant>,
-    /// True if the last value was invalid or is too old.
+    /// True from `EnduranceUnknown` to the next valid value.
     is_lost: bool,
-    /// True from the departure that this state has requested until its end.
-    leaves: bool,
-    /// True from the firmware's own request to leave until `Relay::stay`.
-    is_manual: bool,
-    /// Time since which `leaves` should have the other value.
-    differs_since: Option<Instant>,
-}
-
-impl Endurance {
-    pub(super) const UNKNOWN: Self = Self {
-        end: None,
-        known_at: None,
-        is_lost: false,
-        leaves: false,
-        is_manual: false,
-        differs_since: None,
-    };
-
-    /// Returns the endurance less its error; `None` before a valid value.
-    fn remaining(&self, now: Instant) -> Option<Duration> {
-        self.end.map(|(end, _)| end.since(now))
-    }
+    losses: u32,
+    /// Limit of the margin since `Relay::stay`; `None` for the usual one.
+    limit: Option<Duration>,
+    /// Time since which the margin is below the limit.
+    low_since: Option<Instant>,
 }
 
 /// Returns `seconds` as a duration within 0 to a day.
@@ -66,24 +51,19 @@ fn duration(seconds: f32) -> Duration {
     Duration::from_millis(millis)
 }
 
-/// Returns a duration of at most a few days in whole seconds, at most 65 534.
+/// Returns a duration in whole seconds, at most 65 534: the maximum is the mark of an unknown one.
 fn seconds(span: Duration) -> u16 {
     u16::try_from(span.as_micros() / 1_000_000).map_or(u16::MAX - 1, |s| s.min(u16::MAX - 1))
 }
 
 impl Relay {
-    /// Records the drone's remaining endurance; requests to leave the chain when it is short.
+    /// Records the drone's remaining time of flight and the time of its way home, s; needs the feature `departures`.
     ///
-    /// Needs the feature `departures`.
+    /// The time of flight is the least likely one. Any value that is not finite or is negative, such as NaN for an unknown one, and a
+    /// pause of 10 s make the endurance unknown ([`Event::EnduranceUnknown`](crate::Event::EnduranceUnknown)): the last valid one counts down.
     ///
-    /// `remaining_s` is the time of flight left, s, with an error of up to `error_s`; `home_s` is the time of the way home, s. Each
-    /// is finite and not negative; any other value, such as NaN for an unknown one, makes the endurance unknown
-    /// ([`Event::EnduranceUnknown`](crate::Event::EnduranceUnknown)). So does a pause of 10 s. An unknown endurance is never a full battery: the
-    /// last valid one counts on, less the time since.
-    ///
-    /// The relay calls [`leave`](Self::leave) by itself once the endurance less the error has been at most
-    /// [`endurance_limit_s`](Self::endurance_limit_s) for 5 s, and [`stay`](Self::stay) if it is a minute above that for 5 s
-    /// before the relay is outside of the chain. Takes constant time.
+    /// The relay calls [`leave`](Self::leave) by itself once the endurance has been below [`endurance_limit_s`](Self::endurance_limit_s) for
+    /// 5 s; as a spare, or before it has taken part in anything, at once. It never cancels that. Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -91,114 +71,119 @@ impl Relay {
     /// use uav_relay::{Instant, Settings};
     ///
     /// let mut relay = relay(Settings::default());
-    /// relay.handle_endurance(Instant::from_millis(1_000), 900.0, 45.0, 60.0);
+    /// relay.handle_endurance(Instant::from_millis(1_000), 900.0, 60.0);
     /// # #[cfg(feature = "departures")]
-    /// assert_eq!(relay.endurance_s(Instant::from_millis(6_000)), Some(850));
+    /// assert_eq!(relay.endurance_s(Instant::from_millis(6_000)), Some(895));
     /// // The way home, 3 min of reserve, and 3 min for the replacement.
     /// # #[cfg(feature = "departures")]
     /// assert_eq!(relay.endurance_limit_s(), Some(420));
     /// ```
-    pub fn handle_endurance(&mut self, now: Instant, remaining_s: f32, error_s: f32, home_s: f32) {
+    pub fn handle_endurance(&mut self, now: Instant, remaining_s: f32, home_s: f32) {
         let now = self.clock.advance(now);
-        let Some(endurance) = self.endurance.first_mut() else {
-            return;
-        };
-        let values = [remaining_s, error_s, home_s];
-        if values
-            .into_iter()
-            .all(|value| value.is_finite() && value >= 0.0)
-        {
-            endurance.end = Some((now + duration(remaining_s - error_s), duration(home_s)));
+        let is_valid = |value: f32| value.is_finite() && value >= 0.0;
+        if !is_valid(remaining_s) || !is_valid(home_s) {
+            self.lose_endurance();
+        } else if let Some(endurance) = self.endurance.first_mut() {
+            endurance.end = Some((now + duration(remaining_s), duration(home_s)));
             endurance.known_at = Some(now);
             endurance.is_lost = false;
-        } else {
-            self.lose_endurance();
         }
         self.review_endurance(now);
-        if self.endurance.first().is_some_and(|it| it.leaves) {
-            self.leave_by_endurance(now);
-        }
     }
 
-    /// Returns the remaining endurance less its error, s; `None` while it is unknown. Takes constant time.
+    /// Returns the remaining time of flight, s; `None` while it is unknown. Takes constant time.
     pub fn endurance_s(&self, now: Instant) -> Option<u16> {
-        let endurance = self.endurance.first()?;
-        endurance.known_at?;
-        endurance.remaining(self.clock.internal(now)).map(seconds)
+        let Endurance { end, known_at, .. } = self.endurance.first()?;
+        let now = self.clock.internal(now);
+        known_at.filter(|at| now.since(*at) < STALE)?;
+        end.map(|(end, _)| seconds(end.since(now)))
     }
 
-    /// Returns the endurance at which the relay requests to leave, s; `None` before a valid value. Takes constant time.
+    /// Returns the endurance below which the relay requests to leave, s; `None` before a valid value.
     ///
-    /// It is the time of the way home, the reserve ([`Settings::reserve`](crate::Settings::reserve)), and that of a
-    /// replacement: twelve times `dead_after`, and `respacing`.
+    /// It is the time of the way home, [`Settings::reserve`](crate::Settings::reserve), twelve times `dead_after` for the replacement, and
+    /// `respacing`; after [`stay`](Self::stay) at most the way home and half of what was left beyond it. Takes constant time.
     pub fn endurance_limit_s(&self) -> Option<u16> {
         let (_, home) = self.endurance.first()?.end?;
-        Some(seconds(self.endurance_limit(home)))
+        let limit = Instant::ZERO + home + self.margin_limit();
+        Some(seconds(limit.since(Instant::ZERO)))
     }
 
-    fn endurance_limit(&self, home: Duration) -> Duration {
+    /// Returns the number of times that the endurance became unknown.
+    pub fn endurance_losses(&self) -> u32 {
+        self.endurance.first().map_or(0, |it| it.losses)
+    }
+
+    fn margin(&self, now: Instant) -> Option<Duration> {
+        let (end, home) = self.endurance.first()?.end?;
+        Some(end.since(now + home))
+    }
+
+    fn margin_limit(&self) -> Duration {
         let settings = &self.node.member().settings;
         let replacement = settings.dead_after.times(REPLACEMENT);
-        let sum = Instant::ZERO + home + settings.reserve + replacement;
-        (sum + Leaving::respacing(settings)).since(Instant::ZERO)
+        let usual = Instant::ZERO + settings.reserve + replacement + Leaving::respacing(settings);
+        let usual = usual.since(Instant::ZERO);
+        let lower = self.endurance.first().and_then(|it| it.limit);
+        lower.map_or(usual, |lower| lower.min(usual))
     }
 
-    /// Records if the firmware itself has requested to leave.
-    pub(super) fn set_manual(&mut self, is_manual: bool) {
+    /// Returns true if the pilot has to fly home: the drone may leave, or has requested it and is at its reserve for [`LAST`].
+    pub(crate) fn must_leave(&self, now: Instant) -> bool {
+        let reserve = Instant::ZERO + self.node.member().settings.reserve;
+        let last = reserve.since(Instant::ZERO + LAST);
+        let margin = self.margin(self.clock.internal(now));
+        let is_last = margin.is_some_and(|margin| margin <= last);
+        self.node.is_free() || self.node.is_leaving() && is_last
+    }
+
+    /// Forgets the endurance of a drone on the ground. A departure goes on.
+    pub(crate) fn reset_endurance(&mut self) {
         if let Some(endurance) = self.endurance.first_mut() {
-            endurance.is_manual = is_manual;
+            *endurance = Endurance {
+                losses: endurance.losses,
+                ..Endurance::default()
+            };
         }
     }
 
-    fn lose_endurance(&mut self) {
+    /// Records an order of the firmware: after `stay` half of the present margin has to pass before the next request to leave.
+    pub(super) fn override_endurance(&mut self, now: Instant, stays: bool) {
+        let margin = self.margin(now).unwrap_or_else(|| self.margin_limit());
+        if let Some(endurance) = self.endurance.first_mut() {
+            endurance.limit = stays.then_some(Duration::from_micros(margin.as_micros() / 2));
+            endurance.low_since = None;
+        }
+    }
+
+    /// Reports an endurance that is unknown, once until the next valid value.
+    pub(super) fn lose_endurance(&mut self) {
         if let Some(endurance) = self.endurance.first_mut() {
             endurance.known_at = None;
             if !core::mem::replace(&mut endurance.is_lost, true) {
-                bump(&mut self.node.stats_mut().endurance_unknown);
+                bump(&mut endurance.losses);
                 self.node.raise(Event::EnduranceUnknown);
             }
         }
     }
 
-    /// Requests to leave. The endurance for the leader ends when the drone must be on its way home with its reserve.
-    fn leave_by_endurance(&mut self, now: Instant) {
-        let reserve = self.node.member().settings.reserve;
-        if let Some((end, home)) = self.endurance.first().and_then(|it| it.end) {
-            let left = end.since(now + home + reserve);
-            self.node.leave(now, Some(seconds(left)));
-        }
-    }
-
-    /// Compares the endurance with the limit; requests to leave, or cancels that.
+    /// Compares the endurance with the limit; requests to leave, or renews the request's endurance for the leader.
     pub(super) fn review_endurance(&mut self, now: Instant) {
-        let Some(Endurance { end, known_at, .. }) = self.endurance.first().copied() else {
-            return;
-        };
+        let known_at = self.endurance.first().and_then(|it| it.known_at);
         if known_at.is_some_and(|at| now.since(at) >= STALE) {
             self.lose_endurance();
         }
-        let limit = end.map(|(_, home)| self.endurance_limit(home));
-        let is_outside = self.node.is_outside();
-        let Some((endurance, limit)) = self.endurance.first_mut().zip(limit) else {
+        let (limit, reserve) = (self.margin_limit(), self.node.member().settings.reserve);
+        let (Some(margin), Some(endurance)) = (self.margin(now), self.endurance.first_mut()) else {
             return;
         };
-        let left = endurance.remaining(now).unwrap_or_default();
-        let wants = if endurance.leaves {
-            let is_fixed = is_outside || endurance.is_manual || endurance.known_at.is_none();
-            is_fixed || Instant::ZERO + left <= Instant::ZERO + limit + HYSTERESIS
-        } else {
-            left <= limit
-        };
-        if wants == endurance.leaves {
-            endurance.differs_since = None;
-        } else if now.since(*endurance.differs_since.get_or_insert(now)) >= HOLD {
-            endurance.leaves = wants;
-            endurance.differs_since = None;
-            if wants {
-                self.leave_by_endurance(now);
-            } else {
-                self.node.stay(now);
-            }
+        let low_since = endurance.low_since.unwrap_or(now);
+        endurance.low_since = (margin < limit).then_some(low_since);
+        let is_due = !self.node.has_joined() || now.since(low_since) >= HOLD;
+        if self.node.is_leaving() || margin < limit && is_due {
+            // The leader's order is due before the reserve is used.
+            let left = (Instant::ZERO + margin).since(Instant::ZERO + reserve);
+            self.node.leave(now, Some(seconds(left)));
         }
     }
 
@@ -206,12 +191,14 @@ impl Relay {
     pub(super) fn endurance_timeout(&self) -> Option<Instant> {
         let endurance = self.endurance.first()?;
         let (end, home) = endurance.end?;
-        let limit = self.endurance_limit(home);
-        let low_at = Instant::from_micros(end.as_micros().saturating_sub(limit.as_micros()));
-        let is_high = !endurance.leaves && endurance.differs_since.is_none();
-        let low_at = Some(low_at).filter(|_| is_high);
+        let limit = self.margin_limit();
+        let early = (Instant::ZERO + home + limit).as_micros();
+        // One microsecond later the margin is below the limit, which it cannot be if that is 0.
+        let low_at = Instant::from_micros(end.as_micros().saturating_sub(early) + 1);
+        let leave_at = endurance.low_since.map_or(low_at, |at| at + HOLD);
+        let is_pending = !self.node.is_leaving() && limit > Duration::default();
         let stale_at = endurance.known_at.map(|at| at + STALE);
-        let switch_at = endurance.differs_since.map(|at| at + HOLD);
-        [low_at, stale_at, switch_at].into_iter().flatten().min()
+        let leave_at = Some(leave_at).filter(|_| is_pending);
+        [leave_at, stale_at].into_iter().flatten().min()
     }
 }

@@ -149,7 +149,7 @@ impl Relay {
             endpoint: Endpoint::new(identity.network, identity.index),
             deframers: [Deframer::new(), Deframer::new()],
             clock: MonotonicClock::new(now),
-            endurance: [Endurance::UNKNOWN; cfg!(feature = "departures") as usize],
+            endurance: [Endurance::default(); cfg!(feature = "departures") as usize],
         }
     }
 
@@ -715,6 +715,9 @@ impl Relay {
     ///
     /// Returns true if that is a change for the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
+        if flown && self.endurance_s(now).is_none() {
+            self.lose_endurance();
+        }
         self.node.handle_control(self.clock.advance(now), flown)
     }
 
@@ -747,7 +750,7 @@ impl Relay {
     /// ```
     pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
         let now = self.clock.advance(now);
-        self.set_manual(true);
+        self.override_endurance(now, false);
         self.node.leave(now, endurance_s);
     }
 
@@ -762,9 +765,12 @@ impl Relay {
     }
 
     /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
+    ///
+    /// The relay then requests to leave only by [`leave`](Self::leave), or once half of the remaining time of flight beyond the way home
+    /// has passed (`handle_endurance`).
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
-        self.set_manual(false);
+        self.override_endurance(now, true);
         self.node.stay(now);
     }
 

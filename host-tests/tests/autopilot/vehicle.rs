@@ -44,8 +44,6 @@ pub(crate) enum LinkMessage {
     Interval {
         id: u32,
     },
-    /// Command to return to launch.
-    Return,
     Target(Target),
     Text(String),
     Value {
@@ -408,13 +406,6 @@ impl Vehicle {
         self.systems.push(header.system_id as u8);
         let said = match message {
             MavMessage::HEARTBEAT(_) => LinkMessage::Heartbeat,
-            MavMessage::COMMAND_LONG(command) if command.command as u32 == 20 => {
-                assert_eq!(
-                    (command.target_system, command.target_component),
-                    (SYSTEM, 1)
-                );
-                LinkMessage::Return
-            }
             MavMessage::COMMAND_LONG(command) => {
                 assert_eq!(command.command as u32, 511);
                 if !self.mute {

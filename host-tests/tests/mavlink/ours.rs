@@ -14,7 +14,7 @@ const EACH: usize = 200;
 
 fn messages() -> Vec<Outgoing<'static>> {
     let mut rng = rng(1);
-    let mut all = vec![Outgoing::Heartbeat, Outgoing::ReturnToLaunch];
+    let mut all = vec![Outgoing::Heartbeat];
     for _ in 0..EACH {
         all.push(Outgoing::SetMessageInterval {
             id: rng.random_range(0..1000),
@@ -136,20 +136,6 @@ fn pymavlink_reads_every_field_of_our_messages() {
                     [id as f32, interval_us as f32, 0.0, 0.0, 0.0, 0.0, 0.0]
                 );
             }
-            Outgoing::ReturnToLaunch => {
-                assert_eq!(kind, "COMMAND_LONG");
-                let said = [
-                    "command",
-                    "target_system",
-                    "target_component",
-                    "confirmation",
-                ]
-                .map(integer);
-                assert_eq!(said, [20, 7, 1, 0]);
-                for i in 1..=7 {
-                    assert_eq!(float(&format!("param{i}")), 0.0);
-                }
-            }
             Outgoing::CommandAck {
                 command,
                 result,
@@ -253,10 +239,6 @@ fn the_mavlink_crate_reads_every_field_of_our_messages() {
             ) => {
                 assert_eq!(said.command as u32, u32::from(command));
                 assert_eq!(said.result as u32, u32::from(result));
-            }
-            (Outgoing::ReturnToLaunch, MavMessage::COMMAND_LONG(said)) => {
-                assert_eq!(said.command as u32, 20);
-                assert_eq!((said.target_system, said.target_component), (7, 1));
             }
             (Outgoing::SetMessageInterval { id, interval_us }, MavMessage::COMMAND_LONG(said)) => {
                 assert_eq!(said.command as u32, 511);

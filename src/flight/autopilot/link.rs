@@ -36,9 +36,6 @@ const COMPONENT: u8 = 191;
 /// MAVLink system number of this component until the autopilot's is known: the default of autopilots.
 const SYSTEM: u8 = 1;
 
-/// Time after which the command to return is repeated.
-const RETURN_AGAIN: Duration = Duration::from_millis(2_000);
-
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
 /// Maximum time between two targets to a PX4 that counts as on time. After a longer one the PX4 may have entered its
@@ -90,10 +87,6 @@ pub struct Autopilot {
     bearing: Option<Bearing>,
     /// Side of the neighbour that a directional antenna points to; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
-    /// Position that replaces the relay's setpoint in `exchange`; `None` for none.
-    exit: Option<Placement>,
-    /// Time to send the command to return; `None` if it is not requested.
-    return_at: Option<Instant>,
     target: Option<Target>,
     /// Position where the moving target stops after the setpoint was withdrawn.
     stop: Option<Placement>,
@@ -152,8 +145,6 @@ impl Autopilot {
             setpoint: None,
             bearing: None,
             antenna: None,
-            exit: None,
-            return_at: None,
             target: None,
             stop: None,
             blind_at: None,
@@ -330,22 +321,12 @@ impl Autopilot {
         self.antenna = side;
     }
 
-    /// Sets a position that [`exchange`](Self::exchange) uses in place of the relay's setpoint.
+    /// Sets the time of flight with a full battery, s, and the mean speed of the descent to land, m/s.
     ///
-    /// It is for a drone that may leave ([`Event::MayLeave`]), such as a position beside the line. `None` for none.
-    pub const fn set_exit(&mut self, exit: Option<Placement>) {
-        self.exit = exit;
-    }
-
-    /// Commands the autopilot to return to its home (RTL), if the relay controls the drone.
-    ///
-    /// It is the only change of mode by this link.
-    ///
-    /// The command is repeated every 2 s until the mode changes. The autopilot chooses the altitude of the way home and lands.
-    pub fn return_home(&mut self, now: Instant) {
-        if self.state == State::Engaged && self.return_at.is_none() {
-            self.return_at = Some(self.clock.advance(now));
-        }
+    /// At first they are NaN (unknown: a percentage without a remaining time says nothing) and 1.5. The speed is clamped to 0.1 to 20.
+    pub const fn set_endurance(&mut self, full_s: f32, descent_m_s: f32) {
+        self.vehicle.battery.full_s = full_s;
+        self.vehicle.battery.descent_m_s = descent_m_s.clamp(0.1, 20.0);
     }
 
     /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.
@@ -637,12 +618,6 @@ impl Autopilot {
                 return Some(self.frame(Outgoing::TimeSync { asked }));
             }
         }
-        // The pilot's next choice of a mode ends the command.
-        self.return_at = self.return_at.filter(|_| self.state == State::Engaged);
-        if self.return_at.is_some_and(|at| at <= now) {
-            self.return_at = Some(now + RETURN_AGAIN);
-            return Some(self.frame(Outgoing::ReturnToLaunch));
-        }
         if let Some(frame) = self.next_target(now) {
             return Some(frame);
         }
@@ -767,15 +742,6 @@ impl Autopilot {
         self.noise.take()
     }
 
-    /// Returns the newest remaining time of flight, its error, and the time of the way home, s.
-    ///
-    /// These are the arguments of `Relay::handle_endurance`. NaN is unknown. `None` if there is no new one since the last call, or without the feature `departures`.
-    pub fn poll_endurance(&mut self) -> Option<[f32; 3]> {
-        let [remaining_s, error_s] = self.vehicle.battery.take()?;
-        let home_s = self.vehicle.home_m(&self.axis) / self.pace.speed_m_s;
-        Some([remaining_s, error_s, home_s])
-    }
-
     /// Returns the side whose lost relays have landed by the operator's report, for `Relay::clear_lost`. `None` if
     /// there is no new report since the last call.
     pub const fn poll_cleared(&mut self) -> Option<Side> {
@@ -804,7 +770,7 @@ impl Autopilot {
         let streams = self.streams.next_timeout(now);
         let due = [target, report, self.vehicle.next_timeout(now)]
             .into_iter()
-            .chain([recovered, self.wait_report_due(), self.return_at])
+            .chain([recovered, self.wait_report_due()])
             .chain([self.release.map(|(_, until)| until)])
             .flatten()
             .fold(self.heartbeat_at.min(streams), Instant::min);
@@ -848,7 +814,7 @@ impl Autopilot {
     /// | 2 | | link | timeouts that are due by `now` | an overdue link releases the drone |
     /// | 3 | link | relay | control state | an engaged relay starts from the first position that it receives afterwards |
     /// | 4 | link | relay | position, sample of the radio's noise, endurance, side with cleared lost relays | the relay computes its setpoint from them |
-    /// | 5 | relay | link | readiness, hold reasons, setpoint, values for the operator | the link sends the newest ones |
+    /// | 5 | relay | link | readiness, hold reasons, end of the endurance, setpoint, values for the operator | the link sends the newest ones |
     ///
     /// Call it in each turn of the main loop, after [`handle_bytes`](Self::handle_bytes) and before
     /// [`poll_transmit`](Self::poll_transmit). The relay sends the position in the same turn if its ports are served afterwards. A loop
@@ -913,18 +879,25 @@ impl Autopilot {
             relay.handle_sample(now, sample);
             is_news = true;
         }
-        if let Some([remaining_s, error_s, home_s]) = self.poll_endurance() {
-            relay.handle_endurance(now, remaining_s, error_s, home_s);
+        if self.state == State::Grounded {
+            relay.reset_endurance();
+        }
+        let speed_m_s = self.pace.speed_m_s;
+        if let Some([remaining_s, home_s]) = self.vehicle.take_endurance(&self.axis, speed_m_s) {
+            relay.handle_endurance(now, remaining_s, home_s);
             is_news = true;
         }
         if let Some(side) = self.poll_cleared() {
             relay.clear_lost(now, side);
             is_news = true;
         }
-        let setpoint = self.exit.or(relay.setpoint());
+        let setpoint = relay.setpoint();
         self.handle_ready(now, relay.is_ready());
         let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
         self.handle_hold(now, holds);
+        if self.is_flown() && relay.must_leave(now) {
+            self.report.queue_line(Line::LEAVE);
+        }
         self.handle_setpoint(now, setpoint);
         if let Some(side) = self.antenna {
             self.handle_bearing(relay.bearing(side));

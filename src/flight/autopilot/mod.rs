@@ -11,7 +11,7 @@
 //! | `report` | texts and numbers for the operator, events for the firmware |
 //! | [`trust`] | signatures |
 //!
-//! The link never arms, takes off or lands, and changes the mode only by [`Autopilot::return_home`]. Every target is finite and near the mission's line.
+//! The link never arms, takes off, lands or changes the mode. Every target is finite and near the mission's line.
 
 pub mod carrot;
 mod clearance;

@@ -102,7 +102,7 @@ pub(super) struct Vehicle {
     /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
     measured_at: Option<Instant>,
     position: Option<Position>,
-    /// Place to return to: HOME_POSITION, before it the first position.
+    /// Place to return to (HOME_POSITION); `None` if unknown.
     home: Option<Geodetic>,
     pub(super) battery: Battery,
 }
@@ -135,11 +135,7 @@ impl Vehicle {
         // A gap counts even if no timeout was handled meanwhile.
         self.review_choice(now);
         self.frame_at = Some(now);
-        let heard = if cfg!(feature = "departures") && self.record_battery(now, message) {
-            VehicleUpdate::StateChanged
-        } else {
-            self.take(now, message, axis)
-        };
+        let heard = self.take(now, message, axis);
         if found { VehicleUpdate::Found } else { heard }
     }
 
@@ -222,6 +218,20 @@ impl Vehicle {
             }
             Incoming::PositionTargetGlobal { lat_e7, lon_e7, .. } => {
                 VehicleUpdate::Target(lat_e7, lon_e7)
+            }
+            Incoming::Battery {
+                battery,
+                percent,
+                remaining_s,
+            } if cfg!(feature = "departures") => {
+                self.battery.record(now, battery, percent, remaining_s);
+                // On the ground a PX4 computes the time from an assumed current.
+                self.battery.newest = self.battery.newest.filter(|_| self.armed && self.in_air);
+                VehicleUpdate::StateChanged
+            }
+            Incoming::Home(at) if cfg!(feature = "departures") => {
+                self.home = Some(at).filter(|at| at.is_valid()).or(self.home);
+                VehicleUpdate::StateChanged
             }
             Incoming::FenceStatus { is_breached } => {
                 self.is_breached = is_breached;
@@ -319,48 +329,19 @@ impl Vehicle {
         });
     }
 
-    /// Records the battery's state and the home. Returns true for a message about nothing else.
-    fn record_battery(&mut self, now: Instant, message: Incoming) -> bool {
-        match message {
-            Incoming::Battery {
-                battery,
-                percent,
-                remaining_s,
-            } => {
-                let is_flying = self.armed && self.in_air;
-                self.battery
-                    .record(now, battery, percent, remaining_s, is_flying);
-                true
-            }
-            Incoming::Home { at } => {
-                self.home = Some(at).filter(|at| at.is_valid()).or(self.home);
-                true
-            }
-            Incoming::GlobalPosition {
-                lat_e7,
-                lon_e7,
-                amsl_mm,
-                ..
-            } if self.home.is_none() && (lat_e7, lon_e7) != (0, 0) => {
-                self.home = Some(Geodetic {
-                    lat_e7,
-                    lon_e7,
-                    amsl_mm,
-                });
-                false
-            }
-            _ => false,
-        }
-    }
-
-    /// Returns the length of the way home, m; NaN while a position is unknown or far from the line.
-    pub(super) fn home_m(&self, axis: &Axis) -> f32 {
+    /// Returns the newest remaining time of flight, once, and the time of the way home at `speed_m_s` along the ground, s.
+    ///
+    /// NaN is unknown, as the way home is without a position, and to a home that is unknown or far from the line.
+    pub(super) fn take_endurance(&mut self, axis: &Axis, speed_m_s: f32) -> Option<[f32; 2]> {
+        let remaining_s = self.battery.newest.take()?;
         let home = self.home.and_then(|home| axis.place(home));
-        let position = self.position.map(|position| position.place);
-        position.zip(home).map_or(f32::NAN, |(from, to)| {
+        let way = home.zip(self.position);
+        let home_s = way.map_or(f32::NAN, |(to, Position { place: from, .. })| {
             let level_m = libm::hypotf(from.x_m - to.x_m, from.y_m - to.y_m);
-            level_m + (from.altitude_m - to.altitude_m).abs()
-        })
+            let height_m = (from.altitude_m - to.altitude_m).abs();
+            level_m / speed_m_s + height_m / self.battery.descent_m_s
+        });
+        Some([remaining_s, home_s])
     }
 
     pub(super) fn address(&self) -> Option<Address> {
@@ -409,113 +390,52 @@ impl Vehicle {
 
 /// Age of a BATTERY_STATUS from which on SYS_STATUS counts instead.
 const NO_DETAILS: Duration = Duration::from_millis(10_000);
+/// Part of a reported remaining time that counts.
+const CERTAIN: f32 = 0.9;
 
-/// Minimum time between two steps of the percentage for an estimate.
-const SLOPE: Duration = Duration::from_millis(60_000);
-/// Time without an estimate after which a percentage alone counts as unknown.
-const LEARNING: Duration = Duration::from_millis(180_000);
-
-/// Relative error of a remaining time.
-const TIME_ERROR: f32 = 0.1;
-
-/// Rise of the percentage that restarts the estimate.
-const RISE: i8 = 5;
-/// Fall of the percentage in one message that must be repeated before it counts.
-const FALL: i8 = 20;
-
-/// Endurance by the battery's messages. The time that the autopilot reports counts; without one, the slope of the
-/// percentage in flight between two of its steps, at least 60 s and up to 240 s apart.
-#[derive(Clone, Copy, Debug, Default)]
+/// Endurance by the battery's messages.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Battery {
+    /// Time of flight with a full battery, s; NaN if unknown.
+    pub(super) full_s: f32,
+    /// Mean speed of the descent to land, m/s.
+    pub(super) descent_m_s: f32,
     detailed_at: Option<Instant>,
-    /// Time of the first percentage of this flight.
-    since: Option<Instant>,
-    lowest: i8,
-    /// True if the last percentage was too low to be believed at once.
-    fell: bool,
-    /// Steps of the percentage: start of the slope, start of the next slope, newest.
-    steps: Option<[(Instant, f32); 3]>,
-    /// Remaining time and its error, s, NaN if unknown; `None` once the link has taken it.
-    newest: Option<[f32; 2]>,
+    /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
+    newest: Option<f32>,
+}
+
+impl Default for Battery {
+    fn default() -> Self {
+        Self {
+            full_s: f32::NAN,
+            descent_m_s: 1.5,
+            detailed_at: None,
+            newest: None,
+        }
+    }
 }
 
 impl Battery {
-    fn record(
-        &mut self,
-        now: Instant,
-        battery: Option<u8>,
-        percent: i8,
-        remaining_s: i32,
-        is_flying: bool,
-    ) {
-        let is_detailed = |at| now.since(at) < NO_DETAILS;
+    /// Records the first battery's BATTERY_STATUS, or without one SYS_STATUS. The time counts; without one, the percentage.
+    #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
+    fn record(&mut self, now: Instant, battery: Option<u8>, percent: i8, remaining_s: i32) {
+        let is_detailed = self
+            .detailed_at
+            .is_some_and(|at| now.since(at) < NO_DETAILS);
         match battery {
             Some(0) => self.detailed_at = Some(now),
-            None if !self.detailed_at.is_some_and(is_detailed) => {}
+            None if !is_detailed => {}
             _ => return,
         }
-        let newest = if remaining_s > 0 {
-            #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
-            let time_s = remaining_s as f32;
-            Some([time_s, TIME_ERROR * time_s])
-        } else if !(0..=100).contains(&percent) {
-            Some([f32::NAN; 2])
-        } else if is_flying {
-            self.estimate(now, percent)
+        self.newest = Some(if remaining_s > 0 {
+            CERTAIN * remaining_s as f32
+        } else if (0..=100).contains(&percent) {
+            f32::from(percent) / 100.0 * self.full_s
         } else {
-            (self.since, self.steps) = (None, None);
-            None
-        };
-        self.newest = newest.or(self.newest);
-    }
-
-    /// Returns the endurance by the slope of the percentage; `None` while it is too early to tell.
-    fn estimate(&mut self, now: Instant, percent: i8) -> Option<[f32; 2]> {
-        let since = *self.since.get_or_insert_with(|| {
-            self.lowest = percent;
-            now
+            f32::NAN
         });
-        let fell = percent < self.lowest.saturating_sub(FALL);
-        if fell && !core::mem::replace(&mut self.fell, fell) {
-            return None;
-        }
-        self.fell = false;
-        if percent > self.lowest.saturating_add(RISE) {
-            (self.since, self.steps) = (None, None);
-            return Some([f32::NAN; 2]);
-        }
-        if percent < self.lowest {
-            self.lowest = percent;
-            let step = (now, f32::from(percent));
-            let [start, middle, _] = self.steps.unwrap_or([step; 3]);
-            self.steps = Some(if now.since(middle.0) >= SLOPE.times(2) {
-                [middle, step, step]
-            } else {
-                [start, middle, step]
-            });
-        }
-        if self.lowest == 0 {
-            return Some([0.0, 0.0]);
-        }
-        let [start, _, last] = self.steps.unwrap_or([(now, 0.0); 3]);
-        let span = last.0.since(start.0);
-        if span < SLOPE {
-            return (now.since(since) >= LEARNING).then_some([f32::NAN; 2]);
-        }
-        let steps = start.1 - last.1;
-        let left_s = last.1 / steps * seconds(span) - seconds(now.since(last.0));
-        let left_s = left_s.max(0.0);
-        Some([left_s, left_s * (TIME_ERROR + 0.5 / steps)])
     }
-
-    pub(super) const fn take(&mut self) -> Option<[f32; 2]> {
-        self.newest.take()
-    }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "some hours at most")]
-fn seconds(span: Duration) -> f32 {
-    span.as_micros() as f32 / 1e6
 }
 
 /// True if this crate was built with the feature `sensing`.

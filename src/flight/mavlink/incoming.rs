@@ -99,10 +99,7 @@ pub enum Incoming {
         remaining_s: i32,
     },
     /// HOME_POSITION: place where the vehicle returns to.
-    Home {
-        /// Position of the place.
-        at: Geodetic,
-    },
+    Home(Geodetic),
     /// EXTENDED_SYS_STATE: landed state of the vehicle.
     ExtendedSysState {
         /// Value of `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
@@ -193,13 +190,11 @@ impl Incoming {
                 percent: payload.i8(35),
                 remaining_s: payload.i32(36),
             },
-            id::HOME_POSITION => Self::Home {
-                at: Geodetic {
-                    lat_e7: payload.i32(0),
-                    lon_e7: payload.i32(4),
-                    amsl_mm: payload.i32(8),
-                },
-            },
+            id::HOME_POSITION => Self::Home(Geodetic {
+                lat_e7: payload.i32(0),
+                lon_e7: payload.i32(4),
+                amsl_mm: payload.i32(8),
+            }),
             id::EXTENDED_SYS_STATE => Self::ExtendedSysState {
                 landed_state: payload.u8(1),
             },

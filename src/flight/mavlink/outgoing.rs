@@ -23,6 +23,8 @@ pub type FrameBytes = Vec<u8, FRAME>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {
+    /// Severity of a problem that requires action now.
+    pub const CRITICAL: u8 = 2;
     /// Severity of a problem with which the flight continues.
     pub const WARNING: u8 = 4;
     /// Severity of a piece of information for the operator.
@@ -41,8 +43,6 @@ pub enum Outgoing<'a> {
         /// Interval requested between two of these messages, µs.
         interval_us: u32,
     },
-    /// COMMAND_LONG 20, NAV_RETURN_TO_LAUNCH: returns home and lands there.
-    ReturnToLaunch,
     /// COMMAND_ACK: reply to a command.
     CommandAck {
         /// Value of `MAV_CMD`, the number of the command.
@@ -99,13 +99,12 @@ mod mask {
 const FRAME_AMSL: u8 = 5;
 
 pub(in crate::flight) const SET_MESSAGE_INTERVAL: u16 = 511;
-const RETURN_TO_LAUNCH: u16 = 20;
 
 impl Outgoing<'_> {
     const fn id(&self) -> u32 {
         match self {
             Self::Heartbeat => id::HEARTBEAT,
-            Self::SetMessageInterval { .. } | Self::ReturnToLaunch => id::COMMAND_LONG,
+            Self::SetMessageInterval { .. } => id::COMMAND_LONG,
             Self::CommandAck { .. } => id::COMMAND_ACK,
             Self::SetPosition { .. } => id::SET_POSITION_TARGET_GLOBAL_INT,
             Self::TimeSync { .. } => id::TIMESYNC,
@@ -155,11 +154,6 @@ impl Outgoing<'_> {
                 }
                 to_frame.bytes(&[0; 20]);
                 to_frame.bytes(&SET_MESSAGE_INTERVAL.to_le_bytes());
-                to_frame.bytes(&[to.system, to.component, 0]);
-            }
-            Self::ReturnToLaunch => {
-                to_frame.bytes(&[0; 28]);
-                to_frame.bytes(&RETURN_TO_LAUNCH.to_le_bytes());
                 to_frame.bytes(&[to.system, to.component, 0]);
             }
             Self::CommandAck {

@@ -207,6 +207,21 @@ impl Node {
         }
     }
 
+    /// Returns true if this relay has requested to leave.
+    pub(crate) const fn is_leaving(&self) -> bool {
+        self.layers.leaving.requested
+    }
+
+    /// Returns true if the drone may fly away.
+    pub(crate) const fn is_free(&self) -> bool {
+        self.layers.leaving.free
+    }
+
+    /// Returns true once this relay has taken part in anything; false for a spare.
+    pub(crate) fn has_joined(&self) -> bool {
+        !self.layers.leaving.spare && !self.layers.round.is_fresh()
+    }
+
     /// Makes this relay a spare outside of the chain. No effect if it has taken part in anything since its start, leads,
     /// has requested to leave, or has two wires.
     pub(crate) fn wait_as_spare(&mut self, now: Instant) {
@@ -288,7 +303,9 @@ impl Node {
         } else {
             settings.dead_after
         };
-        if !spare && !free && outside_since.is_some_and(|at| now.since(at) >= most) {
+        // A relay that has not taken part in anything since its start is not needed.
+        let may_return = !spare && !free && !self.layers.round.is_fresh();
+        if may_return && outside_since.is_some_and(|at| now.since(at) >= most) {
             self.come_back(now);
         }
     }

@@ -281,11 +281,6 @@ impl Node {
         &self.telemetry.stats
     }
 
-    /// Returns true if this relay is outside of the chain, because it leaves or waits as a spare.
-    pub(crate) const fn is_outside(&self) -> bool {
-        self.layers.leaving.is_outside()
-    }
-
     pub(crate) const fn stats_mut(&mut self) -> &mut Stats {
         &mut self.telemetry.stats
     }
