@@ -1,131 +1,144 @@
-//! Battery of the drone: departure when it is low, way out, and command to return.
+//! Battery of the drone: its departure in the log, texts to the pilot, and the wait at a start in flight.
 //!
-//! | departure | action |
+//! | departure | text to the pilot |
 //! | --- | --- |
-//! | requested | a text to the pilot |
-//! | free | fly to the place beside the line (`--exit`), if any; the library sends the text "battery: leave now" |
-//! | free, there or without such a place, under setpoint control | with `--return rtl`: one command to return; the pilot's choice of a mode ends it |
+//! | requested, or outside of the chain | once |
+//! | refused | every minute |
+//! | free, or at the reserve | "battery: leave now" every 5 s until he takes over, by the library |
 //!
-//! The companion never arms, takes off or lands.
+//! The drone keeps its setpoint: its pilot flies it home. The companion never changes the mode.
 
 use serde_json::{Value, json};
-use uav_relay::{Departure, Instant, Placement, Relay};
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::{Departure, Duration, Instant, Relay};
 
 use crate::autopilot::Companion;
-use crate::status::at;
+use crate::lost::log_command;
 use uav_relay_linux::log::Log;
 
-/// Maximum distance from the place beside the line at which the drone has arrived, m.
-const NEAR_M: f32 = 2.0;
+/// Time between two texts about a refused departure.
+const AGAIN: Duration = Duration::from_millis(60_000);
 
-/// Permitted behaviour of a drone that may leave.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct BatteryPlan {
-    /// Distance of the place beside the line from the drone's place, m; `None` to hold.
-    ///
-    /// It is positive to the right of the line.
-    pub(crate) exit_m: Option<f32>,
-    /// True if the companion may command the autopilot to return.
-    pub(crate) returns: bool,
-}
+/// Maximum time from the start for which the relay waits for the endurance of its drone.
+const FIRST: Duration = Duration::from_millis(5_000);
+/// Time from the start after which a drone on the ground is not waited for.
+const GROUND: Duration = Duration::from_millis(2_000);
 
 /// State of the departure, as logged.
 #[derive(Debug)]
 pub(crate) struct Battery {
-    plan: BatteryPlan,
     departure: Departure,
-    exit: Option<Placement>,
-    has_returned: bool,
+    told_at: Instant,
+    /// True until the relay may take part in the chain.
+    waits: bool,
 }
 
 impl Battery {
-    pub(crate) const fn new(plan: BatteryPlan) -> Self {
+    /// Creates the state at the start; `waits` for a relay that learns its drone's endurance from an autopilot.
+    pub(crate) const fn new(waits: bool) -> Self {
         Self {
-            plan,
             departure: Departure::Member,
-            exit: None,
-            has_returned: false,
+            told_at: Instant::ZERO,
+            waits,
         }
     }
 
-    /// Follows the relay's departure: logs it, and flies `drone` to its place beside the line and home.
+    /// Returns true while a relay that has just started waits for its endurance.
+    ///
+    /// A relay that restarts with a low battery then leaves before it has taken part in anything, and does not join the chain.
+    pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
+        let state = link.map(Companion::control);
+        let age = now.since(Instant::ZERO);
+        let is_grounded = age >= GROUND && state == Some(State::Grounded);
+        self.waits &= age < FIRST && !is_grounded && relay.endurance_s(now).is_none();
+        self.waits
+    }
+
+    pub(crate) const fn is_waiting(&self) -> bool {
+        self.waits
+    }
+
+    /// Logs changes of the relay's departure, and tells the pilot.
     pub(crate) fn tend(
         &mut self,
         now: Instant,
         log: &Log,
         relay: &Relay,
         autopilot: Option<&mut Companion>,
-        drone: Option<Placement>,
     ) {
         let departure = relay.departure(now);
         let before = std::mem::replace(&mut self.departure, departure);
-        let mut autopilot = autopilot;
         if departure != before {
-            log.event(
-                now,
-                "departure",
-                self.status(relay, now),
-                describe(departure),
-            );
-            let is_asked = matches!(before, Departure::Member | Departure::Spare)
-                && !matches!(departure, Departure::Member | Departure::Spare);
-            if let Some(autopilot) = autopilot.as_deref_mut().filter(|_| is_asked) {
-                autopilot.send_text("battery: low, asks to leave the chain");
-            }
+            let fields = self.status(relay, now);
+            log.event(now, "departure", fields, describe(departure));
         }
-        let Some(autopilot) = autopilot else {
-            return;
-        };
-        if departure != Departure::Free {
-            if self.exit.take().is_some() {
-                autopilot.set_exit(None);
-            }
-            self.has_returned = false;
-            return;
-        }
-        if let (None, Some(exit_m), Some(place)) = (self.exit, self.plan.exit_m, relay.setpoint()) {
-            let exit = Placement {
-                y_m: place.y_m + exit_m,
-                ..place
+        let refusal = refusal(departure, relay);
+        let is_again = refusal.is_some() && now.since(self.told_at) >= AGAIN;
+        if let Some(autopilot) = autopilot
+            && (departure != before || is_again)
+        {
+            self.told_at = now;
+            let text = match departure {
+                Departure::Requested => Some("asks the chain to close up".to_owned()),
+                Departure::Outside => Some("waits for the others to close up".to_owned()),
+                _ => refusal,
             };
-            self.exit = Some(exit);
-            autopilot.set_exit(self.exit);
-            let text = format_args!(
-                "flies to its place beside the line: x {:.1} m, y {:.1} m, altitude {:.1} m",
-                exit.x_m, exit.y_m, exit.altitude_m
-            );
-            log.event(now, "exit", at(exit), text);
-        }
-        let is_clear = match (self.plan.exit_m, self.exit, drone) {
-            (None, ..) => true,
-            (Some(_), Some(exit), Some(drone)) => {
-                let off = [
-                    drone.x_m - exit.x_m,
-                    drone.y_m - exit.y_m,
-                    drone.altitude_m - exit.altitude_m,
-                ];
-                off.into_iter().all(|off_m| off_m.abs() <= NEAR_M)
+            if let Some(text) = text {
+                autopilot.send_text(&format!("battery: low, {text}"));
             }
-            _ => false,
-        };
-        let may_return = self.plan.returns && !self.has_returned;
-        if may_return && is_clear && autopilot.return_home(now) {
-            self.has_returned = true;
-            let text = "commands the autopilot to return (RTL), as --return rtl allows";
-            log.line(now, "return", text);
         }
     }
 
-    /// Returns the endurance and the departure as JSON.
+    /// Executes the operator's commands `leave` and `stay` from the status socket; `None` for another command.
+    pub(crate) fn command(
+        now: Instant,
+        log: &Log,
+        relay: &mut Relay,
+        command: &str,
+        user: &str,
+    ) -> Option<Value> {
+        let text = match command.trim() {
+            "leave" => {
+                relay.leave(now, relay.endurance_s(now));
+                "this relay asks to leave the chain, as the operator commands"
+            }
+            "stay" => {
+                relay.stay(now);
+                "this relay stays in the chain, as the operator commands, until half of its time of flight beyond the way home has passed"
+            }
+            _ => return None,
+        };
+        Some(log_command(
+            now,
+            log,
+            Ok(("commanded", text.to_owned())),
+            command,
+            user,
+        ))
+    }
+
+    /// Returns the endurance and the departure as JSON; `null` is unknown.
     pub(crate) fn status(&self, relay: &Relay, now: Instant) -> Value {
         json!({
             "departure": word(self.departure),
             "endurance_s": relay.endurance_s(now),
             "leaves_below_s": relay.endurance_limit_s(),
-            "exit": self.exit.map(at),
-            "returns": self.has_returned,
+            "endurance_losses": relay.endurance_losses(),
         })
     }
+}
+
+/// Returns the reason of a refused departure for the pilot, up to 37 bytes; `None` if it is not refused.
+fn refusal(departure: Departure, relay: &Relay) -> Option<String> {
+    let relays = relay.mission().relays();
+    Some(match departure {
+        Departure::NeedsGuard => "refused: no guard".to_owned(),
+        Departure::NeedsChannel => "refused: needs a shared radio".to_owned(),
+        Departure::NeedsQuorum => format!("{relays} relays needed: no fresh relay"),
+        Departure::WideGap => "refused: gap in the numbers".to_owned(),
+        Departure::Blocked => "refused: neighbours lack a link".to_owned(),
+        _ => return None,
+    })
 }
 
 const fn word(departure: Departure) -> &'static str {

@@ -57,6 +57,7 @@ impl Lost {
         user: &str,
     ) -> Value {
         let done = self.clear(now, relay, command);
+        let done = done.map(|text| ("cleared", text));
         log_command(now, log, done, command, user)
     }
 
@@ -64,7 +65,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "unknown command `{command}`: the only one is `{CLEAR} N ..`, with the numbers of every lost relay on one side of this relay, once all of them have landed"
+                "unknown command `{command}`: allowed are `leave`, `stay` and `{CLEAR} N ..`, with the numbers of every lost relay on one side of this relay, once all of them have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -127,19 +128,16 @@ impl Lost {
     }
 }
 
-/// Logs an operator's command and its result; returns the answer for the status socket.
+/// Logs an operator's command and its result with the event's name; returns the answer for the status socket.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,
-    done: Result<String, String>,
+    done: Result<(&str, String), String>,
     command: &str,
     by: &str,
 ) -> Value {
-    let (event, is_done) = match done {
-        Ok(_) => ("cleared", true),
-        Err(_) => ("command refused", false),
-    };
-    let (Ok(text) | Err(text)) = done;
+    let is_done = done.is_ok();
+    let (event, text) = done.unwrap_or_else(|text| ("command refused", text));
     let fields = json!({ "command": command, "by": by });
     let line = format_args!("{text} (`{command}` by {by})");
     log.event(now, event, fields, line);

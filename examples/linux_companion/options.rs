@@ -14,7 +14,6 @@ use uav_relay_scenario::endpoint::{Endpoint, FORM};
 use uav_relay_scenario::key;
 
 use crate::autopilot::{AutopilotPlan, AutopilotPort, SigningKey};
-use crate::battery::BatteryPlan;
 use uav_relay_linux::command::{self, named, number, whole};
 use uav_relay_linux::config::{self, FileOnlySettings, FileOptions, Override};
 use uav_relay_linux::log::LogOptions;
@@ -80,7 +79,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep drones apart.
-    /// A line `endurance SECONDS` gives the remaining time of flight. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
+    /// A line `endurance SECONDS HOME` gives the remaining time of flight, and that of the way home. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
     pub(crate) positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
@@ -102,7 +101,7 @@ pub(crate) struct Options {
     autopilot_key_file: Option<PathBuf>,
     /// Maximum speed of the drone, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
-    pub(crate) speed: f32,
+    speed: f32,
     /// Neighbour that a directional antenna points to, forward on the drone: the targets have that heading. Without it the autopilot
     /// chooses the heading
     #[arg(long, value_name = "SIDE", value_enum, requires = "autopilot")]
@@ -126,8 +125,9 @@ pub(crate) struct Options {
     listen: ListenOptions,
     #[command(flatten)]
     pub(crate) battery: BatteryOptions,
-    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The command `clear-lost N`
-    /// reports that the lost relay N has landed, so that this relay need not keep clear of it
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The commands
+    /// `leave` and `stay` order the relay to leave the chain, or to stay. `clear-lost N` reports that the lost relay N has landed, so
+    /// that this relay need not keep clear of it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     pub(crate) status_socket: Option<PathBuf>,
     /// Write every frame of the neighbour ports to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2,
@@ -177,7 +177,7 @@ impl ListenOptions {
     }
 }
 
-/// Options of the battery: when the drone leaves the chain, and how.
+/// Options of the battery: when the relay leaves the chain by itself.
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Battery")]
 pub(crate) struct BatteryOptions {
@@ -185,37 +185,16 @@ pub(crate) struct BatteryOptions {
     /// this reserve, and twelve times --dead-after-ms for the replacement
     #[arg(long, value_name = "S", default_value_t = 180.0, allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
     reserve: f32,
-    /// Place beside the line to which a drone flies that may leave, m to the right of its place
-    ///
-    /// -1000 to 1000, negative to the left; at least the separation away. Only for the method align. Without it the drone holds its position
-    #[arg(long, value_name = "M", requires = "autopilot", allow_negative_numbers = true, value_parser = number([-1_000.0, 1_000.0]))]
-    exit: Option<f32>,
-    /// Command to the autopilot of a drone that may leave and is clear of the line: none or rtl
-    ///
-    /// With none the pilot flies it; rtl is return and land. Set other return altitudes in each autopilot
-    #[arg(long, value_name = "HOW", value_enum, default_value_t = Return::None, requires = "autopilot")]
-    r#return: Return,
+    /// Shortest time of flight with a full battery, s, 1 to 86400, for an autopilot that reports a percentage but no time left, as
+    /// ArduCopter does. Without it such an endurance is unknown
+    #[arg(long, value_name = "S", requires = "autopilot", allow_negative_numbers = true, value_parser = number([1.0, 86_400.0]))]
+    flight_time: Option<f32>,
+    /// Mean speed at which the autopilot descends to land, m/s, 0.1 to 20
+    #[arg(long, value_name = "M/S", default_value_t = 1.5, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
+    descent: f32,
     /// Wait outside of the chain as a spare until the leader calls this relay. Not for relay 1, and only with --shared
     #[arg(long, requires = "shared")]
     pub(crate) spare: bool,
-}
-
-impl BatteryOptions {
-    pub(crate) fn plan(&self) -> BatteryPlan {
-        BatteryPlan {
-            exit_m: self.exit,
-            returns: self.r#return == Return::Rtl,
-        }
-    }
-}
-
-/// Command to the autopilot of a drone that may leave.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-enum Return {
-    /// The pilot flies the drone.
-    None,
-    /// Return to the launch position, and land there.
-    Rtl,
 }
 
 /// Direction of a directional antenna.
@@ -271,8 +250,8 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
     given.value("--speed", own.speed_m_s);
     given.value("--reserve", own.reserve_s);
-    given.value("--exit", own.exit_m);
-    given.value("--return", own.r#return.as_ref());
+    given.value("--flight-time", own.flight_time_s);
+    given.value("--descent", own.descent_m_s);
     given.flag("--spare", own.spare);
     given.path("--positions", own.positions.as_ref());
     given.value("--position-error", own.position_error_m);
@@ -327,7 +306,11 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         reserve: micros(options.battery.reserve),
         ..Settings::default()
     };
-    check_battery(&options, &mission)?;
+    if options.battery.spare && index == mission.leader() {
+        return Err(format!(
+            "--spare: relay {index} is the first leader, which cannot wait as a spare"
+        ));
+    }
     let key = options.key_file.as_deref();
     let key = key.map(|file| key::load("--key-file", file));
     Ok(Plan {
@@ -343,30 +326,6 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         overrides: file_only.overrides,
         options,
     })
-}
-
-/// Checks the options of a drone that leaves, or waits as a spare.
-fn check_battery(options: &Options, mission: &Mission) -> Result<(), String> {
-    let least_m = mission.config().min_separation_m;
-    if let Some(exit_m) = options.battery.exit {
-        if options.method != Method::Align {
-            return Err(format!(
-                "--exit {exit_m}: needs --method align, with which no relay is beside or above another one"
-            ));
-        }
-        if exit_m.abs() < least_m {
-            return Err(format!(
-                "--exit {exit_m}: must be within -1000 to -{least_m} or {least_m} to 1000, at least the separation away"
-            ));
-        }
-    }
-    if options.battery.spare && options.index == mission.leader() {
-        return Err(format!(
-            "--spare: relay {} is the first leader, which cannot wait as a spare",
-            options.index
-        ));
-    }
-    Ok(())
 }
 
 fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
@@ -390,6 +349,10 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
             Antenna::Downstream => Side::Downstream,
         }),
         key: key.transpose()?.map(SigningKey),
+        endurance: [
+            options.battery.flight_time.unwrap_or(f32::NAN),
+            options.battery.descent,
+        ],
     }))
 }
 

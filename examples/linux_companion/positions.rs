@@ -1,5 +1,6 @@
 //! Positions of the drone, read from a FIFO. Each line is `x_m y_m altitude_m`, optionally followed by the interference measured
-//! there, `1.2e-12` in W or `-95 dBm`; or `receiver POWER`, measured at the ground receiver; or `endurance SECONDS`, the remaining time of flight.
+//! there, `1.2e-12` in W or `-95 dBm`; or `receiver POWER`, measured at the ground receiver; or `endurance SECONDS HOME`, the remaining time of flight and the time of the
+//! way home.
 
 use std::os::fd::BorrowedFd;
 use std::path::Path;
@@ -16,22 +17,16 @@ pub(crate) struct Positions {
     listens: bool,
     bad: InvalidLines,
     newest: Option<(Instant, Placement)>,
-    /// First position, to which the drone returns.
-    home: Option<Placement>,
-    speed_m_s: f32,
 }
 
 impl Positions {
     /// Opens the FIFO `path` with the drone's positions. `listens` permits lines with a measured interference power.
-    /// `speed_m_s` is that of the way home.
-    pub(crate) fn open(path: &Path, listens: bool, speed_m_s: f32) -> Result<Self, String> {
+    pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
             listens,
             bad: InvalidLines::default(),
             newest: None,
-            home: None,
-            speed_m_s,
         })
     }
 
@@ -39,15 +34,15 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position and remaining time of flight, s, received since the last call.
+    /// Returns the newest position received since the last call, and the remaining time of flight and the time of the way home, s.
     ///
-    /// The time is NaN if it is invalid. Passes measurements to `on_sample` and logs the first invalid line. Work: that of [`Fifo::read`].
+    /// Invalid times are NaN. Passes measurements to `on_sample` and logs the first invalid line. Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
         log: &Log,
         on_sample: &mut impl FnMut(Sample),
-    ) -> (Option<Placement>, Option<f32>) {
+    ) -> (Option<Placement>, Option<[f32; 2]>) {
         let (mut newest, mut endurance_s) = (None, None);
         let Self {
             fifo, listens, bad, ..
@@ -57,29 +52,18 @@ impl Positions {
                 newest = place.or(newest);
                 sample.into_iter().for_each(&mut *on_sample);
             }
-            Ok(Line::Endurance(left_s)) => endurance_s = Some(left_s),
+            Ok(Line::Endurance(times)) => endurance_s = Some(times),
             Err(why) => {
                 let expected = if *listens {
-                    "x_m y_m altitude_m [POWER], receiver POWER or endurance SECONDS"
+                    "x_m y_m altitude_m [POWER], receiver POWER or endurance SECONDS HOME"
                 } else {
-                    "x_m y_m altitude_m or endurance SECONDS"
+                    "x_m y_m altitude_m or endurance SECONDS HOME"
                 };
                 bad.refuse(now, log, "position", line, [why.as_str(), expected]);
             }
         });
         self.newest = newest.map(|place| (now, place)).or(self.newest);
-        self.home = self.home.or(newest);
         (newest, endurance_s)
-    }
-
-    /// Returns the time of the way home, s; NaN before the first position.
-    pub(crate) fn home_s(&self) -> f32 {
-        self.newest
-            .zip(self.home)
-            .map_or(f32::NAN, |((_, at), to)| {
-                let level_m = (at.x_m - to.x_m).hypot(at.y_m - to.y_m);
-                (level_m + (at.altitude_m - to.altitude_m).abs()) / self.speed_m_s
-            })
     }
 
     /// Returns the drone's newest position, unless it is older than 3 s.
@@ -118,13 +102,13 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parsed line: position, measurement, and remaining time of flight, s (NaN if it is no number).
+/// Parsed line: position and measurement, or remaining time of flight and way home, s (NaN if it is no number).
 enum Line {
     Position(Option<Placement>, Option<Sample>),
-    Endurance(f32),
+    Endurance([f32; 2]),
 }
 
-/// Parses a line: position with or without power, `receiver` and a power, or `endurance` and a time.
+/// Parses a line: position with or without power, `receiver` and a power, or `endurance` and two times.
 ///
 /// Returns the reason as an error if the line is invalid, or if it has a power without `listens`.
 fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
@@ -146,12 +130,12 @@ fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
         return Ok(Line::Position(None, Some(Sample::Receiver { power_w })));
     }
     // An invalid time counts as unknown, which is an event of the relay.
-    if let ["endurance", left @ ..] = words.as_slice() {
-        let left_s = match left {
-            [left] => left.parse().unwrap_or(f32::NAN),
-            _ => f32::NAN,
-        };
-        return Ok(Line::Endurance(left_s));
+    if let ["endurance", times @ ..] = words.as_slice() {
+        let time = |word: &str| word.parse().unwrap_or(f32::NAN);
+        return Ok(Line::Endurance(match times {
+            [left, home] => [time(left), time(home)],
+            _ => [f32::NAN; 2],
+        }));
     }
     let [x, y, altitude, rest @ ..] = &words[..] else {
         return Err("it has fewer than three numbers".to_owned());

@@ -4,7 +4,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 use rustix::event::PollFlags;
 use serde_json::json;
-use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, ViewRecord};
+use uav_relay::{Auth, Duration, Event, Instant, Key, Relay, Settings, ViewRecord};
 
 use crate::autopilot::{Companion, SigningKey};
 use crate::battery::Battery;
@@ -20,6 +20,9 @@ use uav_relay_linux::log::Source;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::{StoredFile, next_epoch};
 use uav_relay_linux::{config, tap};
+
+/// Time between two checks of a relay that waits for the endurance of its drone.
+const WAIT: Duration = Duration::from_millis(100);
 
 struct Flight {
     service: Service,
@@ -80,7 +83,7 @@ impl Flight {
         let listens = plan.settings.listen.is_some();
         let positions = options.positions.as_deref();
         let positions = positions
-            .map(|path| Positions::open(path, listens, options.speed))
+            .map(|path| Positions::open(path, listens))
             .transpose()?;
         let autopilot = plan
             .autopilot
@@ -144,7 +147,7 @@ impl Flight {
             rejections: RejectionReasons::default(),
             hold_reasons: HoldReasonLog::default(),
             lost: Lost::new(plan.identity.index, plan.mission.relays()),
-            battery: Battery::new(plan.options.battery.plan()),
+            battery: Battery::new(plan.autopilot.is_some()),
             signs: auth.is_some(),
         })
     }
@@ -161,8 +164,8 @@ impl Flight {
             if let Some(place) = place {
                 relay.handle_position(time, place, time);
             }
-            if let Some(left_s) = endurance_s {
-                relay.handle_endurance(time, left_s, 0.0, positions.home_s());
+            if let Some([left_s, home_s]) = endurance_s {
+                relay.handle_endurance(time, left_s, home_s);
             }
             drone = positions.place(time);
         }
@@ -178,7 +181,12 @@ impl Flight {
             let file = views.as_mut();
             file.is_none_or(|file| file.store(&record.to_bytes()))
         };
-        let wake = self.ports.poll(time, relay, &mut store);
+        let waits = self.battery.waits(time, relay, self.autopilot.as_ref());
+        let wake = if waits {
+            Some(time + WAIT)
+        } else {
+            self.ports.poll(time, relay, &mut store)
+        };
         while let Some(event) = relay.poll_event() {
             if let (Event::Uploaded, Some(uploads), Some(upload)) =
                 (event, &mut self.uploads, relay.upload())
@@ -192,7 +200,7 @@ impl Flight {
             self.report.event(time, event, relay);
         }
         let autopilot = self.autopilot.as_mut();
-        self.battery.tend(time, log, relay, autopilot, drone);
+        self.battery.tend(time, log, relay, autopilot);
         let moves = self.report.log_movement(time, relay, drone);
         let uploads = self.uploads.as_mut();
         let uploads = uploads.and_then(|file| file.tend(time, log));
@@ -222,6 +230,9 @@ impl Flight {
         let index = report.index();
         service.tend(time, "relay", |log, command| {
             if let Some((command, user)) = command {
+                if let Some(done) = Battery::command(time, log, relay, command, user) {
+                    return done;
+                }
                 return lost.command(time, log, relay, command, user);
             }
             json!({
@@ -253,7 +264,9 @@ impl Flight {
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
         let has_autopilot = autopilot.is_some();
-        let (found, is_over) = self.service.sleep(wake, self.ports.ttys(), &others);
+        let is_waiting = self.battery.is_waiting();
+        let ttys = self.ports.ttys().filter(|_| !is_waiting);
+        let (found, is_over) = self.service.sleep(wake, ttys, &others);
         if has_autopilot
             && let (Some(autopilot), Some(events)) = (&mut self.autopilot, found.last())
         {

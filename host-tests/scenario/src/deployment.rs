@@ -76,10 +76,10 @@ pub struct Companion {
     pub speed_m_s: Option<f32>,
     /// Reserve of the drone's remaining time of flight, s, 0 to 3600.
     pub reserve_s: Option<f32>,
-    /// Distance of the place beside the line to which a drone flies that may leave, m, -1000 to 1000.
-    pub exit_m: Option<f32>,
-    /// Command to the autopilot of a drone that may leave: `none` or `rtl`.
-    pub r#return: Option<String>,
+    /// Time of flight with a full battery, s, 1 to 86400.
+    pub flight_time_s: Option<f32>,
+    /// Mean speed of the descent to land, m/s, 0.1 to 20.
+    pub descent_m_s: Option<f32>,
     /// True to wait outside of the chain as a spare.
     pub spare: Option<bool>,
     /// FIFO from which the companion reads the drone's own position. Another program writes it.

@@ -3,10 +3,10 @@
 use mavlink::dialects::common::{
     BATTERY_STATUS_DATA, HOME_POSITION_DATA, MavMessage, SYS_STATUS_DATA,
 };
-use uav_relay::{Departure, Event, Geodetic, Placement, Settings, Wiring};
+use uav_relay::{Departure, Event, Geodetic, Placement, Relay, Settings, Wiring};
 
 use super::*;
-use crate::exchange::relay;
+use crate::exchange::of;
 use crate::vehicle::{SYSTEM, axis};
 
 impl Vehicle {
@@ -49,34 +49,129 @@ impl Vehicle {
     }
 }
 
-/// Returns the reported remaining time, its error, and the time of the way home, s.
-fn endurance(vehicle: &mut Vehicle) -> Option<[f32; 3]> {
-    let newest = vehicle.link.poll_endurance();
-    assert_eq!(vehicle.link.poll_endurance(), None, "once");
-    newest
+/// Time of the way home of these drones, s: 200 m at 5 m/s, 10 m down at 1.5 m/s.
+const HOME_S: u16 = 46;
+
+/// Relay and vehicle that exchange data once a second.
+struct Pair {
+    vehicle: Vehicle,
+    relay: Relay,
+    events: Vec<Event>,
 }
 
+impl Pair {
+    /// Creates relay `index` of a chain of `relays`, and its drone.
+    fn new(vehicle: Vehicle, relays: u16, index: u16) -> Self {
+        let settings = Settings {
+            wiring: Wiring::Shared,
+            ..Settings::default()
+        };
+        Self {
+            vehicle,
+            relay: of(relays, index, settings),
+            events: Vec::new(),
+        }
+    }
+
+    /// Creates the only relay of a chain and its flying drone, which knows its home.
+    fn flying(kind: Kind) -> Self {
+        let mut pair = Self::new(Vehicle::flying(kind), 1, 1);
+        pair.home();
+        pair
+    }
+
+    fn home(&mut self) {
+        let home = Placement::on_line(300.0, 10.0);
+        self.vehicle.home(axis().point(home).unwrap());
+    }
+
+    fn exchange(&mut self) {
+        self.vehicle
+            .link
+            .exchange(&mut self.relay, self.vehicle.now);
+    }
+
+    /// Returns the endurance and its limit after an exchange, s.
+    fn told(&mut self) -> [Option<u16>; 2] {
+        self.exchange();
+        let now = self.vehicle.now;
+        [self.relay.endurance_s(now), self.relay.endurance_limit_s()]
+    }
+
+    /// Runs for `seconds`, each after `send`. Returns the second at which `until` is true, if any.
+    fn run(
+        &mut self,
+        seconds: u16,
+        send: impl Fn(&mut Vehicle, i32),
+        until: impl Fn(&Self) -> bool,
+    ) -> Option<u16> {
+        (0..seconds).find(|s| {
+            send(&mut self.vehicle, i32::from(*s));
+            for _ in 0..50 {
+                self.vehicle.step_without_exchange();
+                self.exchange();
+                self.vehicle.answer();
+            }
+            self.relay.handle_timeout(self.vehicle.now);
+            let relay = &mut self.relay;
+            self.events
+                .extend(core::iter::from_fn(|| relay.poll_event()));
+            assert!(
+                self.relay
+                    .poll_timeout()
+                    .is_none_or(|at| at > self.vehicle.now)
+            );
+            until(self)
+        })
+    }
+
+    fn departs(&self) -> bool {
+        self.relay.departure(self.vehicle.now) != Departure::Member
+    }
+
+    /// Returns the times at which the pilot read `text`, s.
+    fn read(&self, text: &str) -> Vec<f64> {
+        let said = self.vehicle.received.iter();
+        let said = said.filter(|(_, said)| *said == LinkMessage::Text(text.to_owned()));
+        said.map(|(at, _)| at.as_micros() as f64 / 1e6).collect()
+    }
+
+    fn unknowns(&self) -> usize {
+        let unknown = |event: &&Event| **event == Event::EnduranceUnknown;
+        self.events.iter().filter(unknown).count()
+    }
+}
+
+/// Checks the time of a PX4: nine tenths of it count, and only in flight.
 #[test]
-fn the_time_that_a_px4_reports_counts() {
-    let mut vehicle = Vehicle::flying(Kind::Px4);
-    vehicle.battery(0, 61, 700);
-    let [remaining_s, error_s, home_s] = endurance(&mut vehicle).unwrap();
-    assert_eq!((remaining_s, error_s), (700.0, 70.0));
-    assert_eq!(home_s, 0.0, "home is where the first position was");
-    // Home is 200 m and 10 m of altitude away, at 5 m/s.
-    let home = Placement::on_line(300.0, 10.0);
-    vehicle.home(axis().point(home).unwrap());
-    vehicle.battery(0, 61, 690);
-    let [.., home_s] = endurance(&mut vehicle).unwrap();
-    assert!((home_s - 42.0).abs() < 0.1, "{home_s}");
+fn the_time_of_a_px4_counts_in_flight() {
+    let mut pair = Pair::flying(Kind::Px4);
+    pair.vehicle.battery(0, 61, 1_000);
+    // 180 s of reserve, 180 s of a replacement.
+    assert_eq!(pair.told(), [Some(900), Some(360 + HOME_S)]);
     // SYS_STATUS and other batteries say less than the first one's BATTERY_STATUS.
-    vehicle.sys_status(40);
-    vehicle.battery(1, 90, 5_000);
-    assert_eq!(endurance(&mut vehicle), None);
-    vehicle.home(Geodetic::from_degrees(10.0, 8.0, 0.0).unwrap());
-    vehicle.battery(0, 61, 680);
-    let [.., home_s] = endurance(&mut vehicle).unwrap();
-    assert!(home_s.is_nan(), "far from the line");
+    pair.vehicle.sys_status(40);
+    pair.vehicle.battery(1, 90, 5_000);
+    assert_eq!(pair.told()[0], Some(900));
+    pair.vehicle.link.set_endurance(f32::NAN, 1.0);
+    pair.vehicle.battery(0, 61, 1_000);
+    assert_eq!(pair.told()[1], Some(360 + 50), "10 m at 1 m/s");
+}
+
+/// Checks that an unknown home, and one far from the line, make the endurance unknown.
+#[test]
+fn without_a_home_the_endurance_is_unknown() {
+    let mut pair = Pair::new(Vehicle::flying(Kind::Px4), 1, 1);
+    pair.vehicle.battery(0, 61, 1_000);
+    assert_eq!(pair.told(), [None; 2]);
+    pair.home();
+    pair.vehicle.battery(0, 61, 1_000);
+    assert_eq!(pair.told()[0], Some(900));
+    let far = Geodetic::from_degrees(10.0, 8.0, 0.0).unwrap();
+    pair.vehicle.home(far);
+    pair.vehicle.battery(0, 61, 1_000);
+    assert_eq!(pair.told()[0], None);
+    assert_eq!(pair.relay.endurance_losses(), 2);
 }
 
 #[test]
@@ -84,210 +179,234 @@ fn an_invalid_percentage_without_a_time_is_unknown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
         for percent in [-1, -128, 101, 127] {
             for time_s in [0, -1, i32::MIN] {
-                let mut vehicle = Vehicle::flying(kind);
-                vehicle.battery(0, percent, time_s);
-                let [remaining_s, ..] = endurance(&mut vehicle).unwrap();
-                assert!(remaining_s.is_nan(), "{percent} % {time_s} s");
+                let mut pair = Pair::flying(kind);
+                pair.vehicle.link.set_endurance(1_200.0, 1.5);
+                pair.vehicle.battery(0, percent, time_s);
+                assert_eq!(pair.told(), [None; 2], "{percent} % {time_s} s");
+                assert_eq!(pair.relay.endurance_losses(), 1);
             }
-            let mut vehicle = Vehicle::flying(kind);
-            vehicle.sys_status(percent);
-            assert!(endurance(&mut vehicle).unwrap()[0].is_nan());
+            let mut pair = Pair::flying(kind);
+            pair.vehicle.link.set_endurance(1_200.0, 1.5);
+            pair.vehicle.sys_status(percent);
+            assert_eq!(pair.told(), [None; 2]);
         }
     }
 }
 
-/// Flies for `span_s` with the percentage `percent(time)`; returns the endurance after each second.
-fn discharge(
-    vehicle: &mut Vehicle,
-    span_s: u16,
-    send: impl Fn(&mut Vehicle, i8),
-    percent: impl Fn(f32) -> f32,
-) -> Vec<Option<[f32; 3]>> {
-    let second = |s: u16| {
-        vehicle.run(1_000);
-        send(vehicle, percent(f32::from(s)) as i8);
-        endurance(vehicle)
-    };
-    (0..span_s).map(second).collect()
+/// Checks a percentage without a time, as ArduCopter reports it: it counts by the time of flight with a full battery.
+#[test]
+fn a_percentage_counts_by_the_time_of_a_full_battery() {
+    let send: [fn(&mut Vehicle, i8); 2] = [
+        |vehicle, percent| vehicle.battery(0, percent, 0),
+        |vehicle, percent| vehicle.sys_status(percent),
+    ];
+    for send in send {
+        let mut pair = Pair::flying(Kind::ArduCopter);
+        send(&mut pair.vehicle, 60);
+        assert_eq!(pair.told(), [None; 2], "never full");
+        pair.vehicle.link.set_endurance(1_200.0, 1.5);
+        send(&mut pair.vehicle, 60);
+        assert_eq!(pair.told()[0], Some(720));
+        send(&mut pair.vehicle, 0);
+        assert_eq!(pair.told()[0], Some(0));
+    }
 }
 
-/// Checks the endurance by the slope of a percentage that falls by one in 13 s.
-///
-/// ArduCopter reports it in BATTERY_STATUS, with the time 0, and PX4 in SYS_STATUS.
+/// Checks that no value counts before take-off and after landing: there a PX4 reports an assumed time.
 #[test]
-fn the_slope_of_the_percentage_gives_the_endurance() {
-    for kind in [Kind::ArduCopter, Kind::Px4] {
-        let send = |vehicle: &mut Vehicle, percent: i8| match kind {
-            Kind::ArduCopter => vehicle.battery(0, percent, 0),
-            Kind::Px4 => vehicle.sys_status(percent),
+fn on_the_ground_no_endurance_counts() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut pair = Pair::new(Vehicle::new(kind), 1, 1);
+        pair.home();
+        pair.vehicle.link.set_endurance(1_200.0, 1.5);
+        let low = |vehicle: &mut Vehicle, _| vehicle.battery(0, 5, 40);
+        assert_eq!(pair.run(60, low, Pair::departs), None);
+        assert_eq!(pair.told(), [None; 2]);
+        pair.vehicle.armed = true;
+        assert_eq!(
+            pair.run(60, low, Pair::departs),
+            None,
+            "armed, on the ground"
+        );
+        assert_eq!((pair.unknowns(), pair.relay.endurance_losses()), (0, 0));
+        pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+        let high = |vehicle: &mut Vehicle, _| {
+            vehicle.home(axis().point(Placement::on_line(300.0, 10.0)).unwrap());
+            vehicle.battery(0, 80, 1_000);
         };
-        let mut vehicle = Vehicle::flying(kind);
-        let all = discharge(&mut vehicle, 600, send, |s| 90.9 - s / 13.0);
-        let first = all.iter().position(Option::is_some).unwrap();
-        assert!((60..95).contains(&first), "{first} s");
-        for (s, told) in all.iter().enumerate().skip(first) {
-            let [remaining_s, error_s, _] = told.unwrap();
-            // The percentage is cut off: 0 % at 90 * 13 s.
-            let exact = 89.9 * 13.0 - s as f32;
-            assert!(
-                (remaining_s - exact).abs() < error_s,
-                "{s}: {remaining_s} {exact} {error_s}"
-            );
-            assert!(
-                (remaining_s / exact - 1.0).abs() < 0.1,
-                "{s}: {remaining_s} {exact}"
-            );
-        }
-        // Twice the consumption counts within 5 min.
-        let all = discharge(&mut vehicle, 300, send, |s| (44.8 - s / 6.5).max(0.0));
-        let [remaining_s, ..] = all.last().unwrap().unwrap();
-        assert_eq!(remaining_s, 0.0, "empty after 291 s");
+        pair.run(5, high, |_| false);
+        assert_eq!(pair.relay.endurance_s(pair.vehicle.now), Some(900));
+        pair.vehicle.armed = false;
+        pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_ON_GROUND;
+        assert_eq!(pair.run(2_000, |_, _| {}, Pair::departs), None);
+        assert_eq!(pair.told(), [None; 2], "the next battery is another one");
+        assert_eq!(pair.unknowns(), 0);
     }
-}
-
-#[test]
-fn a_battery_that_tells_nothing_is_never_full() {
-    let send: fn(&mut Vehicle, i8) = |vehicle, percent| vehicle.battery(0, percent, 0);
-    // A percentage that does not change is unknown after 3 min, one on the ground is no estimate.
-    let mut vehicle = Vehicle::flying(Kind::ArduCopter);
-    let all = discharge(&mut vehicle, 240, send, |_| 100.0);
-    assert!(all[..179].iter().all(Option::is_none));
-    assert!(all[181..].iter().all(|told| told.unwrap()[0].is_nan()));
-    let mut vehicle = Vehicle::new(Kind::ArduCopter);
-    let all = discharge(&mut vehicle, 240, send, |s| 90.0 - s / 10.0);
-    assert!(all.iter().all(Option::is_none));
-    // Once the slope is known, a percentage that is stuck does not stop the countdown; one that rises ends it.
-    let mut vehicle = Vehicle::flying(Kind::ArduCopter);
-    let all = discharge(&mut vehicle, 320, send, |s| (50.0 - s / 10.0).max(30.0));
-    let [a, b] = [205, 305].map(|s: usize| all[s].unwrap()[0]);
-    assert!((a - b - 100.0).abs() < 1.0, "{a} {b}");
-    let all = discharge(&mut vehicle, 1, send, |_| 80.0);
-    assert!(all[0].unwrap()[0].is_nan());
-    // A single glitch to 0 % is not believed, a repeated one is.
-    let mut vehicle = Vehicle::flying(Kind::ArduCopter);
-    discharge(&mut vehicle, 200, send, |s| 60.0 - s / 10.0);
-    let all = discharge(&mut vehicle, 4, send, |s| [0.0, 39.0, 0.0, 0.0][s as usize]);
-    assert_eq!(all[0], None);
-    assert!(all[1].unwrap()[0] > 300.0);
-    assert_eq!(all[2], None);
-    assert_eq!(all[3].unwrap()[0], 0.0);
 }
 
 #[test]
 fn a_relay_with_a_low_battery_requests_to_leave() {
-    let mut vehicle = Vehicle::flying(Kind::Px4);
-    let settings = Settings {
-        wiring: Wiring::Shared,
-        ..Settings::default()
-    };
-    let mut relay = relay(settings);
-    let mut events = Vec::new();
-    let mut fly = |relay: &mut uav_relay::Relay, seconds: u16, time_s: fn(u16) -> i32| {
-        (0..seconds).find(|s| {
-            vehicle.run(1_000);
-            if time_s(*s) != 0 {
-                vehicle.battery(0, 50, time_s(*s));
-            }
-            vehicle.link.exchange(relay, vehicle.now);
-            relay.handle_timeout(vehicle.now);
-            events.extend(core::iter::from_fn(|| relay.poll_event()));
-            assert!(relay.poll_timeout().is_none_or(|at| at > vehicle.now));
-            relay.departure(vehicle.now) != Departure::Member
-        })
-    };
-    // The way home takes no time: the limit is 180 s of reserve and 180 s of a replacement.
-    assert_eq!(fly(&mut relay, 20, |_| 500), None);
-    assert_eq!(relay.endurance_limit_s(), Some(360));
-    assert_eq!(fly(&mut relay, 4, |_| 300), None, "too short");
-    assert_eq!(fly(&mut relay, 20, |_| 500), None);
-    // 0.9 * (500 - s) is 360 after 100 s.
-    let left = fly(&mut relay, 200, |s| 500 - i32::from(s)).unwrap();
-    assert!((104..=107).contains(&left), "{left} s");
-    assert_eq!(relay.stats().endurance_unknown, 0);
+    let mut pair = Pair::flying(Kind::Px4);
+    let time = |time_s: i32| move |vehicle: &mut Vehicle, _: i32| vehicle.battery(0, 50, time_s);
+    assert_eq!(pair.run(20, time(500), Pair::departs), None);
+    assert_eq!(pair.run(4, time(300), Pair::departs), None, "too short");
+    assert_eq!(pair.run(20, time(500), Pair::departs), None);
+    // 0.9 * (500 - s) is 406.7 after 48 s.
+    let falls = |vehicle: &mut Vehicle, s: i32| vehicle.battery(0, 50, 500 - s);
+    let left = pair.run(200, falls, Pair::departs).unwrap();
+    assert!((52..=55).contains(&left), "{left} s");
+    assert_eq!(pair.unknowns(), 0);
     // An end of the messages is reported, and cancels nothing.
-    fly(&mut relay, 1, |_| 0);
-    for _ in 0..30 {
-        assert_eq!(fly(&mut relay, 1, |_| 0), Some(0));
-    }
-    assert_eq!(relay.stats().endurance_unknown, 1);
-    assert_eq!(relay.endurance_s(Instant::from_millis(1_200_000)), None);
-    for _ in 0..5 {
-        assert_eq!(fly(&mut relay, 1, |_| 600), Some(0));
-    }
-    assert_eq!(fly(&mut relay, 10, |_| 600), None, "cancelled");
-    let lost = events
-        .iter()
-        .filter(|event| **event == Event::EnduranceUnknown);
-    assert_eq!(lost.count(), 1);
+    assert_eq!(pair.run(30, |_, _| {}, |pair| !pair.departs()), None);
+    assert_eq!((pair.unknowns(), pair.relay.endurance_losses()), (1, 1));
+    assert_eq!(pair.relay.endurance_s(pair.vehicle.now), None);
 }
 
-/// Checks that an unknown endurance counts down, and that the firmware's own departure stays.
+/// Checks an endurance that was never known: the pilot and the firmware are told when the relay takes control, once.
 #[test]
-fn the_last_endurance_counts_down_and_a_manual_departure_stays() {
-    let settings = Settings {
-        wiring: Wiring::Shared,
-        ..Settings::default()
-    };
-    let mut silent = relay(settings);
-    let at = |s: u64| Instant::from_millis(1_000 * s);
-    silent.handle_endurance(at(1), 400.0, 20.0, 0.0);
-    for s in 2..25 {
+fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut pair = Pair::flying(kind);
+        pair.run(30, |_, _| {}, |_| false);
+        assert_eq!(pair.unknowns(), 0);
+        pair.vehicle.mode = Mode::Companion;
+        pair.run(60, |_, _| {}, |_| false);
+        assert_eq!(pair.vehicle.link.state(), State::Engaged);
+        assert_eq!((pair.unknowns(), pair.relay.endurance_losses()), (1, 1));
+        assert_eq!(pair.read("battery: endurance unknown").len(), 1);
+        assert_eq!(pair.told(), [None; 2]);
+    }
+}
+
+/// Checks the pilot's text at the last reserve of a refused departure: every 5 s until he takes over.
+#[test]
+fn the_pilot_is_told_to_leave_at_the_last_reserve() {
+    const LEAVE: &str = "battery: leave now";
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut pair = Pair::flying(kind);
+        pair.vehicle.mode = Mode::Companion;
+        let falls = |vehicle: &mut Vehicle, s: i32| vehicle.battery(0, 50, 500 - s);
+        pair.run(200, falls, Pair::departs).unwrap();
+        let refused = pair.relay.departure(pair.vehicle.now);
+        assert_eq!(refused, Departure::NeedsQuorum, "the only relay");
+        // The reserve of 180 s beyond the way home is reached at 252 s, and the text comes 10 s later.
+        let falls = |vehicle: &mut Vehicle, s: i32| vehicle.battery(0, 50, 445 - s);
+        let first = pair.run(300, falls, |pair| !pair.read(LEAVE).is_empty());
+        let left_s = pair.relay.endurance_s(pair.vehicle.now).unwrap();
+        assert!(left_s.abs_diff(HOME_S + 170) <= 2, "{first:?}: {left_s}");
+        let falls = |vehicle: &mut Vehicle, s: i32| vehicle.battery(0, 50, 235 - s);
+        pair.run(60, falls, |_| false);
+        let times = pair.read(LEAVE);
+        assert!((12..=13).contains(&times.len()), "{times:?}");
+        assert!(
+            times
+                .windows(2)
+                .all(|pair| (5.0..6.1).contains(&(pair[1] - pair[0]))),
+            "{times:?}"
+        );
+        pair.vehicle.mode = Mode::Position;
+        pair.run(2, falls, |_| false);
+        let before = pair.read(LEAVE).len();
+        pair.run(60, falls, |_| false);
+        assert_eq!(pair.read(LEAVE).len(), before, "he has taken over");
+    }
+}
+
+fn at(s: u64) -> Instant {
+    Instant::from_millis(1_000 * s)
+}
+
+/// Returns relay `index` of `relays` on a shared channel.
+fn shared(relays: u16, index: u16) -> Relay {
+    Pair::new(Vehicle::new(Kind::Px4), relays, index).relay
+}
+
+/// Checks that an unknown endurance counts down, and that each invalid value makes it unknown.
+#[test]
+fn the_last_endurance_counts_down() {
+    let mut silent = shared(1, 1);
+    silent.handle_endurance(at(1), 380.0, 0.0);
+    for s in 2..26 {
         silent.handle_timeout(at(s));
         assert_eq!(silent.departure(at(s)), Departure::Member);
     }
-    assert_eq!(silent.endurance_s(at(24)), None);
-    for s in 25..30 {
+    assert_eq!(
+        (silent.endurance_s(at(25)), silent.endurance_losses()),
+        (None, 1)
+    );
+    for s in 26..30 {
         silent.handle_timeout(at(s));
     }
     assert_ne!(silent.departure(at(30)), Departure::Member);
-
-    let mut manual = relay(settings);
-    manual.leave(at(1), Some(600));
-    for s in 2..60 {
-        manual.handle_endurance(at(s), if s < 20 { 100.0 } else { 900.0 }, 0.0, 0.0);
-        assert_ne!(manual.departure(at(s)), Departure::Member);
-    }
-    manual.stay(at(60));
-    assert_eq!(manual.departure(at(60)), Departure::Member);
     for value in [f32::NAN, -1.0, f32::INFINITY] {
-        for which in 0..3 {
-            let mut relay = relay(settings);
-            relay.handle_endurance(at(1), 900.0, 0.0, 0.0);
-            let mut values = [900.0, 0.0, 0.0];
+        for which in 0..2 {
+            let mut relay = shared(1, 1);
+            relay.handle_endurance(at(1), 900.0, 0.0);
+            let mut values = [900.0, 0.0];
             values[which] = value;
-            relay.handle_endurance(at(2), values[0], values[1], values[2]);
-            assert_eq!(relay.endurance_s(at(2)), None);
-            assert_eq!(relay.stats().endurance_unknown, 1);
+            relay.handle_endurance(at(2), values[0], values[1]);
+            assert_eq!(
+                (relay.endurance_s(at(2)), relay.endurance_losses()),
+                (None, 1)
+            );
         }
     }
 }
 
-/// Checks the command to return: repeated until the mode changes, never after the pilot's choice.
-///
-/// It is sent only while the relay controls the drone.
+/// Checks that the operator's order to stay holds until half of the time beyond the way home has passed.
 #[test]
-fn the_return_is_commanded_until_the_mode_changes() {
-    for kind in [Kind::Px4, Kind::ArduCopter] {
-        let returns = |vehicle: &Vehicle| {
-            let said = vehicle.received.iter();
-            said.filter(|(_, said)| *said == LinkMessage::Return)
-                .count()
-        };
-        let mut vehicle = Vehicle::flying(kind);
-        vehicle.link.return_home(vehicle.now);
-        vehicle.run(3_000);
-        assert_eq!(returns(&vehicle), 0, "its pilot flies");
-        vehicle.setpoint = Some(place(180.0));
-        vehicle.engage();
-        vehicle.run(1_000);
-        assert_eq!(vehicle.link.state(), State::Engaged);
-        vehicle.link.return_home(vehicle.now);
-        vehicle.run(5_000);
-        assert_eq!(returns(&vehicle), 3);
-        vehicle.mode = Mode::Hold;
-        vehicle.run(3_000);
-        vehicle.engage();
-        vehicle.run(5_000);
-        assert_eq!(returns(&vehicle), 3, "the pilot's choice ends it");
+fn the_operators_order_to_stay_holds() {
+    let mut relay = shared(1, 1);
+    let fly = |relay: &mut Relay, from: u64, to: u64| {
+        (from..to).find(|s| {
+            relay.handle_timeout(at(*s));
+            relay.handle_endurance(at(*s), 500.0 - *s as f32, 50.0);
+            relay.departure(at(*s)) != Departure::Member
+        })
+    };
+    // 500 - 410: the way home, the reserve and the replacement.
+    assert_eq!(fly(&mut relay, 1, 300), Some(96));
+    relay.stay(at(100));
+    // Of 350 s beyond the way home 175 s are left at 275 s.
+    assert_eq!(
+        relay.endurance_limit_s(),
+        Some(50 + 177),
+        "by the value at 96 s"
+    );
+    assert_eq!(fly(&mut relay, 100, 400), Some(279));
+    // At the end of the endurance an order to stay holds for good, but not the firmware's own order to leave.
+    relay.stay(at(500));
+    assert_eq!(fly(&mut relay, 500, 900), None);
+    assert!(relay.poll_timeout().is_none_or(|due| due > at(899)));
+    relay.leave(at(900), None);
+    assert_ne!(relay.departure(at(900)), Departure::Member);
+    relay.stay(at(901));
+    relay.handle_endurance(at(902), 900.0, 50.0);
+    assert_eq!(fly(&mut relay, 903, 904), None);
+}
+
+/// Checks that a spare with a low battery, and a relay that starts with one, stay outside of the chain.
+#[test]
+fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
+    for is_spare in [true, false] {
+        let mut relay = shared(3, 2);
+        if is_spare {
+            relay.wait_as_spare(at(1));
+            relay.handle_endurance(at(1), 900.0, 50.0);
+            assert_eq!(relay.departure(at(1)), Departure::Spare);
+        }
+        relay.handle_endurance(at(2), 300.0, 50.0);
+        for s in 2..1_000 {
+            relay.handle_timeout(at(s));
+            let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+            while relay.poll_transmit(at(s), &mut frame).is_some() {}
+            assert_eq!(relay.departure(at(s)), Departure::Outside, "{s}");
+        }
+        relay.stay(at(1_000));
+        assert_eq!(
+            relay.departure(at(1_000)),
+            Departure::Member,
+            "the operator's order"
+        );
     }
 }

@@ -17,13 +17,13 @@ use crate::vehicle::{Target, axis};
 
 /// Creates the only relay of a chain, with a motion guard. The mission has the distance between the Tx and Rx of
 /// `vehicle::sites`.
-pub(crate) fn relay(settings: Settings) -> Relay {
+fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 
 /// Creates relay `index` of `relays` relays with a motion guard. The mission has the distance between the Tx and Rx
 /// of `vehicle::sites`.
-fn of(relays: u16, index: u16, settings: Settings) -> Relay {
+pub(crate) fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
     let mission = Mission::try_new(config).unwrap();

@@ -195,7 +195,7 @@ class Drone:
             case ["battery", percent, left]:
                 self.battery = int(percent), int(left)
                 if self.kind == "px4":
-                    self.streams[147] = [1.0, 0.0]
+                    self.streams |= {147: [1.0, 0.0], 242: [2.0, 0.0]}
             case ["noise", noise]:
                 self.noise(int(noise))
             case ["clear", *relays]:
@@ -295,9 +295,6 @@ class Drone:
                 self.say(common.MAVLink_command_ack_message(511, 0 if has else 2))
             elif name == "PARAM_REQUEST_READ":
                 self.value(message)
-            elif name == "COMMAND_LONG" and message.command == common.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-                self.mode, self.by_itself, self.goal = "rtl", False, None
-                self.say(common.MAVLink_command_ack_message(message.command, 0))
             elif name == "TIMESYNC" and message.tc1 == 0:
                 self.say(common.MAVLink_timesync_message(int(time.monotonic() * 1e9), message.ts1))
             elif name == "SET_POSITION_TARGET_GLOBAL_INT":
@@ -320,7 +317,7 @@ class Drone:
             self.goal = message.lat_int / 1e7, message.lon_int / 1e7, message.alt
 
     def has(self, number):
-        return number in (33, 245) or self.kind == "arducopter" and number in (87, 147, 162)
+        return number in (33, 245) or self.kind == "arducopter" and number in (87, 147, 162, 242)
 
     def say(self, message):
         if not self.silent:
@@ -355,6 +352,9 @@ class Drone:
         if number == 147 and self.battery:
             percent, left = self.battery
             return common.MAVLink_battery_status_message(0, 0, 1, 32767, [65535] * 10, -1, -1, -1, percent, left)
+        if number == 242:
+            lat, lon = (round(degrees * 1e7) for degrees in self.home[:2])
+            return common.MAVLink_home_position_message(lat, lon, round(self.home[2] * 1e3), 0, 0, 0, [1, 0, 0, 0], 0, 0, 0)
         # A PX4 does not say it in its mode.
         if number == 162:
             return common.MAVLink_fence_status_message(0, 0, 0, 0)
