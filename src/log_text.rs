@@ -111,9 +111,7 @@ fn text(event: Event) -> defmt::Str {
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
         Event::MayLeaveTold { .. } => defmt::intern!("may fly away; report it once it has left"),
         Event::MayLeave => defmt::intern!("the chain has closed up: this drone may fly away"),
-        Event::EnduranceUnknown => {
-            defmt::intern!("the drone's endurance is unknown: watch its battery")
-        }
+        Event::EnduranceUnknown => defmt::intern!("unknown endurance: watch the battery"),
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }

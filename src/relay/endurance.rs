@@ -18,6 +18,8 @@ use crate::time::{Duration, Instant};
 
 /// Age at which the last value is too old.
 const STALE: Duration = Duration::from_millis(10_000);
+/// Maximum time between two comparisons of the margin with the limit.
+const REVIEW: Duration = Duration::from_millis(1_000);
 /// Time for which the margin must be below the limit before a member requests to leave.
 const HOLD: Duration = Duration::from_millis(5_000);
 /// Time after the margin has reached the reserve at which the pilot is told to leave in any case.
@@ -38,17 +40,18 @@ pub(super) struct Endurance {
     limit: Option<Duration>,
     /// Time since which the margin is below the limit.
     low_since: Option<Instant>,
+    reviewed_at: Instant,
 }
 
-/// Returns `seconds` as a duration within 0 to a day.
-fn duration(seconds: f32) -> Duration {
+/// Returns `seconds` as a duration of at most a day; `None` if it is negative or not finite.
+fn duration(seconds: f32) -> Option<Duration> {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "0 to 8.64e7"
+        reason = "checked below"
     )]
-    let millis = (seconds.clamp(0.0, 86_400.0) * 1e3) as u64;
-    Duration::from_millis(millis)
+    let millis = (seconds.min(86_400.0) * 1e3) as u64;
+    (seconds.is_finite() && seconds >= 0.0).then_some(Duration::from_millis(millis))
 }
 
 /// Returns a duration in whole seconds, at most 65 534: the maximum is the mark of an unknown one.
@@ -80,13 +83,13 @@ impl Relay {
     /// ```
     pub fn handle_endurance(&mut self, now: Instant, remaining_s: f32, home_s: f32) {
         let now = self.clock.advance(now);
-        let is_valid = |value: f32| value.is_finite() && value >= 0.0;
-        if !is_valid(remaining_s) || !is_valid(home_s) {
-            self.lose_endurance();
-        } else if let Some(endurance) = self.endurance.first_mut() {
-            endurance.end = Some((now + duration(remaining_s), duration(home_s)));
+        let times = duration(remaining_s).zip(duration(home_s));
+        if let (Some((left, home)), Some(endurance)) = (times, self.endurance.first_mut()) {
+            endurance.end = Some((now + left, home));
             endurance.known_at = Some(now);
             endurance.is_lost = false;
+        } else {
+            self.lose_endurance();
         }
         self.review_endurance(now);
     }
@@ -134,17 +137,15 @@ impl Relay {
         let last = reserve.since(Instant::ZERO + LAST);
         let margin = self.margin(self.clock.internal(now));
         let is_last = margin.is_some_and(|margin| margin <= last);
-        self.node.is_free() || self.node.is_leaving() && is_last
+        self.node.leaves().is_some_and(|is_free| is_free || is_last)
     }
 
     /// Forgets the endurance of a drone on the ground. A departure goes on.
     pub(crate) fn reset_endurance(&mut self) {
-        if let Some(endurance) = self.endurance.first_mut() {
-            *endurance = Endurance {
-                losses: endurance.losses,
-                ..Endurance::default()
-            };
-        }
+        self.endurance = self.endurance.map(|it| Endurance {
+            losses: it.losses,
+            ..Endurance::default()
+        });
     }
 
     /// Records an order of the firmware: after `stay` half of the present margin has to pass before the next request to leave.
@@ -177,28 +178,20 @@ impl Relay {
         let (Some(margin), Some(endurance)) = (self.margin(now), self.endurance.first_mut()) else {
             return;
         };
+        endurance.reviewed_at = now;
         let low_since = endurance.low_since.unwrap_or(now);
         endurance.low_since = (margin < limit).then_some(low_since);
         let is_due = !self.node.has_joined() || now.since(low_since) >= HOLD;
-        if self.node.is_leaving() || margin < limit && is_due {
+        if self.node.leaves().is_some() || margin < limit && is_due {
             // The leader's order is due before the reserve is used.
             let left = (Instant::ZERO + margin).since(Instant::ZERO + reserve);
             self.node.leave(now, Some(seconds(left)));
         }
     }
 
-    /// Returns the time of the next call of [`review_endurance`](Self::review_endurance).
+    /// Returns the time of the next call of [`review_endurance`](Self::review_endurance); `None` before a valid value.
     pub(super) fn endurance_timeout(&self) -> Option<Instant> {
-        let endurance = self.endurance.first()?;
-        let (end, home) = endurance.end?;
-        let limit = self.margin_limit();
-        let early = (Instant::ZERO + home + limit).as_micros();
-        // One microsecond later the margin is below the limit, which it cannot be if that is 0.
-        let low_at = Instant::from_micros(end.as_micros().saturating_sub(early) + 1);
-        let leave_at = endurance.low_since.map_or(low_at, |at| at + HOLD);
-        let is_pending = !self.node.is_leaving() && limit > Duration::default();
-        let stale_at = endurance.known_at.map(|at| at + STALE);
-        let leave_at = Some(leave_at).filter(|_| is_pending);
-        [leave_at, stale_at].into_iter().flatten().min()
+        let endurance = self.endurance.first().filter(|it| it.end.is_some())?;
+        Some(endurance.reviewed_at + REVIEW)
     }
 }

@@ -736,7 +736,7 @@ impl Relay {
     ///
     /// The relay holds its place until [`Event::MayLeave`]. It needs a guard, or
     /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). Right after a start the relay does not
-    /// join the chain, unless the chain turns out to need it. See [`docs::batteries`](crate::docs::batteries). Takes
+    /// join the chain. See [`docs::batteries`](crate::docs::batteries). Takes
     /// constant time.
     ///
     /// ```

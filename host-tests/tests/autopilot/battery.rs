@@ -1,7 +1,7 @@
 //! Battery messages of PX4 and ArduCopter, and the departure that a relay requests by them.
 
 use mavlink::dialects::common::{
-    BATTERY_STATUS_DATA, HOME_POSITION_DATA, MavMessage, SYS_STATUS_DATA,
+    BATTERY_STATUS_DATA, HOME_POSITION_DATA, MavLandedState, MavMessage, SYS_STATUS_DATA,
 };
 use uav_relay::{Departure, Event, Geodetic, Placement, Relay, Settings, Wiring};
 

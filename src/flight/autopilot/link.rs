@@ -325,8 +325,7 @@ impl Autopilot {
     ///
     /// At first they are NaN (unknown: a percentage without a remaining time says nothing) and 1.5. The speed is clamped to 0.1 to 20.
     pub const fn set_endurance(&mut self, full_s: f32, descent_m_s: f32) {
-        self.vehicle.battery.full_s = full_s;
-        self.vehicle.battery.descent_m_s = descent_m_s.clamp(0.1, 20.0);
+        self.vehicle.battery.setup = Some([full_s, descent_m_s.clamp(0.1, 20.0)]);
     }
 
     /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.

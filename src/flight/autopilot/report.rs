@@ -52,8 +52,8 @@ pub(super) enum Topic {
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
-    /// Endurance of the drone: it may leave, or its battery is unknown.
-    Battery,
+    /// Order to the pilot to fly home.
+    Leave,
 }
 
 impl Topic {
@@ -71,7 +71,7 @@ pub(super) struct Line {
 impl Line {
     /// Text for the pilot of a drone that has to leave, repeated every [`URGENT`].
     pub(super) const LEAVE: Self = Self {
-        topic: Topic::Battery,
+        topic: Topic::Leave,
         severity: severity::CRITICAL,
         text: ["battery: leave now", ""],
     };
@@ -117,12 +117,7 @@ impl Line {
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
             Event::MayLeave => return Some(Self::LEAVE),
-            Event::EnduranceUnknown => {
-                return Some(Self::warning(
-                    Topic::Battery,
-                    ["battery: endurance unknown", ""],
-                ));
-            }
+            Event::EnduranceUnknown => "battery: endurance unknown",
             Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",

@@ -334,12 +334,13 @@ impl Vehicle {
     /// NaN is unknown, as the way home is without a position, and to a home that is unknown or far from the line.
     pub(super) fn take_endurance(&mut self, axis: &Axis, speed_m_s: f32) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
+        let [_, descent_m_s] = self.battery.setup.unwrap_or(Battery::UNSET);
         let home = self.home.and_then(|home| axis.place(home));
         let way = home.zip(self.position);
         let home_s = way.map_or(f32::NAN, |(to, Position { place: from, .. })| {
             let level_m = libm::hypotf(from.x_m - to.x_m, from.y_m - to.y_m);
             let height_m = (from.altitude_m - to.altitude_m).abs();
-            level_m / speed_m_s + height_m / self.battery.descent_m_s
+            level_m / speed_m_s + height_m / descent_m_s
         });
         Some([remaining_s, home_s])
     }
@@ -394,29 +395,18 @@ const NO_DETAILS: Duration = Duration::from_millis(10_000);
 const CERTAIN: f32 = 0.9;
 
 /// Endurance by the battery's messages.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Time of flight with a full battery, s; NaN if unknown.
-    pub(super) full_s: f32,
-    /// Mean speed of the descent to land, m/s.
-    pub(super) descent_m_s: f32,
+    /// Time of flight with a full battery, s, and mean speed of the descent to land, m/s; `None` for [`UNSET`](Self::UNSET).
+    pub(super) setup: Option<[f32; 2]>,
     detailed_at: Option<Instant>,
     /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
     newest: Option<f32>,
 }
 
-impl Default for Battery {
-    fn default() -> Self {
-        Self {
-            full_s: f32::NAN,
-            descent_m_s: 1.5,
-            detailed_at: None,
-            newest: None,
-        }
-    }
-}
-
 impl Battery {
+    const UNSET: [f32; 2] = [f32::NAN, 1.5];
+
     /// Records the first battery's BATTERY_STATUS, or without one SYS_STATUS. The time counts; without one, the percentage.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
     fn record(&mut self, now: Instant, battery: Option<u8>, percent: i8, remaining_s: i32) {
@@ -431,7 +421,7 @@ impl Battery {
         self.newest = Some(if remaining_s > 0 {
             CERTAIN * remaining_s as f32
         } else if (0..=100).contains(&percent) {
-            f32::from(percent) / 100.0 * self.full_s
+            f32::from(percent) / 100.0 * self.setup.unwrap_or(Self::UNSET)[0]
         } else {
             f32::NAN
         });

@@ -11,7 +11,7 @@
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
 //! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
 //! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
-//! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost |
+//! | outside, called or `stay`; after membership: no later view for `dead_after`, not free for 16 times `dead_after` | join as a relay that was lost |
 
 use super::{Layers, Node};
 use crate::event::{Event, NodeEvent};
@@ -207,14 +207,10 @@ impl Node {
         }
     }
 
-    /// Returns true if this relay has requested to leave.
-    pub(crate) const fn is_leaving(&self) -> bool {
-        self.layers.leaving.requested
-    }
-
-    /// Returns true if the drone may fly away.
-    pub(crate) const fn is_free(&self) -> bool {
-        self.layers.leaving.free
+    /// Returns true if the drone may fly away; `None` unless this relay has requested to leave.
+    pub(crate) fn leaves(&self) -> Option<bool> {
+        let leaving = &self.layers.leaving;
+        leaving.requested.then_some(leaving.free)
     }
 
     /// Returns true once this relay has taken part in anything; false for a spare.
@@ -303,7 +299,7 @@ impl Node {
         } else {
             settings.dead_after
         };
-        // A relay that has not taken part in anything since its start is not needed.
+        // A relay that has not taken part in anything since its start is in no view that needs it.
         let may_return = !spare && !free && !self.layers.round.is_fresh();
         if may_return && outside_since.is_some_and(|at| now.since(at) >= most) {
             self.come_back(now);

@@ -47,16 +47,12 @@ impl Layers {
 impl Node {
     pub(crate) const fn leave(&self, _: Instant, _: Option<u16>) {}
 
-    pub(crate) const fn is_leaving(&self) -> bool {
-        false
+    pub(crate) const fn leaves(&self) -> Option<bool> {
+        None
     }
 
     pub(crate) const fn has_joined(&self) -> bool {
         true
-    }
-
-    pub(crate) const fn is_free(&self) -> bool {
-        false
     }
 
     pub(super) const fn return_if_expired(&self, _: Instant) {}
