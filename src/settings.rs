@@ -162,10 +162,6 @@ pub struct Settings {
     /// that still holds its place: beside the end of a chain to within a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
-    /// Reserve of the drone's endurance, beyond the way home and the time of a replacement.
-    ///
-    /// Needs the feature `departures`. By default 3 min; see `Relay::handle_endurance`.
-    pub reserve: Duration,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
     /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
     /// Set it on all relays of a chain, or on none.
@@ -214,7 +210,6 @@ impl Settings {
         respacing: Duration::from_micros(0),
         #[cfg(feature = "departures")]
         leave_without_guard: false,
-        reserve: Duration::from_millis(180_000),
         sited: false,
     };
 

@@ -197,6 +197,12 @@ pub(crate) struct BatteryOptions {
     pub(crate) spare: bool,
 }
 
+impl BatteryOptions {
+    pub(crate) fn reserve(&self) -> Duration {
+        micros(self.reserve)
+    }
+}
+
 /// Direction of a directional antenna.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Antenna {
@@ -303,7 +309,6 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         hop_time: load.hop_time(options.baud, LATENCY),
         probe_after: Duration::from_millis(options.probe_after_ms),
         dead_after: Duration::from_millis(options.dead_after_ms),
-        reserve: micros(options.battery.reserve),
         ..Settings::default()
     };
     if options.battery.spare && index == mission.leader() {

@@ -98,6 +98,7 @@ impl Flight {
         let now = service.now();
         let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now)
             .map_err(|error| error.to_string())?;
+        relay.set_reserve(options.battery.reserve());
         if options.battery.spare {
             relay.wait_as_spare(now);
         }

@@ -22,6 +22,8 @@ const STALE: Duration = Duration::from_millis(10_000);
 const REVIEW: Duration = Duration::from_millis(1_000);
 /// Time for which the margin must be below the limit before a member requests to leave.
 const HOLD: Duration = Duration::from_millis(5_000);
+/// Reserve until `Relay::set_reserve`.
+const RESERVE: Duration = Duration::from_millis(180_000);
 /// Time after the margin has reached the reserve at which the pilot is told to leave in any case.
 const LAST: Duration = Duration::from_millis(10_000);
 /// Maximum time of a replacement, in units of `dead_after`: 8 until the order, 4 until the view without the relay is in place.
@@ -36,6 +38,8 @@ pub(super) struct Endurance {
     /// True from `EnduranceUnknown` to the next valid value.
     is_lost: bool,
     losses: u32,
+    /// Reserve beyond the way home and the time of a replacement; `None` for [`RESERVE`].
+    reserve: Option<Duration>,
     /// Limit of the margin since `Relay::stay`; `None` for the usual one.
     limit: Option<Duration>,
     /// Time since which the margin is below the limit.
@@ -94,6 +98,18 @@ impl Relay {
         self.review_endurance(now);
     }
 
+    /// Sets the reserve of the endurance beyond the way home and the time of a replacement; at first 3 min.
+    pub fn set_reserve(&mut self, reserve: Duration) {
+        if let Some(endurance) = self.endurance.first_mut() {
+            endurance.reserve = Some(reserve);
+        }
+    }
+
+    fn reserve(&self) -> Duration {
+        let reserve = self.endurance.first().and_then(|it| it.reserve);
+        reserve.unwrap_or(RESERVE)
+    }
+
     /// Returns the remaining time of flight, s; `None` while it is unknown. Takes constant time.
     pub fn endurance_s(&self, now: Instant) -> Option<u16> {
         let Endurance { end, known_at, .. } = self.endurance.first()?;
@@ -104,7 +120,7 @@ impl Relay {
 
     /// Returns the endurance below which the relay requests to leave, s; `None` before a valid value.
     ///
-    /// It is the time of the way home, [`Settings::reserve`](crate::Settings::reserve), twelve times `dead_after` for the replacement, and
+    /// It is the time of the way home, the reserve ([`set_reserve`](Self::set_reserve)), twelve times `dead_after` for the replacement, and
     /// `respacing`; after [`stay`](Self::stay) at most the way home and half of what was left beyond it. Takes constant time.
     pub fn endurance_limit_s(&self) -> Option<u16> {
         let (_, home) = self.endurance.first()?.end?;
@@ -125,7 +141,7 @@ impl Relay {
     fn margin_limit(&self) -> Duration {
         let settings = &self.node.member().settings;
         let replacement = settings.dead_after.times(REPLACEMENT);
-        let usual = Instant::ZERO + settings.reserve + replacement + Leaving::respacing(settings);
+        let usual = Instant::ZERO + self.reserve() + replacement + Leaving::respacing(settings);
         let usual = usual.since(Instant::ZERO);
         let lower = self.endurance.first().and_then(|it| it.limit);
         lower.map_or(usual, |lower| lower.min(usual))
@@ -133,8 +149,7 @@ impl Relay {
 
     /// Returns true if the pilot has to fly home: the drone may leave, or has requested it and is at its reserve for [`LAST`].
     pub(crate) fn must_leave(&self, now: Instant) -> bool {
-        let reserve = Instant::ZERO + self.node.member().settings.reserve;
-        let last = reserve.since(Instant::ZERO + LAST);
+        let last = (Instant::ZERO + self.reserve()).since(Instant::ZERO + LAST);
         let margin = self.margin(self.clock.internal(now));
         let is_last = margin.is_some_and(|margin| margin <= last);
         self.node.leaves().is_some_and(|is_free| is_free || is_last)
@@ -144,6 +159,7 @@ impl Relay {
     pub(crate) fn reset_endurance(&mut self) {
         self.endurance = self.endurance.map(|it| Endurance {
             losses: it.losses,
+            reserve: it.reserve,
             ..Endurance::default()
         });
     }
@@ -174,7 +190,7 @@ impl Relay {
         if known_at.is_some_and(|at| now.since(at) >= STALE) {
             self.lose_endurance();
         }
-        let (limit, reserve) = (self.margin_limit(), self.node.member().settings.reserve);
+        let (limit, reserve) = (self.margin_limit(), self.reserve());
         let (Some(margin), Some(endurance)) = (self.margin(now), self.endurance.first_mut()) else {
             return;
         };
