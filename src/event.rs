@@ -121,8 +121,9 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
     /// fly away.
     MayLeave,
-    /// The drone's endurance is unknown: an invalid value, none for 10 s, or none when the relay takes control.
+    /// The drone's endurance is unknown.
     ///
+    /// A value was invalid, none came for 10 s, or there was none when the relay took control.
     /// The last valid value counts down (`Relay::handle_endurance`). Without any the relay does not leave by itself: the pilot watches
     /// the battery. Not raised again before a valid value.
     EnduranceUnknown,

@@ -1,4 +1,4 @@
-//! Battery of the drone: its departure in the log, texts to the pilot, and the wait at a start in flight.
+//! Battery of the drone: departure in the log, texts to the pilot, wait at a start in flight.
 //!
 //! | departure | text to the pilot |
 //! | --- | --- |
@@ -34,7 +34,7 @@ pub(crate) struct Battery {
 }
 
 impl Battery {
-    /// Creates the state at the start; `waits` for a relay that learns its drone's endurance from an autopilot.
+    /// Creates the state at the start; `waits` for a relay whose drone has an autopilot.
     pub(crate) const fn new(waits: bool) -> Self {
         Self {
             departure: Departure::Member,
@@ -89,7 +89,7 @@ impl Battery {
         }
     }
 
-    /// Executes the operator's commands `leave` and `stay` from the status socket; `None` for another command.
+    /// Executes the operator's commands `leave` and `stay`; `None` for another command.
     pub(crate) fn command(
         now: Instant,
         log: &Log,
@@ -128,7 +128,7 @@ impl Battery {
     }
 }
 
-/// Returns the reason of a refused departure for the pilot, up to 37 bytes; `None` if it is not refused.
+/// Returns the reason of a refusal for the pilot, up to 37 bytes; `None` without one.
 fn refusal(departure: Departure, relay: &Relay) -> Option<String> {
     let relays = relay.mission().relays();
     Some(match departure {

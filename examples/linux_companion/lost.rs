@@ -128,7 +128,9 @@ impl Lost {
     }
 }
 
-/// Logs an operator's command and its result with the event's name; returns the answer for the status socket.
+/// Logs an operator's command and its result; returns the answer for the status socket.
+///
+/// `done` has the event's name and a text.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,

@@ -185,8 +185,8 @@ pub(crate) struct BatteryOptions {
     /// this reserve, and twelve times --dead-after-ms for the replacement
     #[arg(long, value_name = "S", default_value_t = 180.0, allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
     reserve: f32,
-    /// Shortest time of flight with a full battery, s, 1 to 86400, for an autopilot that reports a percentage but no time left, as
-    /// ArduCopter does. Without it such an endurance is unknown
+    /// Shortest time of flight with a full battery, s, 1 to 86400. It is for an autopilot that reports a percentage but no time left,
+    /// as ArduCopter does. Without it such an endurance is unknown
     #[arg(long, value_name = "S", requires = "autopilot", allow_negative_numbers = true, value_parser = number([1.0, 86_400.0]))]
     flight_time: Option<f32>,
     /// Mean speed at which the autopilot descends to land, m/s, 0.1 to 20

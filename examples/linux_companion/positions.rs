@@ -34,9 +34,9 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position received since the last call, and the remaining time of flight and the time of the way home, s.
+    /// Returns the newest position and times received since the last call.
     ///
-    /// Invalid times are NaN. Passes measurements to `on_sample` and logs the first invalid line. Work: that of [`Fifo::read`].
+    /// The times are the remaining one of flight and that of the way home, s. Invalid times are NaN. Passes measurements to `on_sample` and logs the first invalid line. Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
@@ -102,7 +102,9 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parsed line: position and measurement, or remaining time of flight and way home, s (NaN if it is no number).
+/// Parsed line: position and measurement, or remaining time of flight and way home, s.
+///
+/// A time that is no number is NaN.
 enum Line {
     Position(Option<Placement>, Option<Sample>),
     Endurance([f32; 2]),

@@ -26,7 +26,9 @@ const HOLD: Duration = Duration::from_millis(5_000);
 const RESERVE: Duration = Duration::from_millis(180_000);
 /// Time after the margin has reached the reserve at which the pilot is told to leave in any case.
 const LAST: Duration = Duration::from_millis(10_000);
-/// Maximum time of a replacement, in units of `dead_after`: 8 until the order, 4 until the view without the relay is in place.
+/// Maximum time of a replacement, in units of `dead_after`.
+///
+/// It is 8 until the order, and 4 until the view without the relay is in place.
 const REPLACEMENT: u32 = 12;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,9 +66,9 @@ fn seconds(span: Duration) -> u16 {
 }
 
 impl Relay {
-    /// Records the drone's remaining time of flight and the time of its way home, s; needs the feature `departures`.
+    /// Records the drone's remaining time of flight and the time of its way home, s.
     ///
-    /// The time of flight is the least likely one. Any value that is not finite or is negative, such as NaN for an unknown one, and a
+    /// Needs the feature `departures`. The time of flight is the least likely one. Any value that is not finite or is negative, such as NaN for an unknown one, and a
     /// pause of 10 s make the endurance unknown ([`Event::EnduranceUnknown`](crate::Event::EnduranceUnknown)): the last valid one counts down.
     ///
     /// The relay calls [`leave`](Self::leave) by itself once the endurance has been below [`endurance_limit_s`](Self::endurance_limit_s) for
@@ -147,7 +149,9 @@ impl Relay {
         lower.map_or(usual, |lower| lower.min(usual))
     }
 
-    /// Returns true if the pilot has to fly home: the drone may leave, or has requested it and is at its reserve for [`LAST`].
+    /// Returns true if the pilot has to fly home.
+    ///
+    /// The drone may leave, or it has requested that and its margin reached the reserve [`LAST`] ago.
     pub(crate) fn must_leave(&self, now: Instant) -> bool {
         let last = (Instant::ZERO + self.reserve()).since(Instant::ZERO + LAST);
         let margin = self.margin(self.clock.internal(now));
@@ -164,7 +168,7 @@ impl Relay {
         });
     }
 
-    /// Records an order of the firmware: after `stay` half of the present margin has to pass before the next request to leave.
+    /// Records an order of the firmware. After `stay` the limit is at most half of the present margin.
     pub(super) fn override_endurance(&mut self, now: Instant, stays: bool) {
         let margin = self.margin(now).unwrap_or_else(|| self.margin_limit());
         if let Some(endurance) = self.endurance.first_mut() {
@@ -184,7 +188,7 @@ impl Relay {
         }
     }
 
-    /// Compares the endurance with the limit; requests to leave, or renews the request's endurance for the leader.
+    /// Compares the margin with the limit; requests to leave, or renews the request's endurance.
     pub(super) fn review_endurance(&mut self, now: Instant) {
         let known_at = self.endurance.first().and_then(|it| it.known_at);
         if known_at.is_some_and(|at| now.since(at) >= STALE) {
@@ -205,7 +209,7 @@ impl Relay {
         }
     }
 
-    /// Returns the time of the next call of [`review_endurance`](Self::review_endurance); `None` before a valid value.
+    /// Returns the time of the next comparison of margin and limit; `None` before a valid value.
     pub(super) fn endurance_timeout(&self) -> Option<Instant> {
         let endurance = self.endurance.first().filter(|it| it.end.is_some())?;
         Some(endurance.reviewed_at + REVIEW)

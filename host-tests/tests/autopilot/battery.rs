@@ -194,7 +194,7 @@ fn an_invalid_percentage_without_a_time_is_unknown() {
     }
 }
 
-/// Checks a percentage without a time, as ArduCopter reports it: it counts by the time of flight with a full battery.
+/// Checks a percentage without a time, as ArduCopter reports it.
 #[test]
 fn a_percentage_counts_by_the_time_of_a_full_battery() {
     let send: [fn(&mut Vehicle, i8); 2] = [
@@ -264,7 +264,7 @@ fn a_relay_with_a_low_battery_requests_to_leave() {
     assert_eq!(pair.relay.endurance_s(pair.vehicle.now), None);
 }
 
-/// Checks an endurance that was never known: the pilot and the firmware are told when the relay takes control, once.
+/// Checks an endurance that was never known: it is reported once, when the relay takes control.
 #[test]
 fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -356,7 +356,7 @@ fn the_last_endurance_counts_down() {
     }
 }
 
-/// Checks that the operator's order to stay holds until half of the time beyond the way home has passed.
+/// Checks that an order to stay holds until half of the time beyond the way home has passed.
 #[test]
 fn the_operators_order_to_stay_holds() {
     let mut relay = shared(1, 1);

@@ -35,7 +35,7 @@ impl Drop for Pair {
 }
 
 impl Pair {
-    /// Starts both relays, relay 2 with `more` options, and the drone on the ground with a battery at `battery`.
+    /// Starts both relays, and the drone on the ground with a battery at `battery`.
     fn grounded(kind: &str, more: &str, battery: &str) -> Self {
         let chain = Chain::on_channel(2, Medium::new(2, QUIET));
         let fifo = chain.files.fifo("positions");
@@ -103,9 +103,9 @@ fn is_command(heard: &ReceivedMessage) -> bool {
     heard.is("COMMAND_LONG") && heard.0["command"] != 511 || heard.is("SET_MODE")
 }
 
-/// Checks a drone whose battery falls: on the ground nothing counts, in flight the relay leaves, and the pilot flies it home.
+/// Checks a drone whose battery falls: on the ground nothing counts, in flight the relay leaves.
 ///
-/// The relay starts again while he does so. It does not join the chain.
+/// The pilot flies the drone home. The relay starts again while he does so. It does not join the chain.
 #[test]
 fn a_low_battery_leads_a_drone_out_of_the_chain() {
     for (kind, more, [full, low]) in [

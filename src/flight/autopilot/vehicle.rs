@@ -219,14 +219,9 @@ impl Vehicle {
             Incoming::PositionTargetGlobal { lat_e7, lon_e7, .. } => {
                 VehicleUpdate::Target(lat_e7, lon_e7)
             }
-            Incoming::Battery {
-                battery,
-                percent,
-                remaining_s,
-            } if cfg!(feature = "departures") => {
-                self.battery.record(now, battery, percent, remaining_s);
+            Incoming::Battery { .. } if cfg!(feature = "departures") => {
                 // On the ground a PX4 computes the time from an assumed current.
-                self.battery.newest = self.battery.newest.filter(|_| self.armed && self.in_air);
+                self.battery.record(now, message, self.armed && self.in_air);
                 VehicleUpdate::StateChanged
             }
             Incoming::Home(at) if cfg!(feature = "departures") => {
@@ -329,9 +324,9 @@ impl Vehicle {
         });
     }
 
-    /// Returns the newest remaining time of flight, once, and the time of the way home at `speed_m_s` along the ground, s.
+    /// Returns the newest remaining time of flight, once, and the time of the way home, s.
     ///
-    /// NaN is unknown, as the way home is without a position, and to a home that is unknown or far from the line.
+    /// `speed_m_s` is the speed along the ground. NaN is unknown, as the way home is without a position, and to a home that is unknown or far from the line.
     pub(super) fn take_endurance(&mut self, axis: &Axis, speed_m_s: f32) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let [_, descent_m_s] = self.battery.setup.unwrap_or(Battery::UNSET);
@@ -397,7 +392,9 @@ const CERTAIN: f32 = 0.9;
 /// Endurance by the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Time of flight with a full battery, s, and mean speed of the descent to land, m/s; `None` for [`UNSET`](Self::UNSET).
+    /// Time of flight with a full battery, s, and mean speed of the descent to land, m/s.
+    ///
+    /// `None` for [`UNSET`](Self::UNSET).
     pub(super) setup: Option<[f32; 2]>,
     detailed_at: Option<Instant>,
     /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
@@ -409,7 +406,15 @@ impl Battery {
 
     /// Records the first battery's BATTERY_STATUS, or without one SYS_STATUS. The time counts; without one, the percentage.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
-    fn record(&mut self, now: Instant, battery: Option<u8>, percent: i8, remaining_s: i32) {
+    fn record(&mut self, now: Instant, message: Incoming, is_flying: bool) {
+        let Incoming::Battery {
+            battery,
+            percent,
+            remaining_s,
+        } = message
+        else {
+            return;
+        };
         let is_detailed = self
             .detailed_at
             .is_some_and(|at| now.since(at) < NO_DETAILS);
@@ -418,12 +423,14 @@ impl Battery {
             None if !is_detailed => {}
             _ => return,
         }
-        self.newest = Some(if remaining_s > 0 {
-            CERTAIN * remaining_s as f32
-        } else if (0..=100).contains(&percent) {
-            f32::from(percent) / 100.0 * self.setup.unwrap_or(Self::UNSET)[0]
-        } else {
-            f32::NAN
+        self.newest = is_flying.then(|| {
+            if remaining_s > 0 {
+                CERTAIN * remaining_s as f32
+            } else if (0..=100).contains(&percent) {
+                f32::from(percent) / 100.0 * self.setup.unwrap_or(Self::UNSET)[0]
+            } else {
+                f32::NAN
+            }
         });
     }
 }
