@@ -325,8 +325,10 @@ impl Relay {
     /// assert!(relay.poll_timeout().is_some_and(|due| due >= Instant::ZERO), "sleep until then, or the next byte");
     /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let due = [self.node.poll_timeout(), self.endurance_timeout()];
-        let due = due.into_iter().flatten().min()?;
+        let due = match (self.node.poll_timeout(), self.endurance_timeout()) {
+            (Some(due), Some(endurance)) => due.min(endurance),
+            (due, endurance) => due.or(endurance)?,
+        };
         Some(self.clock.external(due))
     }
 }
