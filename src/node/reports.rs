@@ -54,11 +54,16 @@ pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 /// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
 
+/// Numbers of control states in a report.
+const SILENT: u16 = State::Silent as u16 + 1;
+const ENGAGED: u16 = State::Engaged as u16 + 1;
+const BLIND: u16 = State::Blind as u16 + 1;
+
 /// Minimum time from an own entry to the next one, so that every relay and the station take it for a newer one.
 const APART: Duration = Duration::from_millis(700);
 
 /// Time by which reports of changed states may be ahead of the share of the channel.
-const AHEAD: Duration = Duration::from_millis(2_000);
+const AHEAD: Duration = Duration::from_millis(1_000);
 
 /// Minimum time between two reports of a relay.
 const LEAST_PERIOD: Duration = Duration::from_millis(500);
@@ -164,14 +169,22 @@ impl Reporting {
         self.power_w = power_w;
     }
 
-    /// Takes the control state; a change is reported ahead of its turn.
+    /// Takes the control state. An urgent change is reported ahead of its turn, another change as soon as the share of
+    /// the channel allows.
     pub(crate) fn handle_control(&mut self, control: u16) {
-        if core::mem::replace(&mut self.control, control) != control {
-            if control == State::Blind as u16 + 1 {
+        let before = core::mem::replace(&mut self.control, control);
+        if before != control {
+            if control == BLIND {
                 // An entry with the age of the last position would not count as newer.
                 self.position = None;
             }
-            self.expedite();
+            if is_urgent(before, control) {
+                self.expedite();
+            } else {
+                for watched in &mut self.watched {
+                    (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
+                }
+            }
         }
     }
 
@@ -490,7 +503,7 @@ impl Reporting {
             // Two ways of one entry differ by the rounding of its age.
             if at > old.at + Duration::from_millis(300) {
                 stored.detail = detail.or(old.detail);
-                if alarms(old.entry.state()) != alarms(entry.state()) {
+                if is_changed(old.entry.state(), entry.state()) {
                     stored.rank = Rank::Changed;
                 }
                 stored.rank = stored.rank.max(old.rank);
@@ -661,15 +674,27 @@ fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     byte.times(bytes).max(LEAST_PERIOD)
 }
 
-/// Returns the part of an entry's state that begins and ends alarms.
+/// Returns true if a control state that changes from `before` to `now` begins an alarm.
 ///
-/// These are the control state, silent neighbours, a duplicate number, and two phases.
+/// These are a silent autopilot, an unknown position, and the end of the relay's control.
+const fn is_urgent(before: u16, now: u16) -> bool {
+    now != before && (now == SILENT || now == BLIND || before == ENGAGED)
+}
+
+/// Returns true if an entry's state that changes from `before` to `now` begins or ends an alarm: a control state, silent
+/// neighbours, a duplicate number, or one of two phases.
+const fn is_changed(before: u16, now: u16) -> bool {
+    is_urgent(before / 4096 % 6, now / 4096 % 6) || alarms(before) != alarms(now)
+}
+
+/// Returns the part of an entry's state that begins and ends alarms, without the control state.
 const fn alarms(state: u16) -> u16 {
     let phase = match state % 8 {
         fault @ (5 | 7) => fault, // infeasible, no quorum
         _ => 0,
     };
-    (state & 0xF600) + phase
+    let is_duplicated = (state / 4096 >= 6) as u16;
+    is_duplicated * 4096 + (state & 0x0600) + phase
 }
 
 /// Returns the age in tenths of a second, rounded. It includes 20 ms for the transmission.
