@@ -108,7 +108,7 @@ impl Faults {
 /// In the bad state it loses all frames, in the good state none.
 #[derive(Debug)]
 pub struct Bursts {
-    /// Mean fraction of frames that the link loses, 0 to 1. It equals the fraction of time in which the link is in its bad state.
+    /// Mean fraction of frames that the link loses, 0 to 1. It equals the fraction of frames that find the link in its bad state.
     share: f64,
     /// Probability that a link in the good state is in the bad state for the next frame.
     worsens: f64,
