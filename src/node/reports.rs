@@ -59,7 +59,7 @@ const SILENT: u16 = State::Silent as u16 + 1;
 const ENGAGED: u16 = State::Engaged as u16 + 1;
 const BLIND: u16 = State::Blind as u16 + 1;
 
-/// Minimum time from an own entry to the next one, so that every relay and the station take it for a newer one.
+/// Minimum time between own entries, so that every relay and the station take the second for newer.
 const APART: Duration = Duration::from_millis(700);
 
 /// Time by which reports of changed states may be ahead of the share of the channel.
@@ -188,7 +188,7 @@ impl Reporting {
         }
     }
 
-    /// Handles an event about node `node` at `side`: what it changes in the own state is reported ahead of its turn.
+    /// Handles an event about node `node` at `side`: a changed own state is reported ahead of its turn.
     pub(crate) fn handle_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         match kind {
             NodeEvent::Mission | NodeEvent::Key | NodeEvent::Epoch => {
@@ -681,8 +681,8 @@ const fn is_urgent(before: u16, now: u16) -> bool {
     now != before && (now == SILENT || now == BLIND || before == ENGAGED)
 }
 
-/// Returns true if an entry's state that changes from `before` to `now` begins or ends an alarm: a control state, silent
-/// neighbours, a duplicate number, or one of two phases.
+/// Returns true if the change of an entry's state from `before` to `now` begins or ends an alarm. States with alarms
+/// are control states, silent neighbours, a duplicate number, and two phases.
 const fn is_changed(before: u16, now: u16) -> bool {
     is_urgent(before / 4096 % 6, now / 4096 % 6) || alarms(before) != alarms(now)
 }

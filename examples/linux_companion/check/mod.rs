@@ -48,8 +48,8 @@ const YEAR_2024_S: u64 = 1_704_067_200;
 /// Files with the udev rules of a bundle: beside the configuration, or where they are installed.
 const RULES: &str = "70-uav-relay.rules";
 
-/// Checks this computer, then the autopilot and the neighbours for at most `limit` after it has listened. Prints all lines; returns
-/// true if all are green.
+/// Checks this computer, then the autopilot and the neighbours for at most `limit`. It listens first. Prints all lines;
+/// returns true if all are green.
 pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     let options = &plan.options;
     let (mut lines, ports) = ports(plan);
@@ -130,7 +130,7 @@ pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     red == 0
 }
 
-/// Exchanges messages with the drone and the neighbours until all lines stay green, or for `limit` after it has listened.
+/// Exchanges messages with the drone and the neighbours until all lines stay green, or for `limit`.
 fn watch(
     plan: &Plan,
     now: impl Fn() -> Instant,

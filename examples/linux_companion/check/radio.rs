@@ -146,7 +146,7 @@ impl Radio {
         self.sends_from
     }
 
-    /// Returns the relays that fly, or take part in a chain without a report that their drones are on the ground.
+    /// Returns the relays that fly, or are in a chain without a report that their drones are on the ground.
     fn flying(&self) -> Vec<String> {
         let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
         let flying = self.heard.iter().filter(|(_, heard)| flies(heard));

@@ -344,7 +344,7 @@ pub(crate) fn head(answer: Answer) -> String {
     }
 }
 
-/// Returns the response with a map tile: status 204 if there is none, which no browser logs as an error.
+/// Returns the response with a map tile: status 204 if there is none, which browsers do not log.
 pub(crate) fn picture(tile: Option<(&str, Vec<u8>)>) -> Vec<u8> {
     let (status, reason, media, content) = match tile {
         Some((media, content)) => (200, "OK", media, content),

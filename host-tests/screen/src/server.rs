@@ -84,13 +84,13 @@ const MAX_ALL_TRIES: usize = 100;
 /// Stack size of a connection's thread, bytes. A tile may have to be decompressed, and an overflow would end the program.
 const STACK: usize = 1024 * 1024;
 
-/// Pictures of the map below the chain, from a file of the program: tiles of the Web Mercator projection.
+/// Pictures of the map below the chain: tiles of the Web Mercator projection from the program's file.
 pub struct Tiles {
     /// Smallest and largest zoom level.
     pub zooms: [u8; 2],
     /// Text that names the source of the pictures, which the page shows. Empty without one.
     pub attribution: String,
-    /// Returns the media type and the bytes of the tile with this zoom level, column and row; `None` if there is none.
+    /// Returns media type and bytes of the tile at a zoom level, column and row; `None` if there is none.
     ///
     /// Threads of several browsers call it at the same time.
     pub read: Box<TileReader>,

@@ -211,7 +211,7 @@ fn add_passes(hash: &mut u64, mut setup: Setup) -> usize {
     count
 }
 
-/// Checks that relays of one direction send the same Sweeps, Verdicts and Asides as before, byte for byte.
+/// Checks that relays of one direction send the same Sweeps, Verdicts and Asides as before.
 #[test]
 fn passes_of_one_direction_are_equal_byte_for_byte() {
     const RECORDED: u64 = 0xdeb4_11e3_1ec0_46b1;

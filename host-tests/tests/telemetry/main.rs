@@ -367,8 +367,8 @@ fn a_hundred_relays_on_wires() {
     assert!(figures.most_bytes([s(1), span[1]]) <= 0.1 * RATE);
 }
 
-/// Checks the time from a change of a drone's control state that begins an alarm until the station knows it. Pilots take over one drone after the other, and
-/// autopilots restart, so that the chain often agrees on new positions meanwhile.
+/// Checks the time until the station knows a changed control state that begins an alarm. Pilots take over one drone
+/// after the other, and autopilots restart, so that the chain often agrees on new positions meanwhile.
 #[test]
 fn changed_control_states_are_known_in_time() {
     let (mut delays_s, mut most) = (Vec::new(), 0.0_f64);

@@ -86,7 +86,7 @@ pub enum TimelineEvent {
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
-    /// This relay has informed a node outside of the chain that the node's drone may fly away.
+    /// Event that this relay has informed a node outside of the chain that its drone may fly away.
     MayLeaveTold,
 }
 

@@ -130,7 +130,7 @@ pub struct Encounter {
 pub struct NearDrone {
     /// Number of the drone's relay.
     pub relay: usize,
-    /// Activity of the drone, departure state of its relay, and what holds its setpoint toward Tx and toward Rx.
+    /// Activity of the drone, departure state of its relay, and what holds its setpoint on each side.
     pub state: String,
     /// True position: x, y and altitude, m.
     pub at_m: Point,
@@ -173,7 +173,7 @@ impl Rotation {
             .unwrap_or(0)
     }
 
-    /// Returns the way from the ground to the place `x_m` beside the line, a spacing above `altitude_m` for each lower tube.
+    /// Returns the way from the ground to the place `x_m` beside the line, above all lower tubes.
     pub(super) fn way_out(&self, x_m: f64, altitude_m: f64, tube: usize) -> VecDeque<Point> {
         let spacing_m = self.spacing_m;
         let (pad_m, above_m) = self.tube(altitude_m, tube);

@@ -454,7 +454,7 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
     }
 }
 
-/// Moves relative paths of files that the unit writes, if they are given, into the folder that it may write.
+/// Moves relative paths of files that the unit writes, if given, into the folder that it may write.
 ///
 /// # Errors
 /// An absolute path is in another folder.

@@ -255,7 +255,7 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// JavaScript that returns the opacity of a relay's symbol as drawn: that of the colours near its upper edge, from 0 to 1.
+/// JavaScript that returns the opacity, 0 to 1, of a relay's symbol, from the colours at its upper edge.
 const OPACITY: &str = "(number) => { map.draw(); const { position } = map.snapshot.relays.find((it) => it.number === number); \
     const [x, y] = map.pixels(position.x_m, position.y_m); const part = (colour) => parseInt(colour.slice(1, 3), 16); \
     const red = map.pen.getImageData(Math.round(x), Math.round(y) - 7, 1, 1).data[0]; \
@@ -851,7 +851,7 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
     println!("pictures took {:?}", start.elapsed());
 }
 
-/// Returns the times of the first paint, ms, of `loads` loads of `url` in a browser that is already running.
+/// Returns the times of the first paint, ms, of `loads` loads of `url` in a running browser.
 fn first_paints(browser: &mut Browser, url: &str, loads: usize) -> Vec<f64> {
     let paint =
         "performance.getEntriesByType('paint').find((it) => it.name === 'first-contentful-paint')";
