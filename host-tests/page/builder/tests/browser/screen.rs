@@ -255,7 +255,7 @@ fn an_unknown_position_and_the_way_back_are_shown_as_they_are() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// JavaScript that returns the opacity, 0 to 1, of a relay's symbol, from the colours at its upper edge.
+/// JavaScript that returns the opacity, 0 to 1, of a relay's symbol, from colours at its upper edge.
 const OPACITY: &str = "(number) => { map.draw(); const { position } = map.snapshot.relays.find((it) => it.number === number); \
     const [x, y] = map.pixels(position.x_m, position.y_m); const part = (colour) => parseInt(colour.slice(1, 3), 16); \
     const red = map.pen.getImageData(Math.round(x), Math.round(y) - 7, 1, 1).data[0]; \
