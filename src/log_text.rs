@@ -190,10 +190,10 @@ mod autopilot {
                 ),
                 Self::State(state) => defmt::write!(f, "{}", state),
                 Self::Released(release) => {
-                    defmt::write!(f, "setpoint control released: {}", release)
+                    defmt::write!(f, "setpoint control released: {}", release);
                 }
                 Self::Waits(reason) => {
-                    defmt::write!(f, "setpoint control cannot be engaged: {}", reason)
+                    defmt::write!(f, "setpoint control cannot be engaged: {}", reason);
                 }
                 Self::Ready => defmt::write!(f, "ready: the pilot may choose OFFBOARD or GUIDED"),
                 Self::Refused => defmt::write!(
