@@ -121,12 +121,6 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
     /// fly away.
     MayLeave,
-    /// The drone's endurance is unknown.
-    ///
-    /// A value was invalid, none came for 10 s, or there was none when the relay took control.
-    /// The last valid value counts down (`Relay::handle_endurance`). Without any the relay does not leave by itself: the pilot watches
-    /// the battery. Not raised again before a valid value.
-    EnduranceUnknown,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
@@ -170,8 +164,6 @@ const POLLED_LAST: &[Event] = &[
     Event::InterfererUnclear,
     #[cfg(feature = "departures")]
     Event::MayLeave,
-    #[cfg(feature = "departures")]
-    Event::EnduranceUnknown,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.

@@ -43,4 +43,5 @@ mod steering;
 pub(crate) mod view;
 
 pub(crate) use dispatch::Node;
+#[cfg(feature = "departures")]
 pub(crate) use dispatch::departure;

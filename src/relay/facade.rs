@@ -15,7 +15,6 @@ use crate::node::view::record::{RecordError, ViewRecord};
 use crate::optimiser::joint::fitted::SlotShares;
 use crate::place::Placement;
 use crate::pointing::Bearing;
-use crate::relay::endurance::Endurance;
 use crate::relay::frames;
 use crate::sensing::estimate::NumberedEstimate;
 use crate::sensing::fit::Unfit;
@@ -89,8 +88,6 @@ pub struct Relay {
     /// downstream port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
-    /// Endurance of the drone. Empty without the feature `departures`.
-    pub(super) endurance: [Endurance; cfg!(feature = "departures") as usize],
 }
 
 impl Relay {
@@ -149,7 +146,6 @@ impl Relay {
             endpoint: Endpoint::new(identity.network, identity.index),
             deframers: [Deframer::new(), Deframer::new()],
             clock: MonotonicClock::new(now),
-            endurance: [Endurance::default(); cfg!(feature = "departures") as usize],
         }
     }
 
@@ -227,9 +223,7 @@ impl Relay {
     /// ```
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
-        let now = self.clock.advance(now);
-        self.node.handle_timeout(now);
-        self.review_endurance(now);
+        self.node.handle_timeout(self.clock.advance(now));
     }
 
     /// Restarts the placement method from its beginning. Better positions can result once the relays have measured
@@ -325,10 +319,7 @@ impl Relay {
     /// assert!(relay.poll_timeout().is_some_and(|due| due >= Instant::ZERO), "sleep until then, or the next byte");
     /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let due = match (self.node.poll_timeout(), self.endurance_timeout()) {
-            (Some(due), Some(endurance)) => due.min(endurance),
-            (due, endurance) => due.or(endurance)?,
-        };
+        let due = self.node.poll_timeout()?;
         Some(self.clock.external(due))
     }
 }
@@ -717,9 +708,6 @@ impl Relay {
     ///
     /// Returns true if that is a change for the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
-        if flown && self.endurance_s(now).is_none() {
-            self.lose_endurance();
-        }
         self.node.handle_control(self.clock.advance(now), flown)
     }
 
@@ -729,16 +717,13 @@ impl Relay {
     pub fn report_control(&mut self, state: crate::flight::autopilot::state::State) {
         self.node.reporting.handle_control(state as u16 + 1);
     }
-}
 
-#[cfg(feature = "departures")]
-impl Relay {
     /// Requests to leave the chain, because the drone has to land soon. `endurance_s` is the remaining endurance of the
     /// drone, s; `None` if it is unknown. Call it again when that changes.
     ///
     /// The relay holds its place until [`Event::MayLeave`]. It needs a guard, or
     /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). Right after a start the relay does not
-    /// join the chain. See [`docs::batteries`](crate::docs::batteries). Takes
+    /// join the chain, unless the chain turns out to need it. See [`docs::batteries`](crate::docs::batteries). Takes
     /// constant time.
     ///
     /// ```
@@ -750,9 +735,9 @@ impl Relay {
     /// relay.leave(Instant::from_millis(1_000), Some(240));
     /// assert_eq!(relay.departure(Instant::from_millis(1_000)), Departure::NeedsChannel, "two wires per relay");
     /// ```
+    #[cfg(feature = "departures")]
     pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
         let now = self.clock.advance(now);
-        self.override_endurance(now, false);
         self.node.leave(now, endurance_s);
     }
 
@@ -761,28 +746,25 @@ impl Relay {
     /// Call it right after the start: it has no effect once the relay has taken part in anything. The first leader
     /// cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it has to wait at
     /// least the separation away from all positions of the chain. Takes constant time.
+    #[cfg(feature = "departures")]
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);
     }
 
     /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
-    ///
-    /// The relay then requests to leave only by [`leave`](Self::leave), or once half of the remaining time of flight beyond the way home
-    /// has passed (`handle_endurance`).
+    #[cfg(feature = "departures")]
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
-        self.override_endurance(now, true);
         self.node.stay(now);
     }
 
     /// Returns the state of this relay's departure from the chain at `now`. Takes constant time.
+    #[cfg(feature = "departures")]
     pub fn departure(&self, now: Instant) -> Departure {
         self.node.departure(now)
     }
-}
 
-impl Relay {
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See
     /// [`handle_control`](Self::handle_control).
     ///

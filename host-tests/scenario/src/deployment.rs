@@ -74,14 +74,6 @@ pub struct Companion {
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
-    /// Reserve of the drone's remaining time of flight, s, 0 to 3600.
-    pub reserve_s: Option<f32>,
-    /// Time of flight with a full battery, s, 1 to 86400.
-    pub flight_time_s: Option<f32>,
-    /// Mean speed of the descent to land, m/s, 0.1 to 20.
-    pub descent_m_s: Option<f32>,
-    /// True to wait outside of the chain as a spare.
-    pub spare: Option<bool>,
     /// FIFO from which the companion reads the drone's own position. Another program writes it.
     pub positions: Option<PathBuf>,
     /// Largest reported position error of a hovering drone, m, 0 to 1000.

@@ -2,7 +2,6 @@
 
 mod any;
 mod arducopter;
-mod battery;
 mod clearance;
 mod exchange;
 mod flights;

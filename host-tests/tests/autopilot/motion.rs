@@ -335,7 +335,7 @@ fn a_short_pause_of_the_autopilot_ends_no_flight() {
 /// Checks that messages that never arrive are requested only a few times in ten minutes of flight.
 #[test]
 fn requests_of_absent_messages_end() {
-    for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 11)] {
+    for (kind, most) in [(Kind::Px4, 2), (Kind::ArduCopter, 9)] {
         let mut rig = Rig::new(kind);
         assert!(rig.choose(Mode::Companion));
         rig.setpoint = Some(place(200.0));

@@ -3,7 +3,6 @@
 
 mod acting;
 mod astray;
-mod battery;
 mod bench;
 mod binary;
 mod bundle;

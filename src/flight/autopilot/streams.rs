@@ -35,29 +35,27 @@ struct RequestedMessage {
     is_vital: bool,
 }
 
-impl RequestedMessage {
-    const fn new(id: u32, interval_ms: u64, is_vital: bool) -> Self {
-        let interval = Duration::from_millis(interval_ms);
-        Self {
-            id,
-            interval,
-            is_vital,
-        }
-    }
-}
-
-/// Messages that the link requests; those of the battery only with the feature `departures`.
-const REQUESTED: &[RequestedMessage] = MESSAGES
-    .split_at(if cfg!(feature = "departures") { 6 } else { 4 })
-    .0;
-
-const MESSAGES: [RequestedMessage; 6] = [
-    RequestedMessage::new(id::GLOBAL_POSITION_INT, 200, true),
-    RequestedMessage::new(id::EXTENDED_SYS_STATE, 500, true),
-    RequestedMessage::new(id::POSITION_TARGET_GLOBAL_INT, 500, false),
-    RequestedMessage::new(id::FENCE_STATUS, 1_000, false),
-    RequestedMessage::new(id::BATTERY_STATUS, 1_000, false),
-    RequestedMessage::new(id::HOME_POSITION, 2_000, false),
+const REQUESTED: [RequestedMessage; 4] = [
+    RequestedMessage {
+        id: id::GLOBAL_POSITION_INT,
+        interval: Duration::from_millis(200),
+        is_vital: true,
+    },
+    RequestedMessage {
+        id: id::EXTENDED_SYS_STATE,
+        interval: Duration::from_millis(500),
+        is_vital: true,
+    },
+    RequestedMessage {
+        id: id::POSITION_TARGET_GLOBAL_INT,
+        interval: Duration::from_millis(500),
+        is_vital: false,
+    },
+    RequestedMessage {
+        id: id::FENCE_STATUS,
+        interval: Duration::from_millis(1_000),
+        is_vital: false,
+    },
 ];
 
 /// State of the periodic request for one kind of message from the autopilot.

@@ -11,7 +11,7 @@
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
 //! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
 //! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
-//! | outside, called or `stay`; after membership: no later view for `dead_after`, not free for 16 times `dead_after` | join as a relay that was lost |
+//! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost |
 
 use super::{Layers, Node};
 use crate::event::{Event, NodeEvent};
@@ -207,17 +207,6 @@ impl Node {
         }
     }
 
-    /// Returns true if the drone may fly away; `None` unless this relay has requested to leave.
-    pub(crate) fn leaves(&self) -> Option<bool> {
-        let leaving = &self.layers.leaving;
-        leaving.requested.then_some(leaving.free)
-    }
-
-    /// Returns true once this relay has taken part in anything; false for a spare.
-    pub(crate) fn has_joined(&self) -> bool {
-        !self.layers.leaving.spare && !self.layers.round.is_fresh()
-    }
-
     /// Makes this relay a spare outside of the chain. No effect if it has taken part in anything since its start, leads,
     /// has requested to leave, or has two wires.
     pub(crate) fn wait_as_spare(&mut self, now: Instant) {
@@ -299,9 +288,7 @@ impl Node {
         } else {
             settings.dead_after
         };
-        // A relay that has not taken part in anything since its start is in no view that needs it.
-        let may_return = !spare && !free && !self.layers.round.is_fresh();
-        if may_return && outside_since.is_some_and(|at| now.since(at) >= most) {
+        if !spare && !free && outside_since.is_some_and(|at| now.since(at) >= most) {
             self.come_back(now);
         }
     }

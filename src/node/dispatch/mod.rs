@@ -145,7 +145,7 @@ impl Node {
         }
     }
 
-    pub(crate) fn raise(&mut self, event: Event) {
+    pub(super) fn raise(&mut self, event: Event) {
         self.telemetry.events.raise(event);
     }
 

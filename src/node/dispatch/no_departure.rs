@@ -45,16 +45,6 @@ impl Layers {
 }
 
 impl Node {
-    pub(crate) const fn leave(&self, _: Instant, _: Option<u16>) {}
-
-    pub(crate) const fn leaves(&self) -> Option<bool> {
-        None
-    }
-
-    pub(crate) const fn has_joined(&self) -> bool {
-        true
-    }
-
     pub(super) const fn return_if_expired(&self, _: Instant) {}
 
     pub(super) const fn frees(&self, _: Side, _: u16) -> bool {
