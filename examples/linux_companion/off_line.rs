@@ -286,11 +286,9 @@ mod tests {
         // Sites in another valley.
         let other = off(site(46.54, 7.40), site(46.55, 7.41), drone).expect("off");
         assert!(other.kind == Kind::Line && !other.is_swapped);
-        assert!(
-            other
-                .to_string()
-                .ends_with("of this flight, and is the drone's position right?")
-        );
+        assert!(other.to_string().ends_with(
+            ": check the mission's sites (positions of Tx and Rx), and the drone's position"
+        ));
         // A longitude above 90 degrees is no latitude, so there is no swapped line.
         let far = off(site(47.40, 138.54), site(47.41, 138.55), drone).expect("off");
         assert!(!far.is_swapped);

@@ -589,8 +589,11 @@ mod tests {
     #[test]
     fn values_of_a_preview_are_checked_as_on_the_command_line() {
         for (body, why) in [
-            ("[]", "not an object of texts: "),
-            (r#"{"altitude": 30}"#, "not an object of texts: "),
+            ("[]", "must be a JSON object whose values are strings: "),
+            (
+                r#"{"altitude": 30}"#,
+                "must be a JSON object whose values are strings: ",
+            ),
             (
                 r#"{"altitude": "0"}"#,
                 "must be a number within 0.1 to 10000.0",
@@ -604,7 +607,7 @@ mod tests {
                 r#"{"receiver": "900,0", "distance": "900"}"#,
                 "must be left out",
             ),
-            (r#"{"site-rx": "47,8,400"}"#, "has no sites"),
+            (r#"{"site-rx": "47,8,400"}"#, "need sites"),
         ] {
             let error = form(1, None, body).unwrap_err();
             assert!(
