@@ -30,7 +30,7 @@ fn three_signing_relays_settle_like_the_simulation() {
         assert!(
             chain.relays[1]
                 .line("signed: ")
-                .contains("epoch 42, a number")
+                .contains("epoch 42 (start counter")
         );
         assert_eq!(epoch(&chain.files, "epoch2"), 42);
         // The relay writes the file before the log line.
@@ -51,7 +51,7 @@ fn three_signing_relays_settle_like_the_simulation() {
         assert!(
             chain.relays[1]
                 .line("signed: ")
-                .contains("epoch 43, a number")
+                .contains("epoch 43 (start counter")
         );
         assert_eq!(chain.relays[0].settled(), expected[0]);
         assert_eq!(chain.relays[1].settled(), expected[1]);
@@ -139,7 +139,7 @@ fn an_epoch_that_goes_back_is_reported_with_the_remedy() {
     chain.relays.remove(1).stopped();
     chain.files.write("epoch2", "5\n");
     let mut back = start(&chain, 2, "key");
-    assert!(back.line("signed: ").contains("epoch 6, a number"));
+    assert!(back.line("signed: ").contains("epoch 6 (start counter"));
     let line = chain.relays[0].line("epoch: ");
     let remedy = "epoch: relay 2 has started with an epoch (start counter) that is not above its last one, and its frames are rejected; raise the number in its --epoch-file and restart it";
     assert!(line.ends_with(remedy), "{line}");
