@@ -339,7 +339,7 @@ impl StationView {
                 && has_details(&known.report)
                 && known.report.at.since(since) >= SILENT_AFTER
             {
-                let note = format!(": mission version {version}, other relays version {newest}");
+                let note = format!(": version {version}, other relays version {newest}");
                 add(Reason::Version, number, vec![number], note);
             }
         }
