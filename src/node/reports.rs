@@ -62,6 +62,9 @@ const BLIND: u16 = State::Blind as u16 + 1;
 /// Minimum time between own entries, so that every relay and the station take the second for newer.
 const APART: Duration = Duration::from_millis(700);
 
+/// Time between two entries of a relay that makes the second count as newer.
+const NEWER: Duration = Duration::from_millis(200);
+
 /// Time by which reports of changed states may be ahead of the share of the channel.
 const AHEAD: Duration = Duration::from_millis(1_000);
 
@@ -539,7 +542,16 @@ impl Reporting {
         let is_due = now >= watched.own_from;
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
-            let age = position.map_or(0, |(at, _)| age(now, at));
+            // A position from just after the last entry gets a later time: without it the entry would not count as newer.
+            let later = watched.own_at + NEWER;
+            let at_time = |at: Instant| {
+                if at >= watched.own_at {
+                    at.max(later).min(now)
+                } else {
+                    at
+                }
+            };
+            let age = position.map_or(0, |(position_at, _)| age(now, at_time(position_at)));
             let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }

@@ -319,7 +319,10 @@ fn the_status_socket_takes_the_same_tasks() {
     };
     let usage = "must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, which need a station with --stand, or empty to read the state";
     for line in ["land", "preview altitude", "upload 1", "upload x 0x1"] {
-        assert_eq!(commanded(line), (false, format!("command {line:?}: {usage}")));
+        assert_eq!(
+            commanded(line),
+            (false, format!("command {line:?}: {usage}"))
+        );
     }
     let refused = commanded("preview land=1");
     assert!(

@@ -279,7 +279,9 @@ fn a_check_does_not_disturb_a_chain_that_flies() {
                     .iter()
                     .any(|part| line.contains(part))
             };
-            assert!(!lines.iter().any(|line| is_change(&line)), "{lines:#?}");
+            // Relays may tell the checking relay that it is free: it is outside of the chain.
+            let changes = lines.iter().filter(|line| !line.contains("  told: "));
+            assert!(!changes.clone().any(|line| is_change(&line)), "{lines:#?}");
         }
     };
     // Their first positions under setpoint control count after some seconds. Then they are on their way, and later at their places.
