@@ -11,7 +11,6 @@
 
 use super::context::Member;
 use super::neighbour::Neighbours;
-use crate::event::NodeEvent;
 use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
@@ -34,16 +33,6 @@ impl Reporting {
     pub(crate) fn handle_session(&mut self, _: Instant, _: &Member, _: Side, _: u16) {}
 
     pub(crate) fn handle_measured(&mut self, _: f32) {}
-
-    pub(crate) fn handle_node_event(&mut self, _: NodeEvent, _: Side, _: u16) {}
-
-    pub(crate) fn handle_sign_of_life(&mut self, _: Side) {}
-
-    pub(crate) fn expedite(&mut self) {}
-
-    pub(crate) fn refuses(&self, _: Side, _: u16) -> bool {
-        false
-    }
 
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         None

@@ -19,8 +19,6 @@ use heapless::Vec;
 use super::context::Member;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
-use crate::event::NodeEvent;
-use crate::flight::autopilot::state::State;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -54,20 +52,6 @@ pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 /// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
 
-/// Numbers of control states in a report.
-const SILENT: u16 = State::Silent as u16 + 1;
-const ENGAGED: u16 = State::Engaged as u16 + 1;
-const BLIND: u16 = State::Blind as u16 + 1;
-
-/// Minimum time between own entries, so that every relay and the station take the second for newer.
-const APART: Duration = Duration::from_millis(700);
-
-/// Time between two entries of a relay that makes the second count as newer.
-const NEWER: Duration = Duration::from_millis(200);
-
-/// Time by which reports of changed states may be ahead of the share of the channel.
-const AHEAD: Duration = Duration::from_millis(1_000);
-
 /// Minimum time between two reports of a relay.
 const LEAST_PERIOD: Duration = Duration::from_millis(500);
 
@@ -92,8 +76,6 @@ pub(crate) struct Reporting {
     control: u16,
     /// Last measured interference, W; 0 before any.
     power_w: f32,
-    /// Nodes at both sides whose frames are refused, until they prove to be alive; 0 for none.
-    refused: [u16; 2],
     stored: Vec<Stored, STORED>,
     watched: [Watched; 2],
     /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
@@ -109,16 +91,7 @@ struct Stored {
     at: Instant,
     /// Time from which the entry may be sent. After it has been sent, a newer one should arrive before.
     from: Instant,
-    rank: Rank,
-}
-
-/// Order in which stored entries are sent, the last one first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Rank {
-    Sent,
-    New,
-    /// New, and with a changed state that begins or ends alarms.
-    Changed,
+    is_new: bool,
 }
 
 /// Side with a ground station that watches.
@@ -148,12 +121,6 @@ struct Watched {
     free: Instant,
     /// Time from which the own entry is part of a report.
     own_from: Instant,
-    /// Time of the last own entry.
-    own_at: Instant,
-    /// Number of own entries that are to be sent ahead of their turn.
-    ahead: u8,
-    /// True until a changed state of another relay is sent.
-    is_changed: bool,
     /// Number of own entries, wrapping.
     count: u8,
     /// True if entries have arrived since the last report.
@@ -172,65 +139,12 @@ impl Reporting {
         self.power_w = power_w;
     }
 
-    /// Takes the control state. An urgent change is reported ahead of its turn, another change as soon as the share of
-    /// the channel allows.
+    /// Takes the control state; a change is reported as soon as the share of the channel allows.
     pub(crate) fn handle_control(&mut self, control: u16) {
-        let before = core::mem::replace(&mut self.control, control);
-        if before != control {
-            if control == BLIND {
-                // An entry with the age of the last position would not count as newer.
-                self.position = None;
+        if core::mem::replace(&mut self.control, control) != control {
+            for watched in &mut self.watched {
+                (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
             }
-            if is_urgent(before, control) {
-                self.expedite();
-            } else {
-                for watched in &mut self.watched {
-                    (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
-                }
-            }
-        }
-    }
-
-    /// Handles an event about node `node` at `side`: a changed own state is reported ahead of its turn.
-    pub(crate) fn handle_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
-        match kind {
-            NodeEvent::Mission | NodeEvent::Key | NodeEvent::Epoch => {
-                self.set_refused(side, node);
-            }
-            NodeEvent::Back => self.set_refused(side, 0),
-            NodeEvent::Lost | NodeEvent::Index => {}
-            _ => return,
-        }
-        self.expedite();
-    }
-
-    /// Records a sign of life of the neighbour at `side`.
-    pub(crate) const fn handle_sign_of_life(&mut self, side: Side) {
-        self.set_refused(side, 0);
-    }
-
-    /// Returns true if frames of `node`, the neighbour at `side`, are refused.
-    pub(crate) const fn refuses(&self, side: Side, node: u16) -> bool {
-        let [upstream, downstream] = self.refused;
-        match side {
-            Side::Upstream => node != 0 && node == upstream,
-            Side::Downstream => node != 0 && node == downstream,
-        }
-    }
-
-    const fn set_refused(&mut self, side: Side, node: u16) {
-        let [upstream, downstream] = &mut self.refused;
-        match side {
-            Side::Upstream => *upstream = node,
-            Side::Downstream => *downstream = node,
-        }
-    }
-
-    /// Schedules two own entries ahead of their turn, because the first may be lost.
-    pub(crate) fn expedite(&mut self) {
-        for watched in &mut self.watched {
-            watched.own_from = watched.own_from.min(watched.own_at + APART);
-            watched.ahead = 2;
         }
     }
 
@@ -281,7 +195,8 @@ impl Reporting {
         for side in [Side::Upstream, Side::Downstream] {
             let watched = self.at(side);
             watched.expire(now, member);
-            while watched.hand_on != 0 && now >= watched.hand_on_at + wait {
+            let is_ready = |at| now >= at + wait;
+            while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
                 let distance = if watched.hand_on & 1 != 0 {
                     1
                 } else {
@@ -307,7 +222,8 @@ impl Reporting {
                     return Some((away, to, Message::Watch { number, mission }));
                 }
             }
-            if watched.report_at(wait).is_some_and(|at| now >= at)
+            if let Some(at) = watched.report_at()
+                && is_ready(at)
                 && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
                 && let Some(report) = self.report(now, member, neighbours, side, own)
             {
@@ -342,17 +258,12 @@ impl Reporting {
 
     /// Returns the times at which a Watch or a Report is due.
     fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
-        let times = self.watched.iter().flat_map(move |watched| {
-            let hand_on = (watched.hand_on != 0).then(|| watched.hand_on_at + wait);
-            [watched.report_at(wait), hand_on]
+        let times = self.watched.iter().flat_map(|watched| {
+            let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
+            [watched.report_at(), hand_on]
         });
-        times.flatten()
+        times.flatten().map(move |at| at + wait)
     }
-}
-
-/// Returns the time `span` before `at`, at least 0.
-const fn before(at: Instant, span: Duration) -> Instant {
-    Instant::from_micros(at.as_micros().saturating_sub(span.as_micros()))
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
@@ -390,13 +301,9 @@ impl Watched {
         }
     }
 
-    /// Returns the time of the next report; `None` while nobody watches. A changed state does not `wait`.
-    fn report_at(&self, wait: Duration) -> Option<Instant> {
-        let ahead = before(self.free, AHEAD);
-        let own = (self.ahead > 0).then(|| self.own_from.max(ahead));
-        let changed = own.into_iter().chain(self.is_changed.then_some(ahead));
-        let next = changed.fold(self.due.max(self.free) + wait, Instant::min);
-        (self.until > Instant::ZERO).then_some(next)
+    /// Returns the time of the next report; `None` while nobody watches.
+    fn report_at(&self) -> Option<Instant> {
+        (self.until > Instant::ZERO).then(|| self.due.max(self.free))
     }
 }
 
@@ -417,7 +324,6 @@ impl Reporting {
         if begins {
             watched.due = now;
             watched.own_from = now;
-            watched.ahead = 0;
             watched.count = 0;
         }
         if begins || (1..0x8000).contains(&ahead) {
@@ -484,44 +390,40 @@ impl Reporting {
         for entry in &report.entries {
             let detail = detail.take();
             if let Some(at) = entry.time(now) {
-                let is_changed = self.store(now, *entry, detail, at);
-                self.at(side.other()).is_changed |= is_changed;
+                self.store(now, *entry, detail, at);
             }
         }
         true
     }
 
     /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
-    /// else the oldest one, is dropped. Returns true for a changed state.
-    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
+    /// else the oldest one, is dropped.
+    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) {
         let mut stored = Stored {
             entry,
             detail,
             at,
             from: now,
-            rank: Rank::New,
+            is_new: true,
         };
         let mut all = self.stored.iter_mut();
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
             // Two ways of one entry differ by the rounding of its age.
             if at > old.at + Duration::from_millis(300) {
                 stored.detail = detail.or(old.detail);
-                if is_changed(old.entry.state(), entry.state()) {
-                    stored.rank = Rank::Changed;
-                }
-                stored.rank = stored.rank.max(old.rank);
                 *old = stored;
-                return old.rank == Rank::Changed;
             } else if old.detail.is_none() {
                 old.detail = detail;
             }
         } else if let Err(stored) = self.stored.push(stored) {
-            let worst = self.stored.iter_mut().min_by_key(|old| (old.rank, old.at));
+            let worst = self
+                .stored
+                .iter_mut()
+                .min_by_key(|old| (old.is_new, old.at));
             if let Some(worst) = worst {
                 *worst = stored;
             }
         }
-        false
     }
 
     /// Returns the report toward `side` that is due now; `None` if there is nothing to report.
@@ -542,33 +444,24 @@ impl Reporting {
         let is_due = now >= watched.own_from;
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
-            // A position from just after the last entry gets a later time: without it the entry would not count as newer.
-            let later = watched.own_at + NEWER;
-            let at_time = |at: Instant| {
-                if at >= watched.own_at {
-                    at.max(later).min(now)
-                } else {
-                    at
-                }
-            };
-            let age = position.map_or(0, |(position_at, _)| age(now, at_time(position_at)));
+            let age = position.map_or(0, |(at, _)| age(now, at));
             let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }
-        // Entries that are not sent any more show which states of relays are changed.
-        self.stored.retain(|stored| now.since(stored.at) < OLDEST);
-        let (mut is_left, mut is_changed) = (false, false);
-        for rank in [Rank::Changed, Rank::New, Rank::Sent] {
+        self.stored.retain(|stored| {
+            let age = now.since(stored.at);
+            age < OLDEST && (stored.is_new || age < period.times(3))
+        });
+        let mut is_left = false;
+        for are_new in [true, false] {
             for stored in &mut self.stored {
                 let is_toward = (stored.entry.relay() > member.node) == (side == Side::Upstream);
-                let is_over = rank == Rank::Sent && now.since(stored.at) >= period.times(3);
-                if stored.rank != rank || !is_toward || is_over || now < stored.from {
+                if stored.is_new != are_new || !is_toward || now < stored.from {
                     continue;
                 }
                 stored.entry.age = age(now, stored.at);
                 if report.entries.push(stored.entry).is_err() {
-                    is_left |= rank != Rank::Sent;
-                    is_changed |= rank == Rank::Changed;
+                    is_left |= are_new;
                     continue;
                 }
                 if report.detail.is_none() && stored.detail.is_some() {
@@ -577,7 +470,7 @@ impl Reporting {
                         core::mem::swap(first, last);
                     }
                 }
-                stored.rank = Rank::Sent;
+                stored.is_new = false;
                 stored.from = now + period;
             }
         }
@@ -597,22 +490,13 @@ impl Reporting {
         // On a shared channel half a period's share may be sent at once. On wires that would overflow the stores of relays nearer to the station.
         let saved = match member.settings.wiring {
             Wiring::Pair => now,
-            Wiring::Shared => before(now, Duration::from_micros(half.into())),
+            Wiring::Shared => Instant::from_micros(now.as_micros().saturating_sub(half.into())),
         };
         watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
         let late = Duration::from_micros((half / 4).into());
         if is_due {
-            watched.ahead = watched.ahead.saturating_sub(1);
-            let regular = late.times(6);
-            let wait = if watched.ahead > 0 {
-                regular.min(APART)
-            } else {
-                regular
-            };
-            watched.own_from = now + wait;
-            watched.own_at = now;
+            watched.own_from = now + late.times(6);
         }
-        watched.is_changed = is_changed;
         watched.due = match (is_left, watched.is_fed) {
             (true, _) => now,
             // The reports of relays behind come first.
@@ -684,29 +568,6 @@ fn period(member: &Member, side: Side, byte: Duration) -> Duration {
         Wiring::Shared => load(member, from_end(member, side)),
     };
     byte.times(bytes).max(LEAST_PERIOD)
-}
-
-/// Returns true if a control state that changes from `before` to `now` begins an alarm.
-///
-/// These are a silent autopilot, an unknown position, and the end of the relay's control.
-const fn is_urgent(before: u16, now: u16) -> bool {
-    now != before && (now == SILENT || now == BLIND || before == ENGAGED)
-}
-
-/// Returns true if the change of an entry's state from `before` to `now` begins or ends an alarm. States with alarms
-/// are control states, silent neighbours, a duplicate number, and two phases.
-const fn is_changed(before: u16, now: u16) -> bool {
-    is_urgent(before / 4096 % 6, now / 4096 % 6) || alarms(before) != alarms(now)
-}
-
-/// Returns the part of an entry's state that begins and ends alarms, without the control state.
-const fn alarms(state: u16) -> u16 {
-    let phase = match state % 8 {
-        fault @ (5 | 7) => fault, // infeasible, no quorum
-        _ => 0,
-    };
-    let is_duplicated = (state / 4096 >= 6) as u16;
-    is_duplicated * 4096 + (state & 0x0600) + phase
 }
 
 /// Returns the age in tenths of a second, rounded. It includes 20 ms for the transmission.

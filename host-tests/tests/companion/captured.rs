@@ -126,7 +126,7 @@ fn a_disk_that_fills_up_ends_the_capture_and_not_the_station() {
     );
     let stand = format!("--stand --end tx --of 1 --tty {tty} --measurements {level}");
     let mut station = Relay::ground(&format!("{stand} --capture {file} {signed}"));
-    station.line("measurement: 1.000e-9 W");
+    station.line("measurement: measured interference 1.000e-9 W");
     fill_disk(station.pid(), true);
     let _relay = chain.relay(1, &files.signed("key", "relay"));
     for power in ["2e-9\n", "3e-9\n", "4e-9\n"] {

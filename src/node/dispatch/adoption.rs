@@ -30,7 +30,6 @@ impl Node {
             ProposalOutcome::NoQuorum => {
                 if !core::mem::replace(&mut self.telemetry.no_quorum_reported, true) {
                     self.raise(Event::NoQuorum);
-                    self.reporting.expedite();
                 }
                 return self.layers.neighbours.refuse();
             }

@@ -215,7 +215,6 @@ impl Node {
 
     /// Records that the neighbour at `side` was alive at time `at`. The neighbour has replied to a message that was sent at that time.
     pub(super) fn confirm(&mut self, now: Instant, side: Side, at: Instant) {
-        self.reporting.handle_sign_of_life(side);
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.record_sign_of_life(now, at) {
             let node = neighbour.node();

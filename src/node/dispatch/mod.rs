@@ -152,7 +152,6 @@ impl Node {
     #[inline(never)] // called from many places
     pub(super) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         self.telemetry.events.raise_node_event(kind, side, node);
-        self.reporting.handle_node_event(kind, side, node);
     }
 
     /// Applies the effects of one protocol layer's step to the other layers, the events and the counters.

@@ -66,10 +66,7 @@ impl Node {
 
     fn own(&self, now: Instant) -> Own {
         let hold = |side| self.hold_reason(side).map_or(0, |reason| reason as u16 + 1);
-        let silent = |side| {
-            let neighbour = self.layers.neighbours.at(side);
-            u16::from(neighbour.is_silent() || self.reporting.refuses(side, neighbour.node()))
-        };
+        let silent = |side| u16::from(self.layers.neighbours.at(side).is_silent());
         let sides = [Side::Upstream, Side::Downstream];
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
         let holds_lease = u16::from(self.lease().is_some());
