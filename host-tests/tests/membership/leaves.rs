@@ -318,6 +318,10 @@ fn a_spare_joins_before_a_relay_leaves() {
         let mut sizes = sizes.clone();
         sizes.dedup();
         assert_eq!(sizes, [8, 9, 8], "{name}");
+        // A relay tells its firmware once of the spare, and once of the leaver: not at each of their hellos.
+        let told = |relay| times(&outcome, relay, |what| what == TimelineEvent::MayLeaveTold).len();
+        let told: Vec<usize> = (1..=9).map(told).collect();
+        assert!(told.iter().all(|times| *times <= 2), "{name}: {told:?}");
         let left: Vec<u16> = (1..=9).filter(|relay| *relay != leaver).collect();
         judge(&setup, &outcome, &left).unwrap_or_else(|what| panic!("{name}: {what}"));
     }

@@ -17,7 +17,7 @@ use super::{Layers, Node};
 use crate::event::{Event, NodeEvent};
 use crate::guard::HoldReason;
 use crate::node::context::{Member, longest_lease, tenths};
-use crate::node::neighbour::hearing::CANDIDATES;
+use crate::node::neighbour::hearing::{CANDIDATES, mask};
 use crate::place::Placement;
 use crate::settings::{Settings, Wiring};
 use crate::side::Side;
@@ -84,6 +84,8 @@ pub(crate) struct Leaving {
     heard_spare: Option<(u16, Instant)>,
     /// Relay outside of the chain, on this side, that has to be told when it may leave.
     waiting: Option<(Side, u16)>,
+    /// Bits of the relays outside of the chain, by side and distance, that the firmware knows to be free to leave.
+    told: [u8; 2],
 }
 
 impl Leaving {
@@ -308,9 +310,16 @@ impl Node {
         complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
     }
 
-    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away.
+    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. It is raised once until that
+    /// node is a neighbour again.
     pub(super) fn on_freed(&mut self, side: Side, to: u16) {
-        self.raise_node_event(NodeEvent::MayLeaveTold, side, to);
+        let bit = mask(to.abs_diff(self.member.node));
+        if let Some(told) = self.layers.leaving.told.get_mut(side as usize)
+            && *told & bit == 0
+        {
+            *told |= bit;
+            self.raise_node_event(NodeEvent::MayLeaveTold, side, to);
+        }
     }
 
     /// Returns true if node `to` at `side`, outside of the chain, is called to join it.
@@ -425,6 +434,9 @@ impl Node {
             return true;
         }
         let leaving = &mut self.layers.leaving;
+        if is_neighbour && let Some(told) = leaving.told.get_mut(side as usize) {
+            *told &= !mask(from.abs_diff(own));
+        }
         // A spare that was called counts as one until it has joined: the departure waits for it.
         if let Some((node, at)) = &mut leaving.heard_spare
             && *node == from

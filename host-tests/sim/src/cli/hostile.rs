@@ -12,7 +12,7 @@ use super::upload::Uploads;
 use crate::command::{Failure, carries, number, whole};
 use crate::report::seconds;
 use crate::simulator::attack::Attack;
-use crate::simulator::drones::Point;
+use crate::simulator::drones::{BIAS_M, GUST_MPS, HOVER_M, NOISE_M, Point};
 use crate::simulator::faults::{Bursts, OneWayFailure};
 use crate::simulator::fleet::{FleetSpec, Takeover, somewhere};
 use crate::simulator::medium::Access;
@@ -422,18 +422,6 @@ fn soak(text: &str) -> Result<Instant, String> {
     number(text, 1.0, 1e6)?;
     instant(text).ok_or_else(|| "must be a number within 1.0 to 1e6".to_owned())
 }
-
-/// Bound on the constant error of a drone's reported position, m.
-pub(super) const BIAS_M: f64 = 0.5;
-/// Bound on the random error of a drone's reported position, m.
-pub(super) const NOISE_M: f64 = 0.3;
-/// Standard deviation of the gusts, m/s per axis.
-const GUST_MPS: f64 = 0.3;
-
-/// Largest distance of a hovering drone's reported position from its setpoint, m.
-///
-/// It allows for the errors of the position and for gusts.
-pub(super) const HOVER_M: f32 = 1.5;
 
 /// Command-line options for simulated drones, their pilots and autopilots.
 #[derive(Args, Debug)]

@@ -3,8 +3,8 @@
 use clap::Args;
 use uav_relay::GuardConfig;
 
-use super::hostile::{BIAS_M, HOVER_M, NOISE_M};
 use crate::command::{Failure, number, whole};
+use crate::simulator::drones::{BIAS_M, HOVER_M, NOISE_M};
 use crate::simulator::rotation::{RotationSpec, duration};
 use crate::simulator::setup::Setup;
 

@@ -26,6 +26,18 @@ pub(crate) fn placement(at: Point) -> Placement {
 /// Number of the random-number stream from which the drones' position errors are drawn.
 const ERRORS: u64 = 2;
 
+/// Bound on the constant error of a drone's reported position, m.
+pub const BIAS_M: f64 = 0.5;
+/// Bound on the random error of a drone's reported position, m.
+pub const NOISE_M: f64 = 0.3;
+/// Standard deviation of the gusts, m/s per axis.
+pub const GUST_MPS: f64 = 0.3;
+
+/// Largest distance of a hovering drone's reported position from its setpoint, m.
+///
+/// It allows for the errors of the position and for gusts.
+pub const HOVER_M: f32 = 1.5;
+
 /// Parameters of simple drones, which fly to their setpoints without an autopilot.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FlightSpec {
