@@ -84,7 +84,7 @@ pub(crate) struct Leaving {
     heard_spare: Option<(u16, Instant)>,
     /// Relay outside of the chain, on this side, that has to be told when it may leave.
     waiting: Option<(Side, u16)>,
-    /// Bits of the relays outside of the chain, by side and distance, that the firmware knows to be free to leave.
+    /// Bits, by side and distance, of the relays that the firmware knows to be free to leave.
     told: [u8; 2],
 }
 
