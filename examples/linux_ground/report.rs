@@ -303,7 +303,7 @@ pub(crate) fn received(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let (event, what) = if is_heard {
         ("back", "and this station receive each other")
     } else {
-        ("lost", "does not reply")
+        ("lost", "has not replied to this station for 5 s")
     };
     let text = format_args!("relay {node} {what}");
     log.event(now, event, json!({ "node": node }), text);
