@@ -43,7 +43,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             let digest = upload.id().digest;
             let sites = upload.sites();
             let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
-            let what = format_args!("version {version} of the mission, digest 0x{digest:04x}{sites}");
+            let what = format_args!("the station offers version {version} of the mission to the nearest relays, digest 0x{digest:04x}{sites}");
             log.line(now, "offering", what);
         }
         Progress::Stored { by } => log.line(
