@@ -502,8 +502,8 @@ fn a_check_names_planted_faults_of_the_radio() {
     bench.finds(
         "--altitude 21",
         &[
-            "relay 1 has another mission, 0x",
-            "relay 3 has another mission, 0x",
+            "relay 1 has another mission, digest 0x",
+            "relay 3 has another mission, digest 0x",
         ],
     );
     let other = format!("--key-file {}", bench.files.text("other"));
@@ -513,7 +513,7 @@ fn a_check_names_planted_faults_of_the_radio() {
     // A neighbour that is checked, too.
     let third = || bench.companion(3, "--check=6 --altitude 21");
     let checked = [bench.companion(1, "--check=6"), third()];
-    bench.finds("", &["relay 3 has another mission, 0x"]);
+    bench.finds("", &["relay 3 has another mission, digest 0x"]);
     drop(checked);
     let checked = [bench.companion(1, "--check=6"), third()];
     bench.channel.cut(0b010);
