@@ -43,7 +43,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             let digest = upload.id().digest;
             let sites = upload.sites();
             let sites = sites.map_or(String::new(), |sites| format!(", {}", Between(sites)));
-            let what = format_args!("version {version} of the mission, digest 0x{digest:04x}{sites}");
+            let what = format_args!("the station offers version {version} of the mission to the nearest relays, digest 0x{digest:04x}{sites}");
             log.line(now, "offering", what);
         }
         Progress::Stored { by } => log.line(
@@ -303,7 +303,7 @@ pub(crate) fn received(log: &Log, now: Instant, node: u16, is_heard: bool) {
     let (event, what) = if is_heard {
         ("back", "and this station receive each other")
     } else {
-        ("lost", "does not reply")
+        ("lost", "has not replied to this station for 5 s")
     };
     let text = format_args!("relay {node} {what}");
     log.event(now, event, json!({ "node": node }), text);

@@ -309,10 +309,10 @@ impl Drone {
                     "its frames are not signed with the key of --autopilot-key-file, or are old"
                 }
                 (_, _, 0, _) => {
-                    "no answer: is it on, are TX and RX wired, and is this its data rate there?"
+                    "no bytes received: check that the autopilot is switched on, that TX and RX are wired, and that its port has this data rate"
                 }
                 (_, _, _, 0) => {
-                    "the bytes received are not MAVLink 2: is this its data rate, and its protocol there?"
+                    "the bytes received are not MAVLink 2: check the data rate and the protocol of the autopilot's port"
                 }
                 _ => "no frame is from a PX4 or an ArduCopter (MAVLink component 1)",
             };
@@ -337,7 +337,7 @@ impl Drone {
                 "{heard_text}: it signs its frames: give --autopilot-key-file"
             )),
             Some(it) if it.found.is_some_and(|found| !differ(found, it.wanted)) => Err(format!(
-                "{heard_text}, but {} is {}: restart it, its parameters are stored but not active",
+                "{heard_text}, but its parameter {} is {}: restart the autopilot, because its parameters are stored but not active",
                 it.name, it.wanted
             )),
             Some(it) => Err(format!(
@@ -388,11 +388,12 @@ impl Drone {
 
     fn place(&self, now: Instant) -> Result<String, String> {
         let recent = self.position.filter(|(at, _)| now.since(*at) < SILENT);
-        let (_, at) = recent.ok_or("none from the autopilot: wait for its position fix")?;
+        let (_, at) =
+            recent.ok_or("the autopilot reports no position: wait for its position fix")?;
         let Some(place) = self.axis.place(at) else {
             let away_m = self.axis.away_m(at).unwrap_or(f64::INFINITY);
             return Err(format!(
-                "{:.0} km from the line between the sites: are these the sites of this flight?",
+                "the drone is {:.0} km from the line between the sites: are these the sites of this flight?",
                 away_m / 1e3
             ));
         };
@@ -400,8 +401,9 @@ impl Drone {
             let x_m = f64::from(place.x_m);
             let along_m = x_m.clamp(0.0, self.axis.distance_m());
             let beyond_m = (x_m - along_m).hypot(place.y_m.into());
-            let text =
-                format!("{beyond_m:.0} m from the line between the sites; no [plan] in the file");
+            let text = format!(
+                "the drone is {beyond_m:.0} m from the line between the sites; its planned place is unknown, because the file has no [plan]"
+            );
             return if beyond_m <= f64::from(self.within_m) {
                 Ok(text)
             } else {
@@ -409,7 +411,7 @@ impl Drone {
             };
         };
         let off_m = (place.x_m - planned.x_m).hypot(place.y_m - planned.y_m);
-        let text = format!("{off_m:.0} m from its planned place");
+        let text = format!("the drone is {off_m:.0} m from its planned place");
         if off_m <= self.within_m {
             Ok(text)
         } else {
@@ -441,7 +443,7 @@ impl Drone {
         let missing = all
             .iter()
             .filter(|it| it.found.is_none())
-            .map(|it| format!("{} is unanswered", it.name));
+            .map(|it| format!("{} is not reported by the autopilot", it.name));
         let faults: Vec<String> = wrong.chain(missing).collect();
         if faults.is_empty() {
             Ok(format!("{} as in {name}", all.len()))

@@ -294,10 +294,10 @@ impl Radio {
         let mut lines = vec![(
             "chain",
             if flying.is_empty() {
-                Ok("no relay was heard that flies".to_owned())
+                Ok("no flying relay was received".to_owned())
             } else {
                 Err(format!(
-                    "the chain flies: relay {} was heard, and did not report that its drone is on the ground; check before flight only",
+                    "the chain may fly: these relays were received, and did not report that their drones are on the ground: {}; check before flight only",
                     flying.join(", ")
                 ))
             },
@@ -309,8 +309,8 @@ impl Radio {
             .filter(|node| (1..=self.of).contains(node));
         lines.extend(neighbours.map(|node| ("neighbour", self.neighbour(now, node))));
         lines.push(("number", match self.twins {
-            0 => Ok(format!("no other relay {} is heard", self.index)),
-            twins => Err(format!("another relay {} is on the channel ({twins} frames): two drones have the same number", self.index)),
+            0 => Ok(format!("no other relay with number {} was received", self.index)),
+            twins => Err(format!("another relay with number {} was received ({twins} frames): give each drone its own --index", self.index)),
         }));
         lines
     }
@@ -320,7 +320,9 @@ impl Radio {
         let digest = self.digest;
         let is_recent = |at: Option<Instant>| at.is_some_and(|at| now.since(at) < OLD);
         if heard.received.is_some() && !is_recent(heard.received) {
-            return Err(format!("relay {node}: nothing heard for 10 s"));
+            return Err(format!(
+                "relay {node}: no frame received for 10 s: check that it is switched on"
+            ));
         }
         let is_verified = is_recent(heard.verified);
         if let Some(other) = heard
@@ -328,19 +330,19 @@ impl Radio {
             .filter(|other| is_verified && *other != digest)
         {
             return Err(format!(
-                "relay {node} has another mission, 0x{other:04x} instead of 0x{digest:04x}"
+                "relay {node} has another mission, digest 0x{other:04x} instead of 0x{digest:04x}: load the same mission into both"
             ));
         }
         if is_verified {
             return match (is_recent(heard.hears), heard.mission) {
                 (true, Some(_)) => Ok(format!(
-                    "relay {node}: heard both ways, mission 0x{digest:04x}"
+                    "relay {node}: both relays receive each other, mission digest 0x{digest:04x}"
                 )),
                 (true, None) => Err(format!(
-                    "relay {node} hears this relay, but has not told its mission: is it 0x{digest:04x}, too?"
+                    "relay {node} receives this relay, but has not reported its mission: check that its mission has the digest 0x{digest:04x}"
                 )),
                 (false, _) => Err(format!(
-                    "relay {node} is heard, but has not heard this relay: one way only"
+                    "relay {node} is received, but does not receive this relay: check this relay's transmitter and the receiver of relay {node}"
                 )),
             };
         }
@@ -352,24 +354,30 @@ impl Radio {
                 "relay {node} is in network {other}, this relay in {}",
                 self.network
             ),
-            Heard { forged: 1.., .. } => format!("relay {node} signs with another key"),
-            Heard { replayed: 1.., .. } => format!("relay {node} signs with an old epoch"),
+            Heard { forged: 1.., .. } => {
+                format!("relay {node} signs with another key: give both relays the same --key-file")
+            }
+            Heard { replayed: 1.., .. } => format!(
+                "relay {node} signs with an epoch (start counter) that is not above its last one: raise the number in its --epoch-file"
+            ),
             Heard { unsigned: 1.., .. } if self.epoch.is_some() => {
-                format!("relay {node} does not sign, or has another version")
+                format!("relay {node} does not sign its frames, or has another software version")
             }
             Heard { unsigned: 1.., .. } => {
-                format!("relay {node} signs, and this relay has no --key-file")
+                format!("relay {node} signs its frames, but this relay has no --key-file")
             }
             Heard {
                 received: Some(_), ..
             } => format!(
-                "relay {node} is received, but sends nothing to this relay: it does not hear it, or has another key"
+                "relay {node} is received, but sends nothing to this relay: it does not receive this relay, or has another key"
             ),
             _ if self.damaged >= DAMAGED => format!(
-                "relay {node}: nothing but {} damaged frames: is {} bit/s the data rate at both ends?",
+                "relay {node}: only damaged frames were received, {} of them: check that both ends have the data rate {} bit/s",
                 self.damaged, self.baud
             ),
-            _ => format!("relay {node}: nothing heard"),
+            _ => format!(
+                "relay {node}: no frame received: check that it is switched on, and its port or radio"
+            ),
         })
     }
 }

@@ -270,7 +270,7 @@ fn a_check_does_not_disturb_a_chain_that_flies() {
     }
     let refuses = |relays: &mut [Relay; 2]| {
         let reds = bench.reds("", 8);
-        let part = "red    chain       the chain flies: relay 1, 3 was heard";
+        let part = "red    chain       the chain may fly: these relays were received, and did not report that their drones are on the ground: 1, 3";
         assert!(reds.iter().any(|it| it.starts_with(part)), "{reds:#?}");
         for relay in relays {
             let lines = relay.lines_with("");
@@ -311,7 +311,9 @@ fn a_neighbour_that_falls_silent_is_red() {
     let lines = check.end().stdout;
     println!("{}", lines.join("\n"));
     let is = |part: &str| lines.iter().any(|it| it.contains(part));
-    assert!(is("relay 1: nothing heard for 10 s") && is("relay 3: heard both ways"));
+    assert!(
+        is("relay 1: no frame received for 10 s") && is("relay 3: both relays receive each other")
+    );
 }
 
 #[test]
@@ -450,8 +452,8 @@ fn a_check_names_planted_faults_of_the_autopilot() {
         &[
             "MAVLink system 9 instead of 2: is this the right drone?",
             "mode        OFFBOARD or GUIDED",
-            "position    none from the autopilot",
-            "parameters  FENCE_ACTION is 1 instead of 4, SYSID_THISMAV is 9 instead of 2, FENCE_TYPE is unanswered; see ",
+            "position    the autopilot reports no position",
+            "parameters  FENCE_ACTION is 1 instead of 4, SYSID_THISMAV is 9 instead of 2, FENCE_TYPE is not reported by the autopilot; see ",
         ],
         &[
             "find",
@@ -464,7 +466,7 @@ fn a_check_names_planted_faults_of_the_autopilot() {
     );
     with(
         &["mode pilot", "system 9"],
-        &["MAVLink system 9, but SYSID_THISMAV is 2: restart it"],
+        &["MAVLink system 9, but its parameter SYSID_THISMAV is 2: restart the autopilot"],
         &["system 2"],
         "",
     );
@@ -500,8 +502,8 @@ fn a_check_names_planted_faults_of_the_radio() {
     bench.finds(
         "--altitude 21",
         &[
-            "relay 1 has another mission, 0x",
-            "relay 3 has another mission, 0x",
+            "relay 1 has another mission, digest 0x",
+            "relay 3 has another mission, digest 0x",
         ],
     );
     let other = format!("--key-file {}", bench.files.text("other"));
@@ -511,14 +513,14 @@ fn a_check_names_planted_faults_of_the_radio() {
     // A neighbour that is checked, too.
     let third = || bench.companion(3, "--check=6 --altitude 21");
     let checked = [bench.companion(1, "--check=6"), third()];
-    bench.finds("", &["relay 3 has another mission, 0x"]);
+    bench.finds("", &["relay 3 has another mission, digest 0x"]);
     drop(checked);
     let checked = [bench.companion(1, "--check=6"), third()];
     bench.channel.cut(0b010);
     bench.finds(
         "",
         &[
-            "relay 1 is heard, but has not heard this relay: one way only",
+            "relay 1 is received, but does not receive this relay",
             "relay 3 ",
         ],
     );
@@ -527,7 +529,7 @@ fn a_check_names_planted_faults_of_the_radio() {
     let mut relays = bench.neighbours();
     bench.finds("", &[]);
     bench.channel.cut(0b001);
-    bench.finds("", &["relay 1: nothing heard"]);
+    bench.finds("", &["relay 1: no frame received"]);
     bench.channel.cut(0);
     for relay in &mut relays {
         assert!(
@@ -548,7 +550,7 @@ fn a_check_names_planted_faults_of_the_radio() {
     let reds = bench.reds("", 5);
     assert!(
         reds.iter()
-            .any(|it| it.contains("another relay 2 is on the channel")),
+            .any(|it| it.contains("another relay with number 2 was received")),
         "{reds:#?}"
     );
     drop((twin, relays));
@@ -564,7 +566,7 @@ fn a_check_names_planted_faults_of_the_radio() {
     );
     let port = |index: usize| format!("--shared {}", noisy.tty(index - 1));
     let _relays = [1, 3].map(|index| bench.companion(index, &port(index)));
-    let damaged = "damaged frames: is 57600 bit/s the data rate at both ends?";
+    let damaged = "check that both ends have the data rate 57600 bit/s";
     bench.finds(&port(2), &[damaged; 2]);
 }
 
@@ -585,7 +587,7 @@ fn a_relay_on_wires_is_checked() {
     assert_eq!(
         lines
             .iter()
-            .filter(|it| it.contains("heard both ways"))
+            .filter(|it| it.contains("both relays receive each other"))
             .count(),
         2
     );

@@ -144,7 +144,7 @@ fn the_relays_know_the_measurements_of_both_stations() {
     // A lost relay is reported because measurements are sent to it.
     drop(relays.remove(2));
     write_until(&level, rx_w, || {
-        rx.has_printed("lost: relay 3 does not reply")
+        rx.has_printed("lost: relay 3 has not replied to this station for 5 s")
     });
     for station in [tx, rx] {
         let last = station.stopped().pop().unwrap();

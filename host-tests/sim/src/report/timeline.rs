@@ -198,8 +198,8 @@ fn belongs(moment: &MomentReport, group: &Group) -> bool {
         return false;
     }
     match one.what {
-        "lost" | "not received by" | "mission mismatch" | "key mismatch" | "epoch went back"
-        | "duplicate index" | "sensor off" => one.other == moment.other,
+        "lost" | "told to leave" | "not received by" | "mission mismatch" | "key mismatch"
+        | "epoch went back" | "duplicate index" | "sensor off" => one.other == moment.other,
         // Both neighbours log that they found each other.
         "found" => {
             one.other == Some(moment.relay) && moment.other == Some(one.relay)
@@ -239,6 +239,8 @@ impl Group {
                 || "relays spread evenly".to_owned(),
                 |sir| format!("SIR {sir:.3}"),
             ),
+            "may leave" => format!("{who} may leave"),
+            "told to leave" => format!("relay {other} may leave"),
             "partition" => format!("partition after relay {relay}"),
             "partition ended" => format!("partition after relay {relay} ended"),
             "does not receive" => format!("relay {relay} does not receive {other}"),
@@ -293,6 +295,10 @@ impl Group {
             "released" => format!("{who} released: the pilot took control"),
             "blind" => format!("{who}: the autopilot reports no position"),
             "restarted" => format!("{who}: autopilot restarted"),
+            "may leave" => {
+                format!("{who}: the chain works without this relay now, its drone may fly away")
+            }
+            "told to leave" => format!("{who}: relay {other} may fly away"),
             "no quorum" => {
                 format!("{who}: too few relays receive each other (no quorum), position held")
             }
@@ -634,5 +640,34 @@ impl RecoveryReport {
             _ = write!(text, "; {sweeps} sweeps");
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Moment, TimelineEvent, line};
+    use uav_relay::Instant;
+
+    /// Checks that the lines about a departure name the relay that may leave.
+    #[test]
+    fn lines_of_a_departure_name_the_relay_that_leaves() {
+        let of = |relay, what, other| {
+            line(&Moment {
+                at: Instant::from_millis(60_000),
+                relay,
+                what,
+                other,
+                target: None,
+                sweeps: 0,
+            })
+        };
+        assert_eq!(
+            of(3, TimelineEvent::MayLeave, None),
+            "relay 3: the chain works without this relay now, its drone may fly away"
+        );
+        assert_eq!(
+            of(4, TimelineEvent::MayLeaveTold, Some(3)),
+            "relay 4: relay 3 may fly away"
+        );
     }
 }
