@@ -12,18 +12,23 @@ use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
 use crate::sir::{Sender, square};
 
+/// Profiles of the relays of a chain: a function of a relay's index, 1 to N.
+pub(super) trait SeatOf: Fn(u16) -> Seat {}
+
+impl<F: Fn(u16) -> Seat> SeatOf for F {}
+
 /// Chain to be solved: its mission, and the profiles of its relays.
 #[derive(Clone, Copy)]
-pub(in crate::optimiser::joint) struct SolverContext<'a, F> {
-    pub(in crate::optimiser::joint) mission: &'a Mission,
-    pub(in crate::optimiser::joint) interferer: &'a Interferer,
-    pub(in crate::optimiser::joint) seat_of: &'a F,
-    pub(super) gain: PowerRatio,
+pub(super) struct Chain<'a, F> {
+    pub(super) mission: &'a Mission,
+    pub(super) interferer: &'a Interferer,
+    seat_of: &'a F,
+    gain: PowerRatio,
 }
 
-impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
+impl<'a, F: SeatOf> Chain<'a, F> {
     /// Creates the chain of `mission`; `None` in an interference field.
-    pub(in crate::optimiser::joint) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
+    pub(super) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
         Some(Self {
             mission,
             interferer: mission.interferer()?,
@@ -32,8 +37,26 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         })
     }
 
-    pub(in crate::optimiser::joint) fn distance_m(&self) -> f32 {
+    pub(super) fn distance_m(&self) -> f32 {
         self.mission.config().distance_m
+    }
+
+    pub(super) const fn relays(&self) -> u16 {
+        self.mission.relays()
+    }
+
+    pub(super) fn seat(&self, index: u16) -> Seat {
+        (self.seat_of)(index)
+    }
+
+    pub(super) fn room(&self, index: u16) -> Room {
+        self.seat(index).room
+    }
+
+    /// Returns the largest x of a relay, m, that leaves the relays after it their separation. `end_m` is that of the
+    /// relay before it, and `step` the minimum step between the two.
+    pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
+        (end_m + step).min(self.distance_m())
     }
 
     /// Returns the sender of the hop to relay `index`: Tx, or relay `index` - 1 at `from`.
@@ -41,7 +64,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         if index <= 1 {
             return Sender::transmitter(self.mission);
         }
-        let power_w = (self.seat_of)(index - 1).power_w;
+        let power_w = self.seat(index - 1).power_w;
         let common = power_w.to_bits() == self.mission.config().common.power_w.to_bits();
         Sender {
             cross_section: from.cross_section(),
@@ -66,20 +89,20 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// Returns the altitude of relay `index`, m, if it is fixed. `None` if the relay may choose its altitude, or if
     /// the mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
-        let Room { band, .. } = (self.seat_of)(index).room;
+        let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
         (free && band.is_single()).then_some(band.least_m)
     }
 
     pub(super) fn holds(&self) -> bool {
-        (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
+        (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
     /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
     /// first and after the last of those relays the altitude is constant if `level` is true. Otherwise it falls to the
     /// band's lowest altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
-        let relays = self.mission.relays();
+        let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
         let before = (1..=index).rev().find_map(held);
         let after = (index..=relays).find_map(held);
@@ -103,15 +126,15 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// Returns the last hop's maximum length for `target` less its length, m, and the derivatives. This difference is the chain's slack.
     /// The last relay is at `at`; the derivatives are by its coordinates.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
-        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
+        let Seat { room, power_w } = self.seat(self.relays());
         site::tail(self.mission, power_w, room, target, at)
     }
 
     /// Returns the upper bound of the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
     /// the last hop.
     pub(super) fn ceiling(&self) -> f32 {
-        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
-        let first = (self.seat_of)(1).room;
+        let Seat { room, power_w } = self.seat(self.relays());
+        let first = self.room(1);
         let first = site::first_most(self.mission, self.interferer, first);
         let last = site::last_most(self.mission, power_w, room);
         libm::logf(first.min(last).clamp(1e-30, 1e30))
@@ -120,7 +143,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// Returns the target, as ln(SIR), from which on every hop has a maximum length. It is just above the largest
     /// gain of a hop: with a lower target a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
-        let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
+        let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
         let gain = self.mission.relay_gain(relay).value();
         libm::logf(self.mission.tx_gain().value().max(gain)) + 0.01
@@ -129,7 +152,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
 
 /// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. Candidates are the
 /// limits of the ranges in `room`, and the lateral offset 0.
-pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
+pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
     for y_m in [room.lateral.least_m, 0.0, room.lateral.most_m] {

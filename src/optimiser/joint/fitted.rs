@@ -17,7 +17,7 @@
 //! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
 //! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
 
-use super::chain::{Seat, SolverContext};
+use super::chain::{Chain, Seat, SeatOf};
 use super::hop::{Triple, minus};
 use crate::mission::{Band, FINEST_STEP};
 use crate::optimiser::search::Infeasible;
@@ -247,11 +247,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     };
 
     /// Continues the solution by one bounded portion. Ready at the end, with the linear SIR of the worst hop.
-    pub(super) fn step(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Poll<Result<f32, Infeasible>> {
-        let relays = chain.mission.relays();
+    pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
+        let relays = chain.relays();
         match self.work {
             Work::Begin(0) if usize::from(self.number) >= starts(chain) => {
                 if !(self.best > 0.0) {
@@ -287,9 +284,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// Moves the next relays to their positions in the current initial chain. The first `done` relays are there
     /// already, and one call moves at most [`OTHERS_AT_ONCE`]. After the last relay, the first pass over the chain is
     /// due.
-    fn begin(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) {
+    fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         if done == 0 {
             self.gains = Gains::new(chain);
         }
@@ -307,7 +304,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         let end = (done + OTHERS_AT_ONCE).min(relays);
         let after = end + 1;
         for index in done + 1..after {
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let x = if first < last {
                 first + (last - first) * f32::from(index) / f32::from(relays + 1)
             } else {
@@ -347,9 +344,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// Returns the position of node `index` moved by `by` along the current coordinate. The node stays within its
     /// limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
-    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, by: f32) -> Spot {
+    fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
-        let Some(&place) = place.filter(|_| index <= chain.mission.relays()) else {
+        let Some(&place) = place.filter(|_| index <= chain.relays()) else {
             let x = if index > 0 { 1.0 } else { 0.0 };
             return Spot {
                 at: [x, 0.0, 0.0],
@@ -357,7 +354,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             };
         };
         let unit = 1.0 / chain.distance_m();
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         let mut at = place;
         let limits = |band: Band| [band.least_m * unit, band.most_m * unit];
         let limits = [[0.0, 1.0], limits(room.lateral), limits(room.band)];
@@ -371,8 +368,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    fn pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, first: u16) {
-        let relays = chain.mission.relays();
+    fn pass(&mut self, chain: &Chain<'_, impl SeatOf>, first: u16) {
+        let relays = chain.relays();
         if first <= 1 {
             let spot = self.spot(chain, 0, 0.0);
             self.front = [State { spot, time: 0.0 }; STATES];
@@ -415,17 +412,17 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
 
     /// Continues after a pass. Its best combination of moves has the total hop time `time`, with the last relay in
     /// `state`.
-    fn conclude(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, time: f32, state: u8) {
+    fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
-            self.work = Work::Back(chain.mission.relays(), state);
+            self.work = Work::Back(chain.relays(), state);
         } else {
             self.next_pass(chain);
         }
     }
 
     /// Moves relays to their best positions, from relay `index` (which is in `state`) toward Tx.
-    fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, state: u8) {
+    fn back(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
         for index in (end + 1..=index).rev() {
@@ -444,7 +441,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
 
     /// Selects the coordinate and the step width of the next pass. After the last one the chain is kept if it is the
     /// best.
-    fn next_pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
+    fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
         if self.number < BEST {
@@ -476,11 +473,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 
     /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the hop's worse SIR.
-    fn hop_times(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        index: u16,
-    ) -> [f32; 2] {
+    fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
             self.spot(chain, index - 1, 0.0),
@@ -515,10 +508,10 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// Returns the position of relay `index`, and its slots, once the chain is solved.
     pub(super) fn place(
         &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         index: u16,
     ) -> (Placement, SlotShares) {
-        let bounds = |hop| self.bounds(chain.mission.relays(), hop);
+        let bounds = |hop| self.bounds(chain.relays(), hop);
         let [[begin, last], [middle, begin_back], [end, first_back]] = [
             bounds(index.saturating_sub(1)),
             bounds(index),
@@ -528,9 +521,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             .spot(chain, index, 0.0)
             .at
             .map(|d| d * chain.distance_m());
-        let at = (chain.seat_of)(index)
-            .room
-            .nearest(CrossSection { y_m, altitude_m });
+        let at = chain.room(index).nearest(CrossSection { y_m, altitude_m });
         let shares = SlotShares {
             to_rx: [middle, end],
             to_tx: [begin_back, last],
@@ -543,7 +534,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
 }
 
 /// Returns the number of initial chains. More chains are tried if relays may choose lateral offsets or altitudes.
-fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
+fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {
         STARTS.len()
@@ -553,7 +544,7 @@ fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
 }
 
 impl Gains {
-    fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
+    fn new(chain: &Chain<'_, impl SeatOf>) -> Self {
         let (mission, interferer) = (chain.mission, chain.interferer);
         let d = mission.config().distance_m;
         let gap = mission.fitted_gap();
@@ -575,10 +566,10 @@ impl Gains {
     }
 
     /// Returns the gains of the hop to node `index`, 1 to N + 1 (Rx).
-    fn hop(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Hop {
+    fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Hop {
         let config = chain.mission.config();
         let relays = config.relays;
-        let power_w = |index: u16| (chain.seat_of)(index).power_w;
+        let power_w = |index: u16| chain.seat(index).power_w;
         let there = match index {
             1 => self.from_tx,
             _ if index > relays => self.to_rx_per_w * power_w(relays),

@@ -17,7 +17,7 @@
 //! The first has a convex direction, along the hop, and the second all across the direction to the interferer. In *convex* mode
 //! those are left out, so that the matrix of [`newton`](super::newton) is positive definite.
 
-use super::super::chain::{Seat, SolverContext};
+use super::super::chain::{Chain, Seat, SeatOf};
 use super::super::hop::{Triple, minus};
 use crate::sir::{Sender, transmitter_gain};
 
@@ -102,7 +102,7 @@ impl Gains {
         reverse: 0.0,
     };
 
-    pub(super) fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
+    pub(super) fn new(chain: &Chain<'_, impl SeatOf>) -> Self {
         let (mission, interferer) = (chain.mission, chain.interferer);
         let d = mission.config().distance_m;
         let common_w = mission.config().common.power_w;
@@ -123,10 +123,10 @@ impl Gains {
 
     /// Returns the logarithms of two gains of hop `k`: forward (toward Rx), and backward divided by r. r is the
     /// required ratio of backward to forward SIR. `k` is 1 (from Tx) to N + 1 (to Rx).
-    fn of(&self, k: u16, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> [f32; 2] {
-        let relays = chain.mission.relays();
+    fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> [f32; 2] {
+        let relays = chain.relays();
         let power = |index: u16| {
-            let power_w = (chain.seat_of)(index).power_w;
+            let power_w = chain.seat(index).power_w;
             if power_w.to_bits() == self.common_w.to_bits() {
                 0.0
             } else {
@@ -160,19 +160,14 @@ impl Gains {
     pub(super) fn levels(
         &self,
         k: u16,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         [from, to]: [Triple; 2],
         [quiet_from, quiet_to]: [f32; 2],
     ) -> [f32; 2] {
         let v = minus(to, from);
         let length = libm::logf(dot(&v, &v) + SHORTEST);
         let [there, back] = self.of(k, chain);
-        let there = there
-            + if k > chain.mission.relays() {
-                0.0
-            } else {
-                quiet_to
-            };
+        let there = there + if k > chain.relays() { 0.0 } else { quiet_to };
         let back = back + if k > 1 { quiet_from } else { 0.0 };
         [there - length, back - length]
     }

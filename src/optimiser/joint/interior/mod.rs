@@ -25,7 +25,7 @@
 mod hop;
 mod newton;
 
-use super::chain::{Seat, SolverContext};
+use super::chain::{Chain, Seat, SeatOf};
 use super::hop::{Triple, minus};
 use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
@@ -237,11 +237,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if they
     /// are close to the result; the barrier weight is then smaller at first.
-    pub(super) fn start(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        is_close: bool,
-    ) {
+    pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
         self.gains = Gains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
         self.iterations = 0;
@@ -253,7 +249,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// fraction of the distance between a coordinate's lower and upper limit.
     pub(super) fn put(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         index: u16,
         place: Placement,
         margin: f32,
@@ -267,18 +263,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Stores the position (x, y, h) of relay `index`, in units of the distance from Tx to Rx.
     #[inline(never)]
-    fn settle(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        index: u16,
-        [x, y, h]: Triple,
-    ) {
+    fn settle(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, [x, y, h]: Triple) {
         let distance_m = chain.distance_m();
         let at = CrossSection {
             y_m: y * distance_m,
             altitude_m: h * distance_m,
         };
-        (self.cells).set(index, Cell::of(at, (chain.seat_of)(index).room));
+        (self.cells).set(index, Cell::of(at, chain.room(index)));
         if let Some(node) = self.node(index) {
             node.x = x;
         }
@@ -304,24 +295,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Returns the stored position of node `index` and its limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
-    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
-        if index > chain.mission.relays() {
+    fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
+        if index > chain.relays() {
             return Spot::fixed([1.0, 0.0, 0.0]);
         }
         let Some(node) = self.nodes.get(usize::from(index).wrapping_sub(1)) else {
             return Spot::fixed([0.0; 3]);
         };
         let unit = 1.0 / chain.distance_m();
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         let at = self.cells.get(index).place(room);
         let (lateral, band) = (room.lateral, room.band);
         let [far, near] = self.closed;
         let most = if index == 1 { 1.0 - far } else { 1.0 };
-        let least = if index == chain.mission.relays() {
-            near
-        } else {
-            0.0
-        };
+        let least = if index == chain.relays() { near } else { 0.0 };
         Spot {
             at: [node.x, at.y_m * unit, at.altitude_m * unit],
             low: [least, lateral.least_m * unit, band.least_m * unit],
@@ -344,7 +331,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Returns the position of node `index` after the tried fraction of its Newton step, and its limits.
     #[inline(never)]
-    fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
+    fn moved(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
         if self.share > 0.0 {
             add_scaled(&mut spot.at, &self.step_of(index), self.share);
@@ -379,8 +366,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Continues the interior-point method by one bounded portion. After the last portion it is ready with a target
     /// in ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is
     /// each backward SIR over r, the required ratio of backward to forward SIR.
-    pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
-        let relays = chain.mission.relays();
+    pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
+        let relays = chain.relays();
         let done = match self.work {
             Work::Levels(k) => {
                 self.levels(chain, k);
@@ -428,8 +415,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Computes the levels of ten hops from hop `k` on, and adds their ends' barrier. The barrier is the sum of
     /// ln(distance to a limit). A level is ln(forward SIR) or ln(backward SIR / r); r is the required ratio of both.
-    fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
-        let relays = chain.mission.relays();
+    fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
+        let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
         let mut from = self.moved(chain, k - 1).at;
         let mut quiet = self.gains.quiet(from);
@@ -499,7 +486,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Accepts the tried step if it does not lower the merit (target plus barrier); else shortens the step. After the
     /// last try the step is computed again without negative curvature, and after that the barrier weight falls.
-    fn judge(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+    fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
             return Poll::Pending;
@@ -527,8 +514,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Stores the new position of relay `k`, and limits the Lagrange multipliers of the hop to relay `k`. The multipliers stay within the
     /// factor [`APART`] of their optimal values.
-    fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
-        let relays = chain.mission.relays();
+    fn accept(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
+        let relays = chain.relays();
         if self.share > 0.0 && k <= relays {
             let spot = self.moved(chain, k);
             self.settle(chain, k, spot.at);
@@ -547,7 +534,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Starts the next Newton step from the accepted positions, or lowers the barrier weight mu. Ready after the
     /// maximum number of steps, with the target, in ln(SIR).
-    fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+    fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
         let is_step = self.share > 0.0;
@@ -568,11 +555,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Lowers the barrier weight mu and continues; after the last mu, ready with the target, in ln(SIR). `resets` is
     /// true to replace the Lagrange multipliers, because no step with them has raised the merit (target plus
     /// barrier).
-    fn lower(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        resets: bool,
-    ) -> Poll<f32> {
+    fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
             return Poll::Ready(self.target);
@@ -597,7 +580,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     #[inline(never)]
     fn eliminate(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u16,
         count: u16,
         factors: &mut [Factor; FIRST],
@@ -608,7 +591,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             Some(Segment::Front(front)) if segment > 0 => (first + 1, *front),
             _ => (0, Front::NONE),
         };
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let mut at = self.spot(chain, from).at;
         let after = first + count + 1;
         for index in from..after {
@@ -628,12 +611,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Eliminates all relays of `segment`, then begins the next segment or the computation of steps. `None` if the
     /// Newton system cannot be solved.
-    fn forward(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        segment: u16,
-    ) -> Option<()> {
-        let relays = chain.mission.relays();
+    fn forward(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u16) -> Option<()> {
+        let relays = chain.relays();
         if segment == 0 {
             self.sums = Sums::NONE;
         }
@@ -657,7 +636,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// cannot be solved or a step is not finite.
     fn substitute(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u16,
         is_second: bool,
     ) -> Option<()> {
@@ -668,8 +647,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         } else {
             (first, middle)
         };
-        let end = end.min(chain.mission.relays());
-        let relays = chain.mission.relays();
+        let end = end.min(chain.relays());
+        let relays = chain.relays();
         let mut factors = [Factor::NONE; FIRST];
         self.eliminate(chain, segment, end - first, &mut factors)?;
         let mut steps = [[0; 3]; FIRST];
@@ -732,6 +711,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 }
 
 /// Returns the number of levels: two for each hop, the logarithms of its forward and backward SIR.
-fn levels(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> f32 {
-    2.0 * f32::from(chain.mission.relays() + 1)
+fn levels(chain: &Chain<'_, impl SeatOf>) -> f32 {
+    2.0 * f32::from(chain.relays() + 1)
 }

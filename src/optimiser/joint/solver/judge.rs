@@ -6,7 +6,7 @@
 use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
-use crate::optimiser::joint::chain::{Seat, SolverContext, far_off, last_of};
+use crate::optimiser::joint::chain::{Chain, Seat, SeatOf, far_off, last_of};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
@@ -28,7 +28,7 @@ const PROBED: f32 = 3e-4;
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     pub(super) fn seek(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         seek: Seek,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -51,7 +51,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Bounded by twenty relays.
     pub(super) fn try_hold_back(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u8,
         place_m: f32,
         seek: Seek,
@@ -75,7 +75,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
     pub(super) fn tried(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         mut seek: Seek,
         purpose: Purpose,
         met: Option<bool>,
@@ -137,7 +137,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     pub(super) fn settle(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         sigma: f32,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -207,11 +207,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    pub(super) fn next(
-        &mut self,
-        turn: AscentStep,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Work {
+    pub(super) fn next(&mut self, turn: AscentStep, chain: &Chain<'_, impl SeatOf>) -> Work {
         self.restart();
         match turn {
             AscentStep::Try { share, sigma } => Work::Forward(share, sigma, false),
@@ -272,15 +268,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// constraint is active.
     pub(super) fn polish(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         sigma: f32,
     ) -> Poll<Result<f32, Infeasible>> {
         let (index, way, halved) = self.move_of(chain.mission);
-        let polished = chain.mission.relays() <= POLISHED || chain.holds();
+        let polished = chain.relays() <= POLISHED || chain.holds();
         if !polished || halved > HALVINGS || self.moved >= MOVES {
             return Poll::Ready(Ok(libm::expf(sigma)));
         }
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         self.kept = self.cells.get(index);
         let part = FIRST_MOVE
             * libm::ldexpf(1.0, -i32::from(halved))
@@ -298,14 +294,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             } else {
                 index.saturating_sub(2)
             };
-            if other < 1 || other > chain.mission.relays() {
+            if other < 1 || other > chain.relays() {
                 self.moving += 1;
                 return Poll::Pending;
             }
-            moved = Cell::of(
-                self.cells.get(other).place((chain.seat_of)(other).room),
-                room,
-            );
+            moved = Cell::of(self.cells.get(other).place(chain.room(other)), room);
         }
         if moved == self.kept {
             self.moving += 1;
@@ -321,7 +314,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Begins the improvement of the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
     ) -> Poll<Result<f32, Infeasible>> {
         let next = Start::number(self.number, Room::of(chain.mission));
         let Some(start) = next else {
@@ -364,8 +357,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.work = match start {
             Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
             Start::Turns => {
-                for index in 1..=chain.mission.relays() {
-                    let room = (chain.seat_of)(index).room;
+                for index in 1..=chain.relays() {
+                    let room = chain.room(index);
                     let apart_m = MARGIN * chain.mission.config().min_separation_m;
                     let at = Start::in_turn(index, chain.interferer, room, apart_m);
                     self.keep(index, 0.0, Cell::of(at, room));
@@ -393,7 +386,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// initial chain, else the stored ones.
     pub(super) fn shaped(
         &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         index: u16,
         room: Room,
         target: f32,
@@ -405,7 +398,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         let wanted = match self.start {
             Start::Far => {
                 let top = far_off(chain, room);
-                let relays = f32::from(chain.mission.relays().saturating_sub(1).max(1));
+                let relays = f32::from(chain.relays().saturating_sub(1).max(1));
                 let down = f32::from(index - 1) / relays;
                 CrossSection {
                     y_m: top.y_m * (1.0 - down),

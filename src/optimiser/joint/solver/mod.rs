@@ -21,7 +21,7 @@ mod passes;
 
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
-use crate::optimiser::joint::chain::{Mark, SEGMENT, STAGES, Seat, SolverContext, Stage};
+use crate::optimiser::joint::chain::{Chain, Mark, SEGMENT, STAGES, Seat, SeatOf, Stage};
 use crate::optimiser::joint::fitted::{Fitted, SlotShares};
 use crate::optimiser::joint::site::{Cell, Cells};
 use crate::optimiser::joint::starts::{Seek, Start};
@@ -183,10 +183,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         cells: Cells::NEW,
     };
 
-    fn step(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Poll<Result<f32, Infeasible>> {
+    fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         match self.work {
             Work::Begin => self.begin(chain),
             Work::Seek(seek, purpose) => self.seek(chain, seek, purpose),
@@ -307,8 +304,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     ///
     /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
-        let cells = self.cells();
-        cells.map_or(0.0, |cells| cells.end_m(mission, seat_of, index))
+        let chain = Chain::new(mission, seat_of);
+        let solved = chain.zip(self.cells());
+        solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
     /// Returns true if some relays have to stay short of their farthest x to meet the target found.
@@ -333,7 +331,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission: &Mission,
         seat_of: impl Fn(u16) -> Seat,
     ) -> Poll<Result<f32, Infeasible>> {
-        let Some(chain) = SolverContext::new(mission, &seat_of) else {
+        let Some(chain) = Chain::new(mission, &seat_of) else {
             return Poll::Ready(Err(Infeasible));
         };
         match &mut self.0 {
@@ -360,7 +358,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let Way::Fitted(solver) = &self.0 else {
             return None;
         };
-        let chain = SolverContext::new(mission, seat_of)?;
+        let chain = Chain::new(mission, seat_of)?;
         Some(solver.first()?.place(&chain, index))
     }
 }
