@@ -10,7 +10,7 @@ use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
-use crate::sir::{Sender, square};
+use crate::sir::{Sender, square, transmitter_gain};
 
 /// Profiles of the relays of a chain: a function of a relay's index, 1 to N.
 pub(super) trait SeatOf: Fn(u16) -> Seat {}
@@ -147,6 +147,70 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         let relay = own.fold(0.0, f32::max);
         let gain = self.mission.relay_gain(relay).value();
         libm::logf(self.mission.tx_gain().value().max(gain)) + 0.01
+    }
+}
+
+/// Gains of the hops of a chain in both directions. The SIR of a hop is its gain times the inverse interference at the
+/// receiver, over the squared length; at Rx and Tx the gain includes the interference.
+///
+/// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as their logarithms.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gains {
+    /// Position (x, y, h) of the interferer.
+    pub(super) source: Triple,
+    /// Receiver noise over the interferer's power received at the distance D (nu).
+    pub(super) noise: f32,
+    relay: f32,
+    to_rx: f32,
+    to_tx: f32,
+    from_tx: f32,
+    from_rx: f32,
+}
+
+impl Gains {
+    pub(super) const NONE: Self = Self {
+        source: [0.0; 3],
+        noise: 0.0,
+        relay: 0.0,
+        to_rx: 0.0,
+        to_tx: 0.0,
+        from_tx: 0.0,
+        from_rx: 0.0,
+    };
+
+    /// Returns the gains for relays of `power_w` watts; each is stored as `stored` returns it.
+    pub(super) fn new(
+        chain: &Chain<'_, impl SeatOf>,
+        power_w: f32,
+        stored: impl Fn(f32) -> f32,
+    ) -> Self {
+        let (mission, interferer, d) = (chain.mission, chain.interferer, chain.distance_m());
+        let on_ground = |gain: f32| stored(gain / d / d);
+        Self {
+            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
+            noise: mission.noise_at_a_metre() * d * d,
+            relay: stored(mission.relay_gain(power_w).value()),
+            to_rx: on_ground(mission.receiver_gain(power_w)),
+            to_tx: on_ground(transmitter_gain(mission, power_w)),
+            from_tx: stored(mission.tx_gain().value()),
+            from_rx: stored(Sender::receiver(mission).gain.value()),
+        }
+    }
+
+    /// Returns the gains of hop `k` forward and backward. `k` is 1 (from Tx) to N + 1 (to Rx), and `relays` is N.
+    /// `sent_by` returns a gain for the power of the relay with the given index.
+    pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
+        let there = match k {
+            1 => self.from_tx,
+            _ if k > relays => sent_by(self.to_rx, k - 1),
+            _ => sent_by(self.relay, k - 1),
+        };
+        let back = match k {
+            _ if k > relays => self.from_rx,
+            1 => sent_by(self.to_tx, k),
+            _ => sent_by(self.relay, k),
+        };
+        [there, back]
     }
 }
 

@@ -17,12 +17,12 @@
 //! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
 //! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
 
-use super::chain::{Chain, Seat, SeatOf};
+use super::chain::{Chain, Gains, SeatOf};
 use super::hop::{Triple, minus};
 use crate::mission::{Band, FINEST_STEP};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
-use crate::sir::{Sender, in_noise, square, transmitter_gain};
+use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
@@ -91,20 +91,6 @@ pub struct SlotShares {
     pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
     pub bits_per_hz: f32,
-}
-
-/// Gains of the hops, each divided by the SNR gap. SINR over the gap is the gain times the inverse interference at
-/// the receiver, over the squared hop length. At Rx and Tx the gain includes the interference.
-#[derive(Clone, Copy, Debug)]
-struct Gains {
-    source: Triple,
-    /// Receiver noise over the interferer's power received at the distance from Tx to Rx.
-    noise: f32,
-    relay_per_w: f32,
-    to_rx_per_w: f32,
-    to_tx_per_w: f32,
-    from_tx: f32,
-    from_rx: f32,
 }
 
 /// Position that is tried for a node, and the inverse interference there; 1 at Tx and Rx.
@@ -191,6 +177,7 @@ enum Work {
 /// Solver of a chain with fitted slots: time slots as long as each hop needs. It maximises the data rate.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
+    /// Gains of the hops from relays of 1 W, each divided by the SNR gap.
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
@@ -221,15 +208,7 @@ pub(super) struct Fitted<const RELAYS: usize> {
 impl<const RELAYS: usize> Fitted<RELAYS> {
     /// State of the solver before its first call. All its bytes are 0, so it takes no flash.
     pub(super) const NEW: Self = Self {
-        gains: Gains {
-            source: [0.0; 3],
-            noise: 0.0,
-            relay_per_w: 0.0,
-            to_rx_per_w: 0.0,
-            to_tx_per_w: 0.0,
-            from_tx: 0.0,
-            from_rx: 0.0,
-        },
+        gains: Gains::NONE,
         places: [[0.0; 3]; RELAYS],
         best_places: [[0.0; 3]; RELAYS],
         choices: [0; RELAYS],
@@ -288,7 +267,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         let config = chain.mission.config();
         let relays = chain.relays();
         if done == 0 {
-            self.gains = Gains::new(chain);
+            let gap = chain.mission.fitted_gap();
+            self.gains = Gains::new(chain, 1.0, |gain| gain / gap);
         }
         let number = usize::from(self.number);
         let is_best = self.number == BEST;
@@ -544,46 +524,20 @@ fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
 }
 
 impl Gains {
-    fn new(chain: &Chain<'_, impl SeatOf>) -> Self {
-        let (mission, interferer) = (chain.mission, chain.interferer);
-        let d = mission.config().distance_m;
-        let gap = mission.fitted_gap();
-        let on_ground = |gain: f32| gain / d / d / gap;
-        Self {
-            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
-            noise: mission.noise_at_a_metre() * d * d,
-            relay_per_w: mission.relay_gain(1.0).value() / gap,
-            to_rx_per_w: on_ground(mission.receiver_gain(1.0)),
-            to_tx_per_w: on_ground(transmitter_gain(mission, 1.0)),
-            from_tx: mission.tx_gain().value() / gap,
-            from_rx: Sender::receiver(mission).gain.value() / gap,
-        }
-    }
-
     fn quiet(&self, at: Triple) -> f32 {
         let [x, y, h] = minus(at, self.source);
         in_noise(square(x) + square(y) + square(h), self.noise)
     }
 
-    /// Returns the gains of the hop to node `index`, 1 to N + 1 (Rx).
+    /// Returns the hop to node `index`, 1 to N + 1 (Rx).
     fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Hop {
-        let config = chain.mission.config();
-        let relays = config.relays;
-        let power_w = |index: u16| chain.seat(index).power_w;
-        let there = match index {
-            1 => self.from_tx,
-            _ if index > relays => self.to_rx_per_w * power_w(relays),
-            _ => self.relay_per_w * power_w(index - 1),
-        };
-        let back = match index {
-            _ if index > relays => self.from_rx,
-            1 => self.to_tx_per_w * power_w(1),
-            _ => self.relay_per_w * power_w(index),
-        };
+        let (config, relays) = (chain.mission.config(), chain.relays());
         let is_between = index > 1 && index <= relays;
         let least = config.min_separation_m / config.distance_m + 0.5 * FINEST_STEP;
         Hop {
-            gains: [there, back],
+            gains: self.of(index, relays, |gain, index| {
+                gain * chain.seat(index).power_w
+            }),
             reverse: chain.mission.reverse(),
             apart: is_between.then_some(square(least)),
         }

@@ -25,13 +25,13 @@
 mod hop;
 mod newton;
 
-use super::chain::{Chain, Seat, SeatOf};
+use super::chain::{Chain, SeatOf};
 use super::hop::{Triple, minus};
 use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
-use hop::{Derivatives, Gains, add_scaled, dot};
+use hop::{Derivatives, LogGains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
 /// First barrier weight mu of the interior-point method for a start far from the result. It is divided among all hops
@@ -173,7 +173,7 @@ enum Work {
 /// directions.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
-    gains: Gains,
+    gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
     /// Lengths of the line Tx-Rx that are closed to two relays. They are next to Rx for relay 1, and next to Tx for
@@ -209,7 +209,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     pub(super) const NEW: Self = Self {
-        gains: Gains::NONE,
+        gains: LogGains::NONE,
         cells: Cells::NEW,
         closed: [0.0; 2],
         nodes: [Node {
@@ -238,7 +238,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if they
     /// are close to the result; the barrier weight is then smaller at first.
     pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
-        self.gains = Gains::new(chain);
+        self.gains = LogGains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
         self.iterations = 0;
         self.convex = false;

@@ -13,7 +13,7 @@
 //! mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
-use crate::optimiser::joint::chain::{Chain, Seat, SeatOf};
+use crate::optimiser::joint::chain::{Chain, SeatOf};
 use crate::optimiser::joint::interior::Interior;
 use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;

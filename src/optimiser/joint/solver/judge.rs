@@ -6,7 +6,7 @@
 use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
-use crate::optimiser::joint::chain::{Chain, Seat, SeatOf, far_off, last_of};
+use crate::optimiser::joint::chain::{Chain, SeatOf, far_off, last_of};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
