@@ -16,7 +16,7 @@ use core::task::Poll;
 use super::reverse::Back;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement};
-use crate::root::sqrt;
+use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
 /// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
@@ -193,6 +193,12 @@ impl Hops {
         incoming.min(outgoing)
     }
 
+    /// Returns true if the hop from the relay at `at` has a lower SIR than the hop to it.
+    fn is_out_worse(&self, at: Placement) -> bool {
+        let (incoming, outgoing) = self.both(at);
+        incoming > outgoing
+    }
+
     /// Returns true if the relay at `at` keeps its minimum distance from both neighbours.
     fn is_clear(&self, at: Placement) -> bool {
         let clear = |of: HopEnd| {
@@ -349,15 +355,7 @@ impl LocalSearch {
         let at = |x_m| Placement::on_line(x_m, altitude_m);
         // Beyond the interferer the incoming hop may improve with its length; then an end of the row is best.
         let ends = self.weigh(at(low)).max(self.weigh(at(high)));
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            let (incoming, outgoing) = self.hops.both(at(middle));
-            if incoming > outgoing {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        (low, high) = bisected(low, high, HALVINGS, |x_m| self.hops.is_out_worse(at(x_m)));
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
@@ -400,16 +398,10 @@ impl LocalSearch {
             }
         }
         self.evaluations += u16::from(SAMPLES) + 1 + 2 * u16::from(HALVINGS);
-        for (mut left, mut right, sign) in crossings.into_iter().flatten() {
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (left + right);
-                let (incoming, outgoing) = self.hops.both(place(middle));
-                if (incoming > outgoing) == sign {
-                    right = middle;
-                } else {
-                    left = middle;
-                }
-            }
+        for (left, right, sign) in crossings.into_iter().flatten() {
+            let (left, right) = bisected(left, right, HALVINGS, |x_m| {
+                self.hops.is_out_worse(place(x_m)) != sign
+            });
             best = best
                 .max(self.weigh(place(left)))
                 .max(self.weigh(place(right)));

@@ -10,7 +10,7 @@ use super::outlook::{Outlook, Policy};
 use crate::mission::{Band, Interferer, Mission};
 use crate::optimiser::spacing::Hop;
 use crate::place::{CrossSection, Placement};
-use crate::root::sqrt;
+use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
 /// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
@@ -184,16 +184,11 @@ impl<'a> Site<'a> {
             altitude_m: near.altitude_m + share * (wanted.altitude_m - near.altitude_m),
         };
         let mut found = self.stretched(target, from_m, near)?;
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if let Some(place) = self.stretched(target, from_m, self.room.nearest(way(middle))) {
-                found = place;
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        bisected(0.0, 1.0, HALVINGS, |share: f32| {
+            let place = self.stretched(target, from_m, self.room.nearest(way(share)));
+            found = place.unwrap_or(found);
+            place.is_some()
+        });
         Some(found)
     }
 
@@ -477,16 +472,7 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
             let s = across + square(1.0 + t) * along;
             squared - t * (across - squared + along) - square(t) * along > noise * t * s * s
         };
-        let (mut low, mut high) = (0.0, -far);
-        for _ in 0..END_HALVINGS {
-            let t = 0.5 * (low + high);
-            if rises(t) {
-                low = t;
-            } else {
-                high = t;
-            }
-        }
-        far = -low;
+        far = -bisected(0.0, -far, END_HALVINGS, rises).0;
     }
     let at = room.nearest(CrossSection {
         y_m: far * m.y_m,

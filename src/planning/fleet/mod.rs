@@ -21,6 +21,7 @@ use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::optimiser::pass::{Walk, before};
 use crate::optimiser::spacing::RequiredPosition;
 use crate::place::Placement;
+use crate::root::bisected;
 #[cfg(feature = "internals")]
 use crate::root::sqrt;
 use crate::side::Heading;
@@ -99,17 +100,12 @@ impl Most {
         if let Some(most) = meets(ceiling) {
             return Some(most);
         }
-        let (mut low, mut high) = (libm::logf(DEPTH), 0.0);
         let mut best = None;
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if let Some(most) = meets(ceiling * libm::expf(middle)) {
-                best = Some(most);
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        bisected(libm::logf(DEPTH), 0.0, HALVINGS, |sigma| {
+            let most = meets(ceiling * libm::expf(sigma));
+            best = most.or(best);
+            most.is_some()
+        });
         best
     }
 }

@@ -73,8 +73,8 @@
 //! Computed in f64, and so exact to the last place of the f32 result. Accuracy: `the_locus_is_where_the_hops_are_equal` in
 //! `host-tests/tests/theorems/`.
 
-use super::edge::{TwoHops, touching_inside};
-use super::{Found, Two};
+use super::edge::{narrow, squared, touching_inside};
+use super::{Found, Two, TwoHops};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Extremum, first_hop_turn, square};
@@ -136,7 +136,7 @@ impl PlaceCase {
 /// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
-    let two = Two { mission, profile };
+    let two = Two::new(mission, profile);
     let end_m = mission.config().distance_m;
     let above_rx = two.found(end_m);
     if !(two.second(end_m) > 0.0) {
@@ -236,12 +236,12 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
         return None;
     }
     let band = mission.config().band;
-    let at = |altitude_m: f32| Two {
-        mission,
-        profile: Profile {
+    let at = |altitude_m: f32| {
+        let profile = Profile {
             altitude_m,
             power_w,
-        },
+        };
+        Two::new(mission, profile)
     };
     let (rises, top_m) = rising(mission, interferer, x_m, band);
     let (lowest, highest) = (at(band.least_m), at(top_m));
@@ -355,7 +355,7 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
         altitude_m,
         power_w: config.common.power_w,
     };
-    let two = Two { mission, profile };
+    let two = Two::new(mission, profile);
     let present = config.tx_power_w / profile.power_w;
     let equal_at = |x_m: f32| present * (two.second(x_m) / two.first(x_m));
     Some(Guide {
@@ -380,7 +380,6 @@ pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32
         return [None; 2];
     };
     let wide = |x: f32| f64::from(x);
-    let squared = |x: f64| x * x;
     let x = wide(x_m);
     let a = squared(x - wide(interferer.x_m)) + squared(wide(interferer.y_m));
     let b = squared(x);
@@ -403,12 +402,4 @@ pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32
     let far = far / square;
     [near.min(far), near.max(far)]
         .map(|u| (u > 0.0 && u.is_finite()).then(|| narrow(libm::sqrt(u))))
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "an altitude is given as an f32"
-)]
-fn narrow(value: f64) -> f32 {
-    value as f32
 }
