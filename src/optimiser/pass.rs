@@ -487,12 +487,31 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
 /// required positions in the opposite order.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
-    pub(crate) target: f32,
-    pub(crate) plain: bool,
-    pub(crate) profile_of: &'a F,
+    target: f32,
+    plain: bool,
+    profile_of: &'a F,
 }
 
-impl<F: Fn(u16) -> Profile> Walk<'_, F> {
+impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
+    pub(crate) const fn new(
+        mission: &'a Mission,
+        target: f32,
+        plain: bool,
+        profile_of: &'a F,
+    ) -> Self {
+        Self {
+            mission,
+            target,
+            plain,
+            profile_of,
+        }
+    }
+
+    /// Returns this chain with relays that all take their farthest x.
+    pub(crate) const fn plainly(&self) -> Self {
+        Self::new(self.mission, self.target, true, self.profile_of)
+    }
+
     pub(crate) fn link(&self, index: u16) -> Link<'_> {
         let before = before(self.mission, index);
         Link {
@@ -530,21 +549,18 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
     /// Returns true if the chain meets its target. This is so if every relay can take the farthest x that meets the
     /// target, or the x that the next relay requires of it.
     pub(crate) fn is_met(&self) -> bool {
-        let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
-        closes(self)
-            && (closes(&Self {
-                plain: true,
-                ..*self
-            }) || self.place(0).is_some())
+        self.closes() && (self.plainly().closes() || self.place(0).is_some())
+    }
+
+    /// Returns true if the reaches of a pass end within the last hop.
+    pub(crate) fn closes(&self) -> bool {
+        self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
     }
 
     /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. The index 0
     /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     fn at_reach(&self, index: u16) -> Option<f32> {
-        let plain = Self {
-            plain: true,
-            ..*self
-        };
+        let plain = self.plainly();
         let (mut from_m, mut at) = (origin(self.mission), self.mission.leader());
         let mut place = None;
         loop {
@@ -592,23 +608,36 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         if let Some(place) = self.at_reach(index) {
             return Some(place);
         }
-        let mut at = match self.mission.heading() {
-            Heading::TowardRx => self.mission.relays(),
-            Heading::TowardTx => 1,
-        };
-        let last = (self.reach(before(self.mission, at))?, self.reach(Some(at))?);
-        let mut place = self.link(at).ending(self.target, last.0, last.1)?.1;
-        loop {
+        let at = last(self.mission);
+        let (before_m, reach) = (self.reach(before(self.mission, at))?, self.reach(Some(at))?);
+        let (_, place) = self.link(at).ending(self.target, before_m, reach)?;
+        let mut own = None;
+        let end = self.settle(place, |at, place, before| {
             if at == index {
-                return Some(place);
+                own = Some(place);
+                return None;
             }
-            let link = self.link(at);
+            self.reach(before)
+        });
+        own.or(end)
+    }
+
+    /// Computes the position of every relay, from the last one of the pass back. The last one is at x = `place`, m.
+    ///
+    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
+    /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
+    /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
+    pub(crate) fn settle(
+        &self,
+        place: f32,
+        mut visit: impl FnMut(u16, f32, Option<u16>) -> Option<f32>,
+    ) -> Option<f32> {
+        let (mut at, mut place) = (last(self.mission), place);
+        loop {
             let before = before(self.mission, at);
-            let from_m = self.reach(before)?;
-            place = match link.required_position(self.target, from_m, place)? {
-                RequiredPosition::AtReach => from_m,
-                RequiredPosition::At(x_m) => x_m,
-            };
+            let reach = visit(at, place, before)?;
+            let required = self.link(at).required_position(self.target, reach, place)?;
+            place = required.or_reach(reach);
             let Some(before) = before else {
                 return Some(place);
             };
@@ -617,7 +646,15 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
     }
 }
 
-pub(crate) fn before(mission: &Mission, index: u16) -> Option<u16> {
+/// Returns the index of the last relay of a pass.
+const fn last(mission: &Mission) -> u16 {
+    match mission.heading() {
+        Heading::TowardRx => mission.relays(),
+        Heading::TowardTx => 1,
+    }
+}
+
+fn before(mission: &Mission, index: u16) -> Option<u16> {
     match mission.heading() {
         Heading::TowardRx => index.checked_sub(1).filter(|before| *before > 0),
         Heading::TowardTx => (index < mission.relays()).then(|| index.saturating_add(1)),

@@ -57,6 +57,16 @@ pub enum RequiredPosition {
     At(f32),
 }
 
+impl RequiredPosition {
+    /// Returns the required x, m. `reach_m` is the farthest x that meets the target.
+    pub(crate) const fn or_reach(self, reach_m: f32) -> f32 {
+        match self {
+            Self::AtReach => reach_m,
+            Self::At(x_m) => x_m,
+        }
+    }
+}
+
 /// Hop toward Rx, prepared for the computation of its maximum length for many targets.
 ///
 /// The terms that do not depend on the target are precomputed, so that each target takes three divisions and a square

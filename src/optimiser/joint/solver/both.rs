@@ -19,7 +19,6 @@ use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;
 use crate::optimiser::pass::{Behind, Link};
 use crate::optimiser::search::Infeasible;
-use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use crate::root::sqrt;
 use crate::sir::square;
@@ -471,10 +470,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         let before = pass.index.saturating_sub(1);
         let [reach, before_m] = self.interior.noted(before);
         let link = self.line_link(chain, pass.index, end_m);
-        pass.x_m = match link.required_position(target, reach, pass.x_m)? {
-            RequiredPosition::AtReach => reach,
-            RequiredPosition::At(x_m) => x_m,
-        };
+        let required = link.required_position(target, reach, pass.x_m)?;
+        pass.x_m = required.or_reach(reach);
         pass.index = before;
         self.interior.note(before, [pass.x_m, before_m]);
         Some(())

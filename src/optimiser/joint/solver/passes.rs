@@ -13,7 +13,7 @@ use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site::{Cell, Cells, Room, Site};
 use crate::optimiser::joint::starts::Start;
-use crate::optimiser::spacing::{Hop, RequiredPosition};
+use crate::optimiser::spacing::Hop;
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use core::task::Poll;
@@ -320,13 +320,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
         for (k, index) in relays_of(segment, relays).rev() {
             let (from_m, end_m) = *before.get(k)?;
-            place_m = match self
-                .hop(chain, index, end_m)
+            let hop = self.hop(chain, index, end_m);
+            place_m = hop
                 .required_position(target, from_m, place_m)?
-            {
-                RequiredPosition::AtReach => from_m,
-                RequiredPosition::At(x_m) => x_m,
-            };
+                .or_reach(from_m);
         }
         Some(place_m)
     }
