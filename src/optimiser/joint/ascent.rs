@@ -83,7 +83,7 @@ pub(crate) struct Ascent {
     floor: f32,
     /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If it misses the
     /// bound, this limit is raised.
-    limit: f32,
+    pub(crate) limit: f32,
     /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
     excess: f32,
     /// Cap on the chain's slack, as a fraction of the distance from Tx to Rx. The cap is lowered if relays are too near the interferer,
@@ -143,10 +143,6 @@ impl Ascent {
             excess: EXCESS,
             ..self
         }
-    }
-
-    pub(crate) const fn limit(&self) -> f32 {
-        self.limit
     }
 
     /// Returns the cap on the chain's slack, m. Slack above the cap does not count when chains are compared.

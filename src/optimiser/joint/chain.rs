@@ -10,6 +10,7 @@ use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
+use crate::root::sqrt;
 use crate::sir::{Sender, square, transmitter_gain};
 
 /// Profiles of the relays of a chain: a function of a relay's index, 1 to N.
@@ -127,7 +128,13 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     /// The last relay is at `at`; the derivatives are by its coordinates.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
-        site::tail(self.mission, power_w, room, target, at)
+        let most = site::last_most(self.mission, power_w, room);
+        let reach_m = sqrt(self.mission.receiver_gain(power_w) / target.min(most));
+        let (slack, mut outlook) = Outlook::tail(reach_m, self.distance_m(), at);
+        if target > most {
+            outlook.by_target = 0.0;
+        }
+        (slack, outlook)
     }
 
     /// Returns the upper bound of the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and

@@ -290,14 +290,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             } else {
                 at + f32::from(index - 1) * step
             };
-            let away_m = if chain.interferer.y_m > 0.0 {
-                room.lateral.least_m
-            } else {
-                room.lateral.most_m
-            };
             let low_m = config.common.altitude_m;
             let place = CrossSection {
-                y_m: aside * away_m,
+                y_m: aside * room.away_m(chain.interferer),
                 altitude_m: low_m + up * (room.band.most_m - low_m),
             };
             let place = room.nearest(place);

@@ -207,7 +207,7 @@ impl<'a> Site<'a> {
     ) -> CrossSection {
         let target = target.min(self.most);
         let by = policy.apply(share, change);
-        let [_, a, b] = policy.axis.first(triple(nominal));
+        let [own, a, b] = policy.axis.first(triple(nominal));
         let (a, b) = (a + by[0], b + by[1]);
         match policy.axis {
             Coordinate::X => {
@@ -225,31 +225,17 @@ impl<'a> Site<'a> {
                     _ => wanted,
                 }
             }
-            Coordinate::Y => {
-                let b = self.room.band.nearest(b);
-                let y = self.along(
-                    policy,
-                    target,
-                    from,
-                    [a.max(from.x_m).min(self.distance_m), b],
-                );
-                CrossSection {
-                    y_m: y.unwrap_or(nominal.y_m),
-                    altitude_m: b,
-                }
-            }
-            Coordinate::H => {
-                let b = self.room.lateral.nearest(b);
-                let h = self.along(
-                    policy,
-                    target,
-                    from,
-                    [a.max(from.x_m).min(self.distance_m), b],
-                );
-                CrossSection {
-                    y_m: b,
-                    altitude_m: h.unwrap_or(nominal.altitude_m),
-                }
+            axis => {
+                let limits = if axis == Coordinate::Y {
+                    self.room.band
+                } else {
+                    self.room.lateral
+                };
+                let free = [a.max(from.x_m).min(self.distance_m), limits.nearest(b)];
+                let found = self.along(policy, target, from, free);
+                let [a, b] = free;
+                let [_, y_m, altitude_m] = axis.back([found.unwrap_or(own), a, b]);
+                CrossSection { y_m, altitude_m }
             }
         }
     }
@@ -433,6 +419,15 @@ impl Room {
         }
     }
 
+    /// Returns the largest lateral offset, m, on the side away from the interferer.
+    pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
+        if interferer.y_m > 0.0 {
+            self.lateral.least_m
+        } else {
+            self.lateral.most_m
+        }
+    }
+
     /// Returns the allowed lateral offset and altitude that are nearest to `at`.
     #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
@@ -489,32 +484,6 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
         .nearest(CrossSection::default())
         .apart_squared(CrossSection::default());
     LITTLE * mission.receiver_gain(power_w) / across
-}
-
-/// Returns the last hop's maximum length for `target` less its length, m, and the derivatives.
-///
-/// This difference is the chain's slack. The derivatives are by the position of the last relay, which is at `at`, with `power_w` watts.
-/// `room` has the lateral offsets and altitudes from which the relay may choose.
-pub(super) fn tail(
-    mission: &Mission,
-    power_w: f32,
-    room: Room,
-    target: f32,
-    at: Placement,
-) -> (f32, Outlook) {
-    let most = last_most(mission, power_w, room);
-    let reach_m = sqrt(mission.receiver_gain(power_w) / target.min(most));
-    let (slack, outlook) = Outlook::tail(reach_m, mission.config().distance_m, at);
-    if target > most {
-        return (
-            slack,
-            Outlook {
-                by_target: 0.0,
-                ..outlook
-            },
-        );
-    }
-    (slack, outlook)
 }
 
 /// Weight of the penalty for a violated minimum separation. The unit is the distance from Tx to Rx. The weight is so large that no gain of

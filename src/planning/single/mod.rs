@@ -133,6 +133,11 @@ impl<'a> Two<'a> {
         self.hops.found(self.at(x_m))
     }
 
+    /// Returns true if the first hop's SIR is at most the second's at `x_m`.
+    fn is_first_worse(&self, x_m: f32) -> bool {
+        self.first(x_m) <= self.second(x_m)
+    }
+
     /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let is_low = |(first, second): (f32, f32)| first > second;

@@ -142,15 +142,14 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
     if !(two.second(end_m) > 0.0) {
         return Some((above_rx, PlaceCase::Drowned));
     }
-    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     // End of the falling part of SIR_1, and true if it rises again before Rx.
     let turn = first_hop_turn(mission, interferer, profile.altitude_m);
     let (to, valley) = match turn {
         Extremum::Level => return Some((above_rx, PlaceCase::Level)),
         Extremum::Hill(peak) => {
-            return Some(if peak >= end_m || !worse_first(end_m) {
+            return Some(if peak >= end_m || !two.is_first_worse(end_m) {
                 (above_rx, PlaceCase::HillAboveRx)
-            } else if worse_first(peak) {
+            } else if two.is_first_worse(peak) {
                 (two.found(peak), PlaceCase::Hilltop)
             } else {
                 (two.crossing(peak, end_m), PlaceCase::BeyondHill)
@@ -165,7 +164,7 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
         return Some((two.found(0.0), PlaceCase::AboveTx));
     }
     let second = second_hill(two, turn, end_m);
-    let first = match (worse_first(to), valley) {
+    let first = match (two.is_first_worse(to), valley) {
         (true, false) => (two.crossing(0.0, to), PlaceCase::Crossing),
         (true, true) => (two.crossing(0.0, to).or(above_rx), PlaceCase::BeforeValley),
         (false, false) => (above_rx, PlaceCase::AboveRx),
@@ -185,13 +184,12 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
     };
-    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     if !(hill < end_m) {
         return None;
     }
-    Some(if worse_first(hill) {
+    Some(if two.is_first_worse(hill) {
         two.found(hill)
-    } else if worse_first(end_m) {
+    } else if two.is_first_worse(end_m) {
         two.crossing(hill, end_m)
     } else {
         two.found(end_m)

@@ -105,7 +105,7 @@ impl Start {
             Along::Arc => quarter(before, relays + 1)[0],
             Along::Line | Along::Even(_) => 1.0,
         };
-        let Room { lateral, band } = room;
+        let Room { band, .. } = room;
         let ([near, middle, far], [first, last]) = (self.aside, self.up);
         let bent = 2.0 * share - 1.0;
         let aside = middle
@@ -115,13 +115,8 @@ impl Start {
                 } else {
                     far - middle
                 };
-        let away_m = if chain.interferer.y_m > 0.0 {
-            lateral.least_m
-        } else {
-            lateral.most_m
-        };
         room.nearest(CrossSection {
-            y_m: scale * aside * away_m,
+            y_m: scale * aside * room.away_m(chain.interferer),
             altitude_m: scale * (band.least_m + (first + share * (last - first)) * band.span_m()),
         })
     }

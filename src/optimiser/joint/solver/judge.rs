@@ -125,7 +125,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
                     self.given_up()
                 }
                 (Some((sigma, _)), Purpose::Raise) => {
-                    Work::Settle(sigma.min(self.ascent.limit()), purpose)
+                    Work::Settle(sigma.min(self.ascent.limit), purpose)
                 }
                 (Some((sigma, _)), _) => Work::Settle(sigma, purpose),
                 (None, Purpose::Last) if self.again => return Poll::Ready(Err(Infeasible)),
@@ -330,32 +330,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             }
             return Poll::Pending;
         };
-        let Some(start) = start else {
+        let Some(start) = start.filter(|start| !self.is_skipped(chain, *start)) else {
             self.number += 1;
             return Poll::Pending;
         };
-        let floor = chain.floor();
-        if matches!(start, Start::Near)
-            && !self.again
-            && self.best.is_some_and(|(best, _)| best > floor)
-        {
-            self.number += 1;
-            return Poll::Pending;
-        }
-        if matches!(start, Start::Through { .. } | Start::Turns) && !self.walled {
-            self.number += 1;
-            return Poll::Pending;
-        }
-        if matches!(start, Start::FixedAltitudes { .. }) && !chain.holds() {
-            self.number += 1;
-            return Poll::Pending;
-        }
         self.start = start;
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         (self.judged_at, self.is_whole) = (None, true);
         self.restart();
         self.work = match start {
-            Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
+            Start::Near => Work::Settle(chain.floor() + 0.04, Purpose::Start),
             Start::Turns => {
                 for index in 1..=chain.relays() {
                     let room = chain.room(index);
@@ -375,6 +359,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             }
         };
         Poll::Pending
+    }
+
+    /// Returns true if `start` cannot lead to a better chain.
+    fn is_skipped(&self, chain: &Chain<'_, impl SeatOf>, start: Start) -> bool {
+        match start {
+            Start::Near if self.again => false,
+            Start::Near => self.best.is_some_and(|(best, _)| best > chain.floor()),
+            Start::Through { .. } | Start::Turns => !self.walled,
+            Start::FixedAltitudes { .. } => !chain.holds(),
+            Start::Arch { .. } | Start::Around { .. } | Start::Far => false,
+        }
     }
 
     pub(super) fn given_up(&mut self) -> Work {

@@ -334,17 +334,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let Some(chain) = Chain::new(mission, &seat_of) else {
             return Poll::Ready(Err(Infeasible));
         };
-        match &mut self.0 {
-            Way::OneWay(solver) => solver.step(&chain),
-            Way::Both(solver) => match solver.first_mut() {
-                Some(solver) => solver.step(&chain),
-                None => Poll::Ready(Err(Infeasible)),
-            },
-            Way::Fitted(solver) => match solver.first_mut() {
-                Some(solver) => solver.step(&chain),
-                None => Poll::Ready(Err(Infeasible)),
-            },
-        }
+        let solved = match &mut self.0 {
+            Way::OneWay(solver) => Some(solver.step(&chain)),
+            Way::Both(solver) => solver.first_mut().map(|solver| solver.step(&chain)),
+            Way::Fitted(solver) => solver.first_mut().map(|solver| solver.step(&chain)),
+        };
+        solved.unwrap_or(Poll::Ready(Err(Infeasible)))
     }
 
     /// Returns the position of relay `index` and its slots, once the chain is solved. `None` unless the mission has
