@@ -10,38 +10,32 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First limit of a relay's move in one iteration of the joint method. The unit is the relay's distance from the interferer. The same
-/// number limits the change of ln(target SIR).
+/// First trust: the limit of a relay's move in one iteration, as a fraction of the relay's distance from the interferer. The same number
+/// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum limit of a relay's move at which the final target SIR of a chain's improvement is predicted. A smaller
-/// limit holds the relays back, so that the prediction would be too low.
+/// Minimum trust at which an improvement's final target is predicted. A smaller one makes the prediction too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Limit of a relay's move below which the improvement of a chain ends without progress. It is a fraction of the
-/// relay's distance from the interferer.
+/// Trust below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising target SIR is assumed to shorten the chain. It is in units of the distance Tx to Rx
-/// per ln(SIR). The computed rate is a divisor, so it must not be near 0; it is usually 0.5.
+/// Minimum rate at which a rising target is assumed to shorten the chain, in the distance Tx to Rx per ln(SIR). The
+/// computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of a chain's target SIR is raised, in ln(SIR). The limit is raised when the chain's target has reached
-/// it and is still below the upper bound for all chains.
+/// First amount by which the limit of the target is raised, in ln(SIR), if the chain meets it but not the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's slack, as a fraction of the distance from Tx to Rx. Slack above the cap does not count, so that it cannot
-/// outweigh a penalty.
+/// First cap on the chain's slack, as a fraction of the distance from Tx to Rx, so that slack cannot outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's slack, as a fraction of the distance from Tx to Rx. Slack above the cap does not count, so that it cannot
-/// outweigh a penalty.
+/// Smallest cap on the chain's slack, as a fraction of the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of a negative slack relative to a positive slack, when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
-/// improvement.
+/// Increase of ln(target SIR) below which an iteration counts as idle; two in a row end a chain's improvement.
 const CLOSE: f32 = 3e-6;
 
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
@@ -50,8 +44,7 @@ const SETTLED: f32 = 0.3 * CLOSE;
 /// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which a chain's improvement is checked for divergence. It diverges if the chain falls
-/// far short of Rx.
+/// Number of iterations after which an improvement counts as diverged if the chain falls far short of Rx.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 

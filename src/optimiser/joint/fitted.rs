@@ -33,7 +33,7 @@ const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
 /// Number of bits in which a relay's choice among the states of the relay before it is stored.
 const BITS: usize = 3;
 
-/// Step width at which the search from one initial chain ends. It is a fraction of the distance from Tx to Rx.
+/// Step width at which the search from one initial chain ends, in units of D.
 const NARROWEST: f32 = 1.0 / 131_072.0;
 /// Relative gain of a round of passes below which the step width of the moves is halved.
 const LITTLE: f32 = 1e-3;
@@ -45,11 +45,11 @@ const AT_ONCE: u16 = 3;
 /// Number of relays that one call of the solver handles in all work but passes.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to each squared hop length, so that no hop time is 0. In units of the squared distance Tx to Rx.
+/// Amount added to each squared hop length, in units of D^2, so that no hop time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, and first step width of the moves. All are fractions of the
-/// distance from Tx to Rx. If both x are equal, the relays start there, at their minimum separation.
+/// Initial chains: first and last x of the relays, and first step width of the moves, in units of D. If both x are
+/// equal, the relays start there, at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -63,7 +63,7 @@ const STARTS: [[f32; 3]; 8] = [
 /// Number of the initial chain that starts from the best one along the line. Used only if relays may leave the common
 /// altitude.
 const BEST: u8 = 8;
-/// First step width of the moves from the best chain along the line. It is a fraction of the distance from Tx to Rx.
+/// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
 /// Lateral offset and altitude of further initial chains, as two fractions. The first is of the largest lateral
 /// offset away from the interferer, the second of the altitude range above the common altitude.

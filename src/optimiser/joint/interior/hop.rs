@@ -24,6 +24,11 @@ use super::super::hop::{Triple, minus};
 /// Rx.
 const SHORTEST: f32 = 1e-8;
 
+/// Levels of a hop: ln(forward SIR), and ln(backward SIR / r), with r the required ratio of backward to forward SIR.
+///
+/// Other values for the two directions of a hop have the same order. The *slack* of a level is its excess over the target.
+pub(super) type Levels = [f32; 2];
+
 /// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
 
@@ -84,9 +89,8 @@ impl LogGains {
         }
     }
 
-    /// Returns the logarithms of two gains of hop `k`: forward (toward Rx), and backward divided by r. r is the
-    /// required ratio of backward to forward SIR. `k` is 1 (from Tx) to N + 1 (to Rx).
-    fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> [f32; 2] {
+    /// Returns the logarithms of both gains of hop `k`, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
+    fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;
             if power_w.to_bits() == self.common_w.to_bits() {
@@ -106,16 +110,14 @@ impl LogGains {
         libm::logf(s / (1.0 + self.gains.noise * s))
     }
 
-    /// Returns the two levels of hop `k`: ln(forward SIR), and ln(backward SIR / r). r is the required ratio of
-    /// backward to forward SIR. The hop leads from `from` to `to`; `quiet_from` and `quiet_to` are ln(inverse
-    /// interference) at these two positions.
+    /// Returns the levels of hop `k` from `from` to `to`; `quiet_from` and `quiet_to` are ln q at the two positions.
     pub(super) fn levels(
         &self,
         k: u16,
         chain: &Chain<'_, impl SeatOf>,
         [from, to]: [Triple; 2],
         [quiet_from, quiet_to]: [f32; 2],
-    ) -> [f32; 2] {
+    ) -> Levels {
         let v = minus(to, from);
         let length = libm::logf(dot(&v, &v) + SHORTEST);
         let [there, back] = self.of(k, chain);
@@ -124,10 +126,9 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s two levels by the positions of its ends `from` and `to`. The levels are
-    /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The second
-    /// derivatives are summed with the `weights` of both levels, and negated. If `convex` is true, terms that would
-    /// make that sum indefinite are left out.
+    /// Returns the derivatives of hop `k`'s levels by the positions of its ends `from` and `to`. The second ones are
+    /// summed with the `weights` of both levels. If `convex` is true, terms that would make that sum indefinite are
+    /// left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -195,8 +196,7 @@ impl LogGains {
     }
 }
 
-/// Derivatives of a hop's two levels by the positions of its ends. The levels are ln(forward SIR) and ln(backward SIR
-/// / r); r is the required ratio of backward to forward SIR. The second derivatives (`bend...`) are weighted sums
+/// Derivatives of a hop's levels by the positions of its ends. The second derivatives (`bend...`) are weighted sums
 /// over both levels, negated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {

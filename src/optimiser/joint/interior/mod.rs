@@ -18,6 +18,9 @@
 //! | `hop` | levels of a hop and their derivatives |
 //! | `newton` | block tridiagonal system of a step |
 //!
+//! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are the Lagrange
+//! multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the merit gains little.
+//!
 //! This file has the state and one portion of the work. Lengths are in units of D; across the line the positions are stored as
 //! those of the other solver, six bytes each. The memory of a segment of ten relays has its front during the elimination, and
 //! then its steps.
@@ -31,46 +34,40 @@ use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
-use hop::{Derivatives, LogGains, add_scaled, dot};
+use hop::{Derivatives, Levels, LogGains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight mu of the interior-point method for a start far from the result. It is divided among all hops
-/// and directions.
+/// First barrier weight for a start far from the result.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight mu of the interior-point method for a start near the result. It is divided among all hops and
-/// directions.
+/// First barrier weight for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight mu of the interior-point method, divided among all hops and directions. The result is within
-/// this of a local optimum, in ln(SIR), if the problem is concave around it.
+/// Last barrier weight. The result is within this of a local optimum, in ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the interior-point method's barrier weight mu falls once positions have settled.
+/// Factor by which the barrier weight falls once the positions have settled.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
-/// number of levels. For steps of more than half a Newton step.
+/// Gain of the merit over the barrier weight below which positions count as settled, for more than half a Newton step.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
-/// number of levels. For Newton steps shortened by any factor.
+/// Gain of the merit over the barrier weight below which positions count as settled, for any fraction of a Newton step.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
 /// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened after a try that lowers the merit (target plus barrier).
+/// Factor by which a Newton step is shortened after a try that lowers the merit.
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and mu / s, its value at the optimum. mu is the barrier weight, s the
-/// excess of ln(SIR) of a hop over the target. Multipliers outside are moved to the limit.
+/// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers outside are moved to the limit.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target T that one call makes. T is slightly below the worst SIR, in ln(SIR).
+/// Number of Newton steps for the target that one call makes.
 const STEPS: u8 = 4;
-/// Index, from 0, of the last Newton step for the target T. T is slightly below the worst SIR, in ln(SIR).
+/// Index, from 0, of the last Newton step for the target.
 const TARGETS: u8 = 12;
-/// Relative error at which the Newton steps for the target T end. T is slightly below the worst SIR, in ln(SIR).
+/// Relative error at which the Newton steps for the target end.
 const EXACT: f32 = 5e-4;
 
 /// Number of relays in a segment, the part of the chain that one call handles.
@@ -80,11 +77,10 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Both levels of a hop, and their Lagrange multipliers `lambda`. The levels are ln(forward SIR) and ln(backward SIR
-/// / r). r is the required ratio of backward to forward SIR. A multiplier is the upper half of an f32.
+/// Levels of a hop, and their Lagrange multipliers `lambda`, each of which is the upper half of an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
-    level: [f32; 2],
+    level: Levels,
     lambda: [u16; 2],
 }
 
@@ -153,12 +149,11 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of all hops' levels (logarithms of their SIRs) at the tried positions. The field is the next hop.
+    /// Computation of all hops' levels at the tried positions. The field is the next hop.
     Levels(u16),
-    /// Computation of the target T from all levels; the field is the number of Newton steps done. T is slightly below
-    /// the worst SIR, in ln(SIR).
+    /// Computation of the target from all levels; the field is the number of Newton steps done.
     Target(u8),
-    /// Summation of the merit (target plus barrier), which decides if a step is accepted. The field is the next hop.
+    /// Summation of the merit, which decides if a step is accepted. The field is the next hop.
     Merit(u16),
     /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),
@@ -190,8 +185,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit (target plus barrier) at the stored positions, before the current step. The step is accepted if it does
-    /// not lower the merit.
+    /// Merit at the stored positions. The current step is accepted if it does not lower the merit.
     merit: f32,
     /// Sum of the barrier's logarithms over the hops handled so far, at the positions that are tried.
     sum: f32,
@@ -199,8 +193,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// True to replace the stored Lagrange multipliers by mu / s, their values at the optimum. mu is the barrier
-    /// weight, s the excess of a level (ln(SIR) of a hop in one direction) over the target.
+    /// True to replace the stored Lagrange multipliers by their values at the optimum.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -363,9 +356,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by one bounded portion. After the last portion it is ready with a target
-    /// in ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is
-    /// each backward SIR over r, the required ratio of backward to forward SIR.
+    /// Continues the interior-point method by one bounded portion. Ready at the end, with a target in ln(SIR) slightly
+    /// below all levels of the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -413,8 +405,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds their ends' barrier. The barrier is the sum of
-    /// ln(distance to a limit). A level is ln(forward SIR) or ln(backward SIR / r); r is the required ratio of both.
+    /// Computes the levels of ten hops from hop `k` on, and adds ln(distance to a limit) of their ends.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -445,11 +436,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1. mu is the
-    /// barrier weight, and each level c belongs to one hop in one direction.
+    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1.
     ///
-    /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to
-    /// it.
+    /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to it.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -472,8 +461,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the Lagrange multipliers of hop `k`, the slacks of its levels, and the barrier weight mu. A slack is
-    /// ln(SIR) in one direction minus the target.
     fn weights(&mut self, relays: u16, k: u16) -> Weights {
         let (target, mu) = (self.target, self.mu);
         let Hop { level, lambda } = *self.hop(relays, k);
@@ -484,8 +471,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the tried step if it does not lower the merit (target plus barrier); else shortens the step. After the
-    /// last try the step is computed again without negative curvature, and after that the barrier weight falls.
+    /// Accepts the tried step if it does not lower the merit; else shortens the step. After the last try the step is
+    /// computed again without negative curvature, and after that the barrier weight falls.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -507,7 +494,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the merit of the tried positions: the target plus the barrier's sum times its weight mu.
     fn summed(&self) -> f32 {
         self.target + self.mu * self.sum
     }
@@ -532,8 +518,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight mu. Ready after the
-    /// maximum number of steps, with the target, in ln(SIR).
+    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. Ready after the maximum
+    /// number of steps, with the target, in ln(SIR).
     fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -552,9 +538,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight mu and continues; after the last mu, ready with the target, in ln(SIR). `resets` is
-    /// true to replace the Lagrange multipliers, because no step with them has raised the merit (target plus
-    /// barrier).
+    /// Lowers the barrier weight and continues; after the last one, ready with the target, in ln(SIR). `resets` is true
+    /// to replace the Lagrange multipliers, because no step with them has raised the merit.
     fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
@@ -566,8 +551,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, its multipliers and slacks. A level is
-    /// ln(SIR) in one direction, a slack its excess over the target.
+    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, and its multipliers and slacks.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
@@ -647,8 +631,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         } else {
             (first, middle)
         };
-        let end = end.min(chain.relays());
         let relays = chain.relays();
+        let end = end.min(relays);
         let mut factors = [Factor::NONE; FIRST];
         self.eliminate(chain, segment, end - first, &mut factors)?;
         let mut steps = [[0; 3]; FIRST];
@@ -687,8 +671,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Lowers the common factor on all Newton steps, so that the relay at `spot` stays within its limits. `step` is
     /// that relay's whole step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
-        let spans = (spot.room_below(), spot.room_above());
-        for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
+        let (below, above) = (spot.room_below(), spot.room_above());
+        for (step, (below, above)) in step.iter().zip(below.iter().zip(&above)) {
             let room = if *step < 0.0 { below } else { above };
             let most = NEAR_BOX * room / step.abs();
             if *below > 0.0 && *above > 0.0 && most < self.share {
@@ -710,7 +694,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns the number of levels: two for each hop, the logarithms of its forward and backward SIR.
+/// Returns the number of levels, two for each hop.
 fn levels(chain: &Chain<'_, impl SeatOf>) -> f32 {
     2.0 * f32::from(chain.relays() + 1)
 }
