@@ -136,7 +136,7 @@ impl Back {
     }
 }
 
-/// Returns the distance along x from the interferer, m, below which s / (1 + `noise` s) is less than `needed`, m^2.
+/// Returns the distance along x from the interferer, m, below which q = s / (1 + `noise` s) is below `needed`.
 ///
 /// s is the squared distance from the interferer, m^2, and `aside_squared` its part across x. `None` if the noise
 /// alone prevents that at any distance.

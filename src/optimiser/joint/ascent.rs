@@ -10,7 +10,7 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First trust: the limit of a relay's move in one iteration, as a fraction of the relay's distance from the interferer. The same number
+/// First *trust*: limit of a relay's move in one iteration, over its distance from the interferer. The same number
 /// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
@@ -20,22 +20,23 @@ const RESTRAINED: f32 = 0.05;
 /// Trust below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising target is assumed to shorten the chain, in the distance Tx to Rx per ln(SIR). The
+/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain, over the distance Tx to Rx. The
 /// computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of the target is raised, in ln(SIR), if the chain meets it but not the upper bound of all chains.
+/// First amount by which the limit of the target is raised, in ln(SIR). It is raised if the chain meets it, but not
+/// the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's slack, as a fraction of the distance from Tx to Rx, so that slack cannot outweigh a penalty.
+/// First cap on the chain's slack, over the distance Tx to Rx. With it slack cannot outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's slack, as a fraction of the distance from Tx to Rx.
+/// Smallest cap on the chain's slack, over the distance Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of a negative slack relative to a positive slack, when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) below which an iteration counts as idle; two in a row end a chain's improvement.
+/// Increase of ln(target SIR) below which an iteration counts as idle. Two in a row end a chain's improvement.
 const CLOSE: f32 = 3e-6;
 
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
@@ -44,7 +45,7 @@ const SETTLED: f32 = 0.3 * CLOSE;
 /// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which an improvement counts as diverged if the chain falls far short of Rx.
+/// Number of iterations after which a chain that falls far short of Rx counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 

@@ -69,14 +69,6 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns this relay without the required minimum separation from its sender.
-    pub(crate) fn unparted(self) -> Self {
-        Self {
-            apart_m: 0.0,
-            ..self
-        }
-    }
-
     /// Returns the position of largest x that meets `target` with the lateral offset and altitude `wanted`.
     ///
     /// The sender is at x = `from_m`. If the hop cannot reach `wanted`, the closest lateral offset and altitude that

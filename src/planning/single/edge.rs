@@ -136,11 +136,8 @@ impl Edge {
             let [behind, valley, hill] = noisy_turns(p, a, b, noise).map(narrow);
             return [behind, valley, hill, end];
         }
-        let half = 0.5 * (squared(p) + a - b);
-        // The larger root first, the other one from their product: neither cancels.
-        let root = libm::sqrt(squared(half) + squared(p) * b);
-        let sum = half + libm::copysign(root, half);
-        [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
+        let [one, other] = noise_free_turns(p, a, b).map(narrow);
+        [one, other, end, f32::NAN]
     }
 
     /// Returns the position on the edge with the best SIR of the worse hop.
@@ -200,6 +197,15 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
+/// Returns the two t, m, at which the first hop's SIR has an extremum on an edge, without noise.
+fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
+    let half = 0.5 * (squared(p) + a - b);
+    // The larger root first, the other one from their product: neither cancels.
+    let root = libm::sqrt(squared(half) + squared(p) * b);
+    let sum = half + libm::copysign(root, half);
+    [sum / p, -p * b / sum]
+}
+
 /// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. Missing ones are NaN.
 ///
 /// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where the coordinate t varies
@@ -214,28 +220,22 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
         };
         return [-t, 0.0, t];
     }
-    let half = 0.5 * (p * p + a - b);
-    let root = libm::sqrt(half * half + p * p * b);
     let slope = Slope {
         p: libm::fabs(p),
-        q: 2.0 * half,
+        q: p * p + a - b,
         a,
         b,
         noise,
         halvings: NOISY_HALVINGS,
     };
-    // Extrema without noise; neither cancels.
-    let (valley, before) = if half > 0.0 {
-        ((half + root) / slope.p, slope.p * b / (half + root))
-    } else {
-        (slope.p * b / (root - half), (root - half) / slope.p)
-    };
+    let [one, other] = noise_free_turns(slope.p, a, b);
+    let (behind, valley) = (one.min(other), one.max(other));
     let [low, high] = slope.valley_and_hill(valley).unwrap_or([f64::NAN; 2]);
     let mirrored = Slope {
         p: -slope.p,
         ..slope
     };
-    [-mirrored.hill(before), low, high].map(|t| libm::copysign(1.0, p) * t)
+    [-mirrored.hill(-behind), low, high].map(|t| libm::copysign(1.0, p) * t)
 }
 
 /// Number of lines of constant y on either side of y = 0 that the search at one altitude evaluates.

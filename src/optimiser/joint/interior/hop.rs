@@ -24,7 +24,7 @@ use super::super::hop::{Triple, minus};
 /// Rx.
 const SHORTEST: f32 = 1e-8;
 
-/// Levels of a hop: ln(forward SIR), and ln(backward SIR / r), with r the required ratio of backward to forward SIR.
+/// Levels of a hop: ln(forward SIR) and ln(backward SIR / r). r is the required ratio of backward to forward SIR.
 ///
 /// Other values for the two directions of a hop have the same order. The *slack* of a level is its excess over the target.
 pub(super) type Levels = [f32; 2];
@@ -64,7 +64,7 @@ fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
     *hh += value;
 }
 
-/// Logarithms of the gains from which the SIR of each hop is computed, for relays of the mission's common power.
+/// Logarithms of the gains of all hops, for relays of the mission's common power.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LogGains {
     gains: Gains,
@@ -110,7 +110,7 @@ impl LogGains {
         libm::logf(s / (1.0 + self.gains.noise * s))
     }
 
-    /// Returns the levels of hop `k` from `from` to `to`; `quiet_from` and `quiet_to` are ln q at the two positions.
+    /// Returns the levels of hop `k` from `from` to `to`. `quiet_from` and `quiet_to` are ln q there.
     pub(super) fn levels(
         &self,
         k: u16,

@@ -47,9 +47,9 @@ const LAST_MU: f32 = 1e-4;
 /// Factor by which the barrier weight falls once the positions have settled.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit over the barrier weight below which positions count as settled, for more than half a Newton step.
+/// Gain of the merit, over the barrier weight, below which positions have settled. For more than half a Newton step.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit over the barrier weight below which positions count as settled, for any fraction of a Newton step.
+/// Gain of the merit, over the barrier weight, below which positions have settled. For any fraction of a Newton step.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;

@@ -65,7 +65,7 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Lagrange multipliers of both directions of a hop, the slacks of its levels, and the barrier weight `mu`.
+/// Lagrange multipliers of a hop's levels, the slacks of the levels, and the barrier weight `mu`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -188,8 +188,7 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`, from this node's equations, and adds it
-    /// to `sums`.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`. It is added to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {

@@ -84,22 +84,20 @@ enum Purpose {
     Raise,
     /// The chain's slack is computed again, after the cap on the slack was lowered.
     Tighten,
-    /// The search finds the highest target of an improved chain, with the improvement's margins. It does not compute
-    /// hops as the relays do.
+    /// The search finds the highest target of an improved chain, with the improvement's margins.
     Judge,
-    /// The search finds the highest target of an improved chain. Hops are computed exactly as the relays compute them
-    /// from their messages. Some relays may then stay short of their farthest position.
+    /// The search finds the highest target of an improved chain by the sweep's rules.
     Last,
-    /// The search checks if the chain meets the upper bound of all chains. Hops are computed exactly as the relays
-    /// compute them from their messages.
+    /// The search checks if the chain meets the upper bound of all chains by the sweep's rules.
     Probe,
-    /// The search checks a trial move of one relay. Hops are computed exactly as the relays compute them from their
-    /// messages.
+    /// The search checks a trial move of one relay by the sweep's rules.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the search computes hops as the relays compute them from their messages.
+    /// Returns true for the sweep's rules: hops are computed exactly as the relays compute them from their messages.
+    ///
+    /// Some relays may then stay short of their farthest position.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -116,22 +114,18 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target SIR that the improvement of the best chain reached, in ln(SIR). The improvement of another chain is
-    /// stopped once it is predicted to end below this target.
+    /// Target that the improvement of the best chain reached, in ln(SIR). Others are stopped if predicted to end below.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target, as ln(SIR), at which the improvement of the best chain ended. The last search starts from this target and need not improve
-    /// the chain again. `None` if the improvement was stopped early, because the target is then not final.
+    /// Target at which the improvement of the best chain ended: its `judged_at`. The last search starts there, and
+    /// need not improve the chain again.
     best_judged: Option<f32>,
-    /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
-    /// before the end, and if the improvement was cut short.
+    /// Target at which the current chain's improvement ended, in ln(SIR). `None` before the end, and if it was stopped early.
     judged_at: Option<f32>,
-    /// True if the current chain's improvement ran to its end. False if it was stopped early, because the chain was not expected to become
-    /// the best one.
+    /// True unless the current chain's improvement was stopped early, because it was not expected to become the best.
     is_whole: bool,
-    /// True in the last phase, which improves the best chain. This phase has a finer search for the chain's highest target, and other
-    /// positions of single relays.
+    /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
     again: bool,
     ascent: Ascent,
     work: Work,

@@ -267,11 +267,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         from: Placement,
         room: Room,
     ) -> Site<'a> {
-        let link = chain.link(index, from, room);
-        match self.start {
-            Start::Through { .. } => link.unparted(),
-            _ => link,
+        let mut link = chain.link(index, from, room);
+        if let Start::Through { .. } = self.start {
+            link.apart_m = 0.0;
         }
+        link
     }
 }
 
