@@ -219,7 +219,7 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     }
 }
 
-/// Function phi(t) with the sign of the slope of the first hop's SIR at the position t on a straight line.
+/// Function phi(t) with the sign of the slope of the first hop's SIR at t, a position on a line.
 ///
 /// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
 pub(crate) struct Slope<T> {

@@ -136,10 +136,10 @@ impl Back {
     }
 }
 
-/// Returns the distance along x from the interferer, m, below which q = s / (1 + `noise` s) is below `needed`.
+/// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
 ///
-/// s is the squared distance from the interferer, m^2, and `aside_squared` its part across x. `None` if the noise
-/// alone prevents that at any distance.
+/// q is s / (1 + `noise` s). s is the squared distance from the interferer, m^2, and `aside_squared` its part across x.
+/// `None` if the noise alone prevents that at any distance.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

@@ -20,7 +20,7 @@ const RESTRAINED: f32 = 0.05;
 /// Trust below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain, over the distance Tx to Rx. The
+/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain. The unit is the distance Tx to Rx. The
 /// computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 

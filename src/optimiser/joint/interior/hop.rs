@@ -24,9 +24,10 @@ use super::super::hop::{Triple, minus};
 /// Rx.
 const SHORTEST: f32 = 1e-8;
 
-/// Levels of a hop: ln(forward SIR) and ln(backward SIR / r). r is the required ratio of backward to forward SIR.
+/// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
 ///
-/// Other values for the two directions of a hop have the same order. The *slack* of a level is its excess over the target.
+/// The factor r is the required ratio of backward to forward SIR. Other values for the two directions of a hop have the
+/// same order. The *slack* of a level is its excess over the target.
 pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.

@@ -95,7 +95,7 @@ enum Purpose {
 }
 
 impl Purpose {
-    /// Returns true for the sweep's rules: hops are computed exactly as the relays compute them from their messages.
+    /// Returns true for the sweep's rules: hops are computed as the relays compute them from messages.
     ///
     /// Some relays may then stay short of their farthest position.
     const fn is_sweep(self) -> bool {
@@ -123,7 +123,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     best_judged: Option<f32>,
     /// Target at which the current chain's improvement ended, in ln(SIR). `None` before the end, and if it was stopped early.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was stopped early, because it was not expected to become the best.
+    /// True unless the current chain's improvement was stopped early, as it would not become the best.
     is_whole: bool,
     /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
     again: bool,
