@@ -82,14 +82,12 @@ pub struct Hops {
     noise: f32,
 }
 
-/// Gains of both hops for traffic from Rx to Tx; infinite for a mission of one direction.
+/// Gains of both hops for traffic from Rx to Tx, divided by r; infinite for a mission of one direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, over r, m^2. r is the
-    /// required ratio of backward to forward SIR.
+    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, m^2.
     returned: f32,
-    /// Gain of the backward hop from the next node toward Rx to the relay, over r. The hop's SIR is the gain times
-    /// inverse interference over squared length; r is the required ratio of backward to forward SIR.
+    /// Gain A' of the backward hop from the next node toward Rx to the relay.
     gain: f32,
 }
 
@@ -166,7 +164,6 @@ impl Hops {
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
     /// For traffic in both directions, each is the smaller one of the forward SIR and the backward SIR divided by r.
-    /// r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);

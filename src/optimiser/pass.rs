@@ -9,8 +9,9 @@
 //! On the way back each relay has a position, and [`required_position`](Link::required_position) returns the required position of the relay before it on
 //! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
-//! The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole chain
-//! for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
+//! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0 if the target is
+//! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
+//! chain for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
 
 use super::PerTarget;
 use super::from_rx::FromRx;
@@ -51,8 +52,7 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data from which its *reach* is computed. The reach for a target SIR is
-/// the farthest x, in the direction of the pass, that meets the target.
+/// Relay in a pass along the chain, with all data from which its reach for a target SIR is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
@@ -94,7 +94,6 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 impl<'a> Link<'a> {
     /// Appends to `reaches` this relay's reaches for those `targets` that have none in the list yet.
     ///
-    /// A reach is the farthest x in the direction of the pass, m, at which this relay can meet a target SIR.
     /// `targets` rises, and entry i of each list belongs to target i. `from` has the reaches of the previous relay of
     /// the pass, m. The list ends before the first target that cannot be met. Work for each target: one computation
     /// of a hop; in an interference field, up to three for each point of the field.
@@ -140,9 +139,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. A reach is the
-    /// farthest x for a target. One call computes 16 of them, or in an interference field as many as take 128
-    /// evaluations of its points, at least one.
+    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
+    /// computes 16 of them, or in an interference field as many as take 128 evaluations of its points, at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -252,10 +250,7 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// The slack is the maximum length of a chain that meets the target, less the distance D from Tx to Rx. It is below 0 if the chain
-    /// misses the target. `reach` is the farthest x of this relay that meets the target, and `from_m` that of the previous relay. `None` if
-    /// Rx is out of reach from everywhere.
-    ///
+    /// `reach` is this relay's reach, and `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere.
     /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at the
     /// x that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
@@ -416,7 +411,7 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
 }
 
 /// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are that
-/// relay's farthest x for each target, and `from` those of the relay before it on the pass, m.
+/// relay's reaches, and `from` those of the relay before it on the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -428,9 +423,7 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of a sweep: slacks, and the target that the chain commits to, if any. A sweep is one pass of target SIRs
-/// along the chain. The slack for a target is the maximum length of a chain that meets it, less the distance from Tx
-/// to Rx. It is below 0 if the target is missed.
+/// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
@@ -482,9 +475,6 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
 }
 
 /// Computation of a whole chain for one target, in one program and without messages.
-///
-/// It computes each relay's reach (farthest x that meets the target) from the leader to the last relay, and then the
-/// required positions in the opposite order.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
     target: f32,
@@ -526,11 +516,9 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Computes the reach of every relay, and calls `visit` with its index and reach, m. A reach is the farthest x in the direction of the
-    /// pass at which the relay meets the target.
+    /// Computes the reach of every relay, and calls `visit` with its index and reach, m.
     ///
-    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target. The slack is the maximum length of
-    /// a chain that meets the target, less the distance from Tx to Rx. It is below 0 if the chain misses the target.
+    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
         let mut from_m = origin(self.mission);
         let mut at = self.mission.leader();
@@ -546,8 +534,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns true if the chain meets its target. This is so if every relay can take the farthest x that meets the
-    /// target, or the x that the next relay requires of it.
+    /// Returns true if the chain meets its target with relays at their reaches or required positions.
     pub(crate) fn is_met(&self) -> bool {
         self.closes() && (self.plainly().closes() || self.place(0).is_some())
     }
@@ -557,7 +544,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
     }
 
-    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. The index 0
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
     /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
@@ -582,8 +569,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns the farthest x of relay `index` that meets the target, m. For the index `None` it is the x at which
-    /// the pass starts. The result is `None` if a hop cannot meet the target.
+    /// Returns the reach of relay `index`, m; for the index `None` the x at which the pass starts. `None` if a hop
+    /// cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let mut from_m = origin(self.mission);
         let Some(index) = index else {

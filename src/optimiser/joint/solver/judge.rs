@@ -71,8 +71,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Records if the chain meets the target that was tried, and selects the next piece of work.
     ///
-    /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
+    /// `met` is as in [`Seek::tried`].
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

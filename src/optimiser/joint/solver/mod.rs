@@ -365,7 +365,7 @@ mod tests {
     use core::task::Poll;
 
     use super::{Seat, Solver, Way};
-    use crate::channel::{AirGround, Channel};
+    use crate::mission::tests::paper;
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
     /// Uniform random numbers in 0..1: Knuth's MMIX generator.
@@ -398,9 +398,7 @@ mod tests {
         } else {
             rng.between(80.0, 300.0)
         };
-        let channel = Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los).expect("in range");
         let mission = Mission::try_new(MissionConfig {
-            relays,
             distance_m: rng.between(400.0, 4000.0),
             min_separation_m: rng.between(1.0, 12.0),
             tx_power_w: rng.between(1.0, 100.0),
@@ -408,7 +406,6 @@ mod tests {
                 altitude_m: least_m,
                 power_w: 1.0,
             },
-            channel,
             band: Band { least_m, most_m },
             lateral: Band {
                 least_m: -side,
@@ -419,11 +416,7 @@ mod tests {
                 x_m: rng.between(-500.0, 4000.0),
                 y_m: rng.between(10.0, 900.0),
             }),
-            noise_w: 0.0,
-            reverse: 0.0,
-            rx_power_w: 80.0,
-            fitted_gap: 0.0,
-            tolerance: 1e-4,
+            ..paper(relays)
         });
         let holds = rng.next() < 0.3;
         let held =
