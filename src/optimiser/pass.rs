@@ -13,6 +13,8 @@
 //! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
 //! chain for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
 
+use core::iter::successors;
+
 use super::PerTarget;
 use super::from_rx::FromRx;
 use super::ladder::{Ladder, TARGETS};
@@ -516,22 +518,27 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
+    /// Returns the reaches of the relays in the order of the pass, before the first hop that cannot meet the target.
+    ///
+    /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
+    fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
+        let mut reach = origin(self.mission);
+        let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
+        relays.map_while(move |at| {
+            let before_m = reach;
+            reach = self.link(at).reach(self.target, before_m)?;
+            Some((at, before_m, reach))
+        })
+    }
+
     /// Computes the reach of every relay, and calls `visit` with its index and reach, m.
     ///
     /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
-        let mut from_m = origin(self.mission);
-        let mut at = self.mission.leader();
-        loop {
-            let link = self.link(at);
-            let before_m = from_m;
-            from_m = link.reach(self.target, from_m)?;
-            visit(at, from_m);
-            let Some(next) = self.mission.after(at) else {
-                return link.ending(self.target, before_m, from_m);
-            };
-            at = next;
-        }
+        let reaches = self.reaches().inspect(|(at, _, reach)| visit(*at, *reach));
+        let (at, before_m, reach) = reaches.last()?;
+        let is_complete = at == last(self.mission);
+        is_complete.then(|| self.link(at).ending(self.target, before_m, reach))?
     }
 
     /// Returns true if the chain meets its target with relays at their reaches or required positions.
@@ -548,42 +555,30 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
-        let (mut from_m, mut at) = (origin(self.mission), self.mission.leader());
         let mut place = None;
-        loop {
-            let reach = self.link(at).reach(self.target, from_m)?;
-            let same = plain.link(at).reach(self.target, from_m)?.to_bits() == reach.to_bits();
-            if !same {
+        for (at, before_m, reach) in self.reaches() {
+            if plain.link(at).reach(self.target, before_m)?.to_bits() != reach.to_bits() {
                 return None;
             }
-            let before_m = from_m;
-            from_m = reach;
             if at == index || index == 0 {
                 place = Some(reach);
             }
-            let Some(next) = self.mission.after(at) else {
+            if at == last(self.mission) {
                 let (_, end) = self.link(at).ending(self.target, before_m, reach)?;
                 return place.filter(|_| end.to_bits() == reach.to_bits());
-            };
-            at = next;
+            }
         }
+        None
     }
 
     /// Returns the reach of relay `index`, m; for the index `None` the x at which the pass starts. `None` if a hop
     /// cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
-        let mut from_m = origin(self.mission);
         let Some(index) = index else {
-            return Some(from_m);
+            return Some(origin(self.mission));
         };
-        let mut at = self.mission.leader();
-        loop {
-            from_m = self.link(at).reach(self.target, from_m)?;
-            if at == index {
-                return Some(from_m);
-            }
-            at = self.mission.after(at)?;
-        }
+        let own = self.reaches().find(|(at, ..)| *at == index);
+        own.map(|(_, _, reach)| reach)
     }
 
     /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
