@@ -173,7 +173,7 @@ impl Edge {
         if !apart || better(at_low) == better(at_high) {
             return end;
         }
-        let is_low = |sirs: (f32, f32)| better(sirs) == better(at_low);
+        let is_low = |t| better(both(t)) == better(at_low);
         end.or(hops.crossing(low, high, is_low, |t| self.place(t)))
     }
 }

@@ -53,16 +53,9 @@ struct TwoHops<'a> {
 }
 
 impl TwoHops<'_> {
-    fn first(&self, at: Placement) -> f32 {
-        Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at)
-    }
-
-    fn second(&self, at: Placement) -> f32 {
-        sir::at_receiver(self.mission, at, self.power_w)
-    }
-
     fn both(&self, at: Placement) -> (f32, f32) {
-        (self.first(at), self.second(at))
+        let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
+        (first, sir::at_receiver(self.mission, at, self.power_w))
     }
 
     fn found(&self, place: Placement) -> Found {
@@ -76,13 +69,13 @@ impl TwoHops<'_> {
     /// Returns the position on a line where both hops have the same SIR. Of the two adjacent f32 values of the
     /// varying coordinate it is the better one.
     ///
-    /// `place` returns the position for a value of that coordinate, from `low` to `high`, m. `is_low` returns true for
-    /// SIRs of both hops before the position.
+    /// `is_low` returns true for a value of that coordinate, from `low` to `high`, m, before the position; `place`
+    /// returns the position for it.
     fn crossing(
         &self,
         low: f32,
         high: f32,
-        is_low: impl Fn((f32, f32)) -> bool,
+        is_low: impl Fn(f32) -> bool,
         place: impl Fn(f32) -> Placement,
     ) -> Found {
         let (mut low, mut high) = (low, high);
@@ -91,7 +84,7 @@ impl TwoHops<'_> {
             if !(middle > low && middle < high) {
                 break;
             }
-            if is_low(self.both(place(middle))) {
+            if is_low(middle) {
                 low = middle;
             } else {
                 high = middle;
@@ -122,11 +115,12 @@ impl<'a> Two<'a> {
     }
 
     fn first(&self, x_m: f32) -> f32 {
-        self.hops.first(self.at(x_m))
+        let mission = self.hops.mission;
+        Sender::transmitter(mission).sir_at(mission, 0.0, self.at(x_m))
     }
 
     fn second(&self, x_m: f32) -> f32 {
-        self.hops.second(self.at(x_m))
+        sir::at_receiver(self.hops.mission, self.at(x_m), self.hops.power_w)
     }
 
     fn found(&self, x_m: f32) -> Found {
@@ -140,7 +134,7 @@ impl<'a> Two<'a> {
 
     /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's.
     fn crossing(&self, low: f32, high: f32) -> Found {
-        let is_low = |(first, second): (f32, f32)| first > second;
+        let is_low = |x_m| self.first(x_m) > self.second(x_m);
         self.hops.crossing(low, high, is_low, |x_m| self.at(x_m))
     }
 }
