@@ -129,11 +129,11 @@ impl<'a> Link<'a> {
                 fill(reaches, pairs.map_while(reach));
             }
             Some(Onward::Tx(hop)) => {
-                let longest = |target, from_m| self.longest(&hop, target, from_m, self.latest());
-                fill(
-                    reaches,
-                    pairs.map_while(|(&target, &from_m)| Some(longest(target, from_m)?.from_m)),
-                );
+                let latest = self.latest();
+                let reach = |(&target, &from_m): (&f32, &f32)| {
+                    Some(self.longest(&hop, target, from_m, latest)?.from_m)
+                };
+                fill(reaches, pairs.map_while(reach));
             }
             None => {
                 pairs.next();
