@@ -32,7 +32,7 @@
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::power_ratio::PowerRatio;
-use crate::root::sqrt;
+use crate::root::{Real, bisected, sqrt};
 
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
@@ -190,102 +190,99 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
     let x = interferer.x_m;
     let q = square(x) + square(interferer.y_m);
     let root = sqrt(square(q) + square(2.0 * x * altitude_m));
+    let noise = mission.noise_at_a_metre();
     let slope = Slope {
-        x,
+        p: x,
         q,
-        squared: square(altitude_m),
-        aside: square(interferer.y_m) + square(altitude_m),
-        noise: mission.noise_at_a_metre(),
+        a: square(interferer.y_m) + square(altitude_m),
+        b: square(altitude_m),
+        noise,
+        halvings: HALVINGS,
     };
     if x > 0.0 {
-        slope.turns((q + root) / (2.0 * x))
+        let bottom = (q + root) / (2.0 * x);
+        if !(noise > 0.0) {
+            return Extremum::Valley(bottom);
+        }
+        slope
+            .valley_and_hill(bottom)
+            .map_or(Extremum::Falls, |[valley, hill]| {
+                Extremum::ValleyAndHill(valley, hill)
+            })
     } else if x < 0.0 {
-        slope.hill(-2.0 * x * square(altitude_m) / (q + root))
-    } else if q > 0.0 || slope.noise > 0.0 {
+        let peak = -2.0 * x * square(altitude_m) / (q + root);
+        Extremum::Hill(if noise > 0.0 { slope.hill(peak) } else { peak })
+    } else if q > 0.0 || noise > 0.0 {
         Extremum::Falls
     } else {
         Extremum::Level
     }
 }
 
-/// Function phi(x) that has the sign of the slope of the first hop's SIR along x. The field `x` is the X of the
-/// interferer at (X, Y), and `q` is X^2 + Y^2.
-struct Slope {
-    x: f32,
-    q: f32,
-    /// Squared altitude h^2 of the relay, m^2.
-    squared: f32,
-    /// Squared distance of the relay from the interferer across x, Y^2 + h^2, m^2.
-    aside: f32,
+/// Function phi(t) with the sign of the slope of the first hop's SIR at t, a position on a line.
+///
+/// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
+pub(crate) struct Slope<T> {
+    /// t of the point closest to the interferer, m; 0 is the t of the point closest to Tx.
+    pub(crate) p: T,
+    /// Difference p^2 + a - b, m^2.
+    pub(crate) q: T,
+    /// Squared distance of the line from the interferer, m^2.
+    pub(crate) a: T,
+    /// Squared distance of the line from Tx, m^2.
+    pub(crate) b: T,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
-    noise: f32,
+    pub(crate) noise: T,
+    /// Number of bisection steps for each extremum.
+    pub(crate) halvings: u8,
 }
 
-impl Slope {
-    /// Returns phi at x = `at`, m: above 0 where the first hop's SIR rises, below 0 where it falls.
-    fn sign(&self, at: f32) -> f32 {
-        let s = square(at - self.x) + self.aside;
-        self.x * at - self.q - self.x * (self.squared / at) - self.noise * s * s
+impl<T: Real> Slope<T> {
+    fn rises(&self, t: T) -> bool {
+        let Self { p, q, a, b, .. } = *self;
+        let s = (t - p) * (t - p) + a;
+        p * t - q - p * (b / t) - self.noise * s * s > T::from(0.0)
     }
 
-    /// Returns half the derivative of phi at x = `at`, m, for an interferer at X > 0. phi has the sign of the slope
-    /// of the first hop's SIR. Beyond X this derivative falls with x, so phi has at most one maximum there.
-    fn bend(&self, at: f32) -> f32 {
-        let s = square(at - self.x) + self.aside;
-        0.5 * (self.x + self.x * (self.squared / square(at))) - 2.0 * self.noise * s * (at - self.x)
+    /// Returns true if phi rises at `t`, m, for p > 0. Beyond p the derivative of phi falls with t, so phi has at
+    /// most one maximum there.
+    fn bends_up(&self, t: T) -> bool {
+        let Self { p, a, b, .. } = *self;
+        let s = (t - p) * (t - p) + a;
+        let half = T::from(0.5) * (p + p * (b / (t * t)));
+        half - T::from(2.0) * self.noise * s * (t - p) > T::from(0.0)
     }
 
-    /// Returns the maximum of the first hop's SIR along x, for an interferer at X < 0. `peak` is the x of the maximum
-    /// without noise, m.
-    fn hill(&self, peak: f32) -> Extremum {
-        if !(self.noise > 0.0) {
-            return Extremum::Hill(peak);
-        }
-        Extremum::Hill(last(0.0, peak, |at| self.sign(at) > 0.0))
+    /// Returns the only maximum of the SIR for p < 0, m. `peak` is its t without noise.
+    pub(crate) fn hill(&self, peak: T) -> T {
+        bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
-    /// Returns the extrema of the first hop's SIR along x, for an interferer at X > 0. `bottom` is the x of the
-    /// minimum without noise, m.
-    fn turns(&self, bottom: f32) -> Extremum {
-        if !(self.noise > 0.0) {
-            return Extremum::Valley(bottom);
+    /// Returns the minimum and the maximum of the SIR for p > 0, m. `bottom` is the minimum without noise. `None` if
+    /// the SIR only falls.
+    pub(crate) fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
+        let bends_up = |t: T| self.bends_up(t);
+        if !bends_up(bottom) {
+            return None;
         }
-        let rises = |at: f32| self.bend(at) > 0.0;
-        if !rises(bottom) {
-            return Extremum::Falls;
+        let (top, _) = bisected(bottom, beyond(bottom, bends_up), self.halvings, bends_up);
+        let rises = |t: T| self.rises(t);
+        if !rises(top) {
+            return None;
         }
-        let top = last(bottom, beyond(bottom, rises), rises);
-        let above = |at: f32| self.sign(at) > 0.0;
-        if !above(top) {
-            return Extremum::Falls;
-        }
-        let valley = last(bottom, top, |at| !above(at));
-        Extremum::ValleyAndHill(valley, last(top, beyond(top, above), above))
+        let (valley, _) = bisected(bottom, top, self.halvings, |t| !rises(t));
+        let (hill, _) = bisected(top, beyond(top, rises), self.halvings, rises);
+        Some([valley, hill])
     }
 }
 
-/// Returns the last x in [`low`, `high`] at which `holds` is true, by bisection. `holds` is true at `low` and changes
-/// once.
-fn last(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> f32 {
-    let (mut low, mut high) = (low, high);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
-}
-
-fn beyond(from: f32, holds: impl Fn(f32) -> bool) -> f32 {
-    let mut at = 2.0 * from;
+fn beyond<T: Real>(from: T, holds: impl Fn(T) -> bool) -> T {
+    let mut at = T::from(2.0) * from;
     for _ in 0..DOUBLINGS {
         if !holds(at) {
             break;
         }
-        at *= 2.0;
+        at = T::from(2.0) * at;
     }
     at
 }

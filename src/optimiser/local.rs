@@ -16,7 +16,7 @@ use core::task::Poll;
 use super::reverse::Back;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement};
-use crate::root::sqrt;
+use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
 /// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
@@ -82,14 +82,12 @@ pub struct Hops {
     noise: f32,
 }
 
-/// Gains of both hops for traffic from Rx to Tx; infinite for a mission of one direction.
+/// Gains of both hops for traffic from Rx to Tx, divided by r; infinite for a mission of one direction.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, over r, m^2. r is the
-    /// required ratio of backward to forward SIR.
+    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, m^2.
     returned: f32,
-    /// Gain of the backward hop from the next node toward Rx to the relay, over r. The hop's SIR is the gain times
-    /// inverse interference over squared length; r is the required ratio of backward to forward SIR.
+    /// Gain A' of the backward hop from the next node toward Rx to the relay.
     gain: f32,
 }
 
@@ -166,7 +164,6 @@ impl Hops {
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
     /// For traffic in both directions, each is the smaller one of the forward SIR and the backward SIR divided by r.
-    /// r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -191,6 +188,12 @@ impl Hops {
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
+    }
+
+    /// Returns true if the hop from the relay at `at` has a lower SIR than the hop to it.
+    fn is_out_worse(&self, at: Placement) -> bool {
+        let (incoming, outgoing) = self.both(at);
+        incoming > outgoing
     }
 
     /// Returns true if the relay at `at` keeps its minimum distance from both neighbours.
@@ -349,15 +352,7 @@ impl LocalSearch {
         let at = |x_m| Placement::on_line(x_m, altitude_m);
         // Beyond the interferer the incoming hop may improve with its length; then an end of the row is best.
         let ends = self.weigh(at(low)).max(self.weigh(at(high)));
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            let (incoming, outgoing) = self.hops.both(at(middle));
-            if incoming > outgoing {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        (low, high) = bisected(low, high, HALVINGS, |x_m| self.hops.is_out_worse(at(x_m)));
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
@@ -400,16 +395,10 @@ impl LocalSearch {
             }
         }
         self.evaluations += u16::from(SAMPLES) + 1 + 2 * u16::from(HALVINGS);
-        for (mut left, mut right, sign) in crossings.into_iter().flatten() {
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (left + right);
-                let (incoming, outgoing) = self.hops.both(place(middle));
-                if (incoming > outgoing) == sign {
-                    right = middle;
-                } else {
-                    left = middle;
-                }
-            }
+        for (left, right, sign) in crossings.into_iter().flatten() {
+            let (left, right) = bisected(left, right, HALVINGS, |x_m| {
+                self.hops.is_out_worse(place(x_m)) != sign
+            });
             best = best
                 .max(self.weigh(place(left)))
                 .max(self.weigh(place(right)));

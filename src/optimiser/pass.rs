@@ -9,8 +9,11 @@
 //! On the way back each relay has a position, and [`required_position`](Link::required_position) returns the required position of the relay before it on
 //! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
-//! The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole chain
-//! for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
+//! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0 if the target is
+//! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
+//! chain for one target, without messages: reaches from the leader to the last relay, and required positions on the way back.
+
+use core::iter::successors;
 
 use super::PerTarget;
 use super::from_rx::FromRx;
@@ -51,8 +54,7 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data from which its *reach* is computed. The reach for a target SIR is
-/// the farthest x, in the direction of the pass, that meets the target.
+/// Relay in a pass along the chain, with all data from which its reach for a target SIR is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
@@ -94,7 +96,6 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 impl<'a> Link<'a> {
     /// Appends to `reaches` this relay's reaches for those `targets` that have none in the list yet.
     ///
-    /// A reach is the farthest x in the direction of the pass, m, at which this relay can meet a target SIR.
     /// `targets` rises, and entry i of each list belongs to target i. `from` has the reaches of the previous relay of
     /// the pass, m. The list ends before the first target that cannot be met. Work for each target: one computation
     /// of a hop; in an interference field, up to three for each point of the field.
@@ -128,11 +129,11 @@ impl<'a> Link<'a> {
                 fill(reaches, pairs.map_while(reach));
             }
             Some(Onward::Tx(hop)) => {
-                let longest = |target, from_m| self.longest(&hop, target, from_m, self.latest());
-                fill(
-                    reaches,
-                    pairs.map_while(|(&target, &from_m)| Some(longest(target, from_m)?.from_m)),
-                );
+                let latest = self.latest();
+                let reach = |(&target, &from_m): (&f32, &f32)| {
+                    Some(self.longest(&hop, target, from_m, latest)?.from_m)
+                };
+                fill(reaches, pairs.map_while(reach));
             }
             None => {
                 pairs.next();
@@ -140,9 +141,8 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. A reach is the
-    /// farthest x for a target. One call computes 16 of them, or in an interference field as many as take 128
-    /// evaluations of its points, at least one.
+    /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
+    /// computes 16 of them, or in an interference field as many as take 128 evaluations of its points, at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -252,10 +252,7 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// The slack is the maximum length of a chain that meets the target, less the distance D from Tx to Rx. It is below 0 if the chain
-    /// misses the target. `reach` is the farthest x of this relay that meets the target, and `from_m` that of the previous relay. `None` if
-    /// Rx is out of reach from everywhere.
-    ///
+    /// `reach` is this relay's reach, and `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere.
     /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at the
     /// x that maximises it.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
@@ -416,7 +413,7 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
 }
 
 /// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are that
-/// relay's farthest x for each target, and `from` those of the relay before it on the pass, m.
+/// relay's reaches, and `from` those of the relay before it on the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -428,9 +425,7 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
     Verdict::new(link.mission, ladder, &targets, slacks)
 }
 
-/// Result of a sweep: slacks, and the target that the chain commits to, if any. A sweep is one pass of target SIRs
-/// along the chain. The slack for a target is the maximum length of a chain that meets it, less the distance from Tx
-/// to Rx. It is below 0 if the target is missed.
+/// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
     /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
@@ -482,17 +477,33 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
 }
 
 /// Computation of a whole chain for one target, in one program and without messages.
-///
-/// It computes each relay's reach (farthest x that meets the target) from the leader to the last relay, and then the
-/// required positions in the opposite order.
 pub(crate) struct Walk<'a, F> {
     pub(crate) mission: &'a Mission,
-    pub(crate) target: f32,
-    pub(crate) plain: bool,
-    pub(crate) profile_of: &'a F,
+    target: f32,
+    plain: bool,
+    profile_of: &'a F,
 }
 
-impl<F: Fn(u16) -> Profile> Walk<'_, F> {
+impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
+    pub(crate) const fn new(
+        mission: &'a Mission,
+        target: f32,
+        plain: bool,
+        profile_of: &'a F,
+    ) -> Self {
+        Self {
+            mission,
+            target,
+            plain,
+            profile_of,
+        }
+    }
+
+    /// Returns this chain with relays that all take their farthest x.
+    pub(crate) const fn plainly(&self) -> Self {
+        Self::new(self.mission, self.target, true, self.profile_of)
+    }
+
     pub(crate) fn link(&self, index: u16) -> Link<'_> {
         let before = before(self.mission, index);
         Link {
@@ -507,80 +518,67 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         }
     }
 
-    /// Computes the reach of every relay, and calls `visit` with its index and reach, m. A reach is the farthest x in the direction of the
-    /// pass at which the relay meets the target.
+    /// Returns the reaches of the relays in the order of the pass, before the first hop that cannot meet the target.
     ///
-    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target. The slack is the maximum length of
-    /// a chain that meets the target, less the distance from Tx to Rx. It is below 0 if the chain misses the target.
+    /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
+    fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
+        let mut reach = origin(self.mission);
+        let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
+        relays.map_while(move |at| {
+            let before_m = reach;
+            reach = self.link(at).reach(self.target, before_m)?;
+            Some((at, before_m, reach))
+        })
+    }
+
+    /// Computes the reach of every relay, and calls `visit` with its index and reach, m.
+    ///
+    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
     pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
-        let mut from_m = origin(self.mission);
-        let mut at = self.mission.leader();
-        loop {
-            let link = self.link(at);
-            let before_m = from_m;
-            from_m = link.reach(self.target, from_m)?;
-            visit(at, from_m);
-            let Some(next) = self.mission.after(at) else {
-                return link.ending(self.target, before_m, from_m);
-            };
-            at = next;
-        }
+        let reaches = self.reaches().inspect(|(at, _, reach)| visit(*at, *reach));
+        let (at, before_m, reach) = reaches.last()?;
+        let is_complete = at == last(self.mission);
+        is_complete.then(|| self.link(at).ending(self.target, before_m, reach))?
     }
 
-    /// Returns true if the chain meets its target. This is so if every relay can take the farthest x that meets the
-    /// target, or the x that the next relay requires of it.
+    /// Returns true if the chain meets its target with relays at their reaches or required positions.
     pub(crate) fn is_met(&self) -> bool {
-        let closes = |chain: &Self| chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0);
-        closes(self)
-            && (closes(&Self {
-                plain: true,
-                ..*self
-            }) || self.place(0).is_some())
+        self.closes() && (self.plainly().closes() || self.place(0).is_some())
     }
 
-    /// Returns the x of relay `index`, m, if every relay can take its farthest x; `None` if some cannot. The index 0
+    /// Returns true if the reaches of a pass end within the last hop.
+    pub(crate) fn closes(&self) -> bool {
+        self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
+    }
+
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
     /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
     fn at_reach(&self, index: u16) -> Option<f32> {
-        let plain = Self {
-            plain: true,
-            ..*self
-        };
-        let (mut from_m, mut at) = (origin(self.mission), self.mission.leader());
+        let plain = self.plainly();
         let mut place = None;
-        loop {
-            let reach = self.link(at).reach(self.target, from_m)?;
-            let same = plain.link(at).reach(self.target, from_m)?.to_bits() == reach.to_bits();
-            if !same {
+        for (at, before_m, reach) in self.reaches() {
+            if plain.link(at).reach(self.target, before_m)?.to_bits() != reach.to_bits() {
                 return None;
             }
-            let before_m = from_m;
-            from_m = reach;
             if at == index || index == 0 {
                 place = Some(reach);
             }
-            let Some(next) = self.mission.after(at) else {
+            if at == last(self.mission) {
                 let (_, end) = self.link(at).ending(self.target, before_m, reach)?;
                 return place.filter(|_| end.to_bits() == reach.to_bits());
-            };
-            at = next;
+            }
         }
+        None
     }
 
-    /// Returns the farthest x of relay `index` that meets the target, m. For the index `None` it is the x at which
-    /// the pass starts. The result is `None` if a hop cannot meet the target.
+    /// Returns the reach of relay `index`, m; for the index `None` the x at which the pass starts. `None` if a hop
+    /// cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
-        let mut from_m = origin(self.mission);
         let Some(index) = index else {
-            return Some(from_m);
+            return Some(origin(self.mission));
         };
-        let mut at = self.mission.leader();
-        loop {
-            from_m = self.link(at).reach(self.target, from_m)?;
-            if at == index {
-                return Some(from_m);
-            }
-            at = self.mission.after(at)?;
-        }
+        let own = self.reaches().find(|(at, ..)| *at == index);
+        own.map(|(_, _, reach)| reach)
     }
 
     /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
@@ -592,23 +590,36 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
         if let Some(place) = self.at_reach(index) {
             return Some(place);
         }
-        let mut at = match self.mission.heading() {
-            Heading::TowardRx => self.mission.relays(),
-            Heading::TowardTx => 1,
-        };
-        let last = (self.reach(before(self.mission, at))?, self.reach(Some(at))?);
-        let mut place = self.link(at).ending(self.target, last.0, last.1)?.1;
-        loop {
+        let at = last(self.mission);
+        let (before_m, reach) = (self.reach(before(self.mission, at))?, self.reach(Some(at))?);
+        let (_, place) = self.link(at).ending(self.target, before_m, reach)?;
+        let mut own = None;
+        let end = self.settle(place, |at, place, before| {
             if at == index {
-                return Some(place);
+                own = Some(place);
+                return None;
             }
-            let link = self.link(at);
+            self.reach(before)
+        });
+        own.or(end)
+    }
+
+    /// Computes the position of every relay, from the last one of the pass back. The last one is at x = `place`, m.
+    ///
+    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
+    /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
+    /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
+    pub(crate) fn settle(
+        &self,
+        place: f32,
+        mut visit: impl FnMut(u16, f32, Option<u16>) -> Option<f32>,
+    ) -> Option<f32> {
+        let (mut at, mut place) = (last(self.mission), place);
+        loop {
             let before = before(self.mission, at);
-            let from_m = self.reach(before)?;
-            place = match link.required_position(self.target, from_m, place)? {
-                RequiredPosition::AtReach => from_m,
-                RequiredPosition::At(x_m) => x_m,
-            };
+            let reach = visit(at, place, before)?;
+            let required = self.link(at).required_position(self.target, reach, place)?;
+            place = required.or_reach(reach);
             let Some(before) = before else {
                 return Some(place);
             };
@@ -617,7 +628,15 @@ impl<F: Fn(u16) -> Profile> Walk<'_, F> {
     }
 }
 
-pub(crate) fn before(mission: &Mission, index: u16) -> Option<u16> {
+/// Returns the index of the last relay of a pass.
+const fn last(mission: &Mission) -> u16 {
+    match mission.heading() {
+        Heading::TowardRx => mission.relays(),
+        Heading::TowardTx => 1,
+    }
+}
+
+fn before(mission: &Mission, index: u16) -> Option<u16> {
     match mission.heading() {
         Heading::TowardRx => index.checked_sub(1).filter(|before| *before > 0),
         Heading::TowardTx => (index < mission.relays()).then(|| index.saturating_add(1)),

@@ -140,12 +140,12 @@ pub fn solve(
         let Some(agreed) = planner.step(mission, &profile_of, u16::MAX)? else {
             continue;
         };
-        let chain = Walk {
+        let chain = Walk::new(
             mission,
-            target: agreed.target,
-            plain: agreed.ladder.is_plain(),
-            profile_of: &profile_of,
-        };
+            agreed.target,
+            agreed.ladder.is_plain(),
+            &profile_of,
+        );
         let next = if chain.place(0).is_some() {
             if planner.search.accept(agreed.target) {
                 return Ok(agreed);
@@ -170,12 +170,7 @@ fn placed(
     index: u16,
     profile_of: impl Fn(u16) -> Profile,
 ) -> Option<Placement> {
-    let chain = Walk {
-        mission,
-        target,
-        plain,
-        profile_of: &profile_of,
-    };
+    let chain = Walk::new(mission, target, plain, &profile_of);
     // Every relay must have a position, not only those on the way back to this one.
     chain.place(0)?;
     chain

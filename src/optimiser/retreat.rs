@@ -86,18 +86,19 @@ impl<'a> Retreat<'a> {
     /// Returns the hop from relay `index` to a relay at `altitude_m`, m, or to Rx if that is `None`. `own` has the
     /// altitude and power of relay `index`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
-        let climb = own.cross_section.altitude_m - altitude_m.unwrap_or(0.0);
-        Self {
-            gain: match altitude_m {
-                Some(_) => mission.relay_gain(own.power_w).value(),
-                None => mission.receiver_gain(own.power_w),
-            },
-            climb_squared: square(climb),
+        let climb_squared = square(own.cross_section.altitude_m - altitude_m.unwrap_or(0.0));
+        let (gain, least_step) = match altitude_m {
+            Some(_) => (
+                mission.relay_gain(own.power_w).value(),
+                mission.least_step(climb_squared),
+            ),
             // The receiver is on the ground, so altitude alone separates relay N from it.
-            least_step: match altitude_m {
-                Some(_) => mission.least_step(square(climb)),
-                None => 0.0,
-            },
+            None => (mission.receiver_gain(own.power_w), 0.0),
+        };
+        Self {
+            gain,
+            climb_squared,
+            least_step,
             end_m: mission.end_for(index, 0.0),
             to_rx: altitude_m.is_none(),
             back: None,

@@ -132,8 +132,15 @@ impl Back {
     /// Returns the distance along x from the interferer below which a receiver misses `target`, m. The backward hop
     /// has the squared length `squared`, m^2. `None` if every receiver misses the target.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
-        let needed = target * squared / self.gain;
-        let left = 1.0 - self.noise * needed;
-        (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - self.aside_squared))
+        zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
+}
+
+/// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
+///
+/// q is s / (1 + `noise` s). s is the squared distance from the interferer, m^2, and `aside_squared` its part across x.
+/// `None` if the noise alone prevents that at any distance.
+pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
+    let left = 1.0 - noise * needed;
+    (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))
 }

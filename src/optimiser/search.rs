@@ -3,7 +3,7 @@
 //! It implements both schedules of Algorithm 1. The paper's tries gamma_0, gamma_0 - epsilon, ..., one per sweep. The bracketed
 //! one tries a ladder of targets per sweep. Feasibility is monotone in the target, so the optimum is between the highest target
 //! that was met and the lowest that was missed. The slacks are smooth in log gamma, so inverse interpolation places the dense
-//! middle of the next ladder, while its ends still span the bracket.
+//! middle of the next ladder, while its ends still span the *bracket*: the range of targets that may be the highest feasible one.
 //!
 //! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as met. All
 //! other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
@@ -57,20 +57,17 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit is the gap between two targets. Both
-/// interpolations estimate the target at which the chain's slack is 0.
+/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit is the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. The bracket is the
-/// range of targets that may be the highest feasible one. After a stalled pass the next targets are spread evenly
-/// over it, and not around an interpolated optimum.
+/// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. After such a pass the
+/// next targets are spread evenly over the bracket, and not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
 const MOST_SWEEPS: u32 = 48;
 
-/// State of the leader's search for the highest target SIR: the bracket and the next targets to try. The bracket is
-/// from the highest feasible to the lowest infeasible target.
+/// State of the leader's search for the highest target SIR: the bracket and the next targets to try.
 #[derive(Clone, Debug)]
 pub struct Search {
     schedule: Schedule,
@@ -81,8 +78,7 @@ pub struct Search {
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the bracket before the last pass, `infeasible` / `feasible` - 1. The bracket is the range of
-    /// targets that may be the highest feasible one.
+    /// Relative width of the bracket before the last pass, `infeasible` / `feasible` - 1.
     width: f32,
     ladder: Ladder,
     tried: u32,

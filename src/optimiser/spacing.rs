@@ -40,7 +40,7 @@
 //! Accuracy: asserted by `reaches_agree_with_the_reference` in `host-tests/tests/placement/main.rs` against a bisection in f64.
 
 use super::noisy_hop::{HALVINGS, MOST_RATIO, NoisyHop, before, closest};
-use super::reverse::Back;
+use super::reverse::{Back, zone};
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
@@ -55,6 +55,16 @@ pub enum RequiredPosition {
     AtReach,
     /// The previous relay must take this x, m, which is short of its farthest x that meets the target.
     At(f32),
+}
+
+impl RequiredPosition {
+    /// Returns the required x, m. `reach_m` is the farthest x that meets the target.
+    pub(crate) const fn or_reach(self, reach_m: f32) -> f32 {
+        match self {
+            Self::AtReach => reach_m,
+            Self::At(x_m) => x_m,
+        }
+    }
 }
 
 /// Hop toward Rx, prepared for the computation of its maximum length for many targets.
@@ -337,12 +347,7 @@ impl Hop {
         // Within this distance of the interferer even the closest sender is too weak; both positions are rounded.
         let nearest = self.least_step + 2.0 * f32::EPSILON * near;
         let needed = ratio * (square(nearest) + self.across_squared);
-        // s / (1 + nu s) >= needed has no solution if the signal is below the noise.
-        let left = 1.0 - self.nu() * needed;
-        if !(left > 0.0) {
-            return None;
-        }
-        let zone = sqrt(needed / left - self.aside_squared);
+        let zone = zone(needed, self.nu(), self.aside_squared)?;
         let before_zone = |place: f32| {
             if (place - self.interferer_x_m).abs() < zone {
                 (self.interferer_x_m - zone).next_down()

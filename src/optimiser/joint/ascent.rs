@@ -10,38 +10,33 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First limit of a relay's move in one iteration of the joint method. The unit is the relay's distance from the interferer. The same
-/// number limits the change of ln(target SIR).
+/// First *trust*: limit of a relay's move in one iteration, over its distance from the interferer. The same number
+/// limits the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum limit of a relay's move at which the final target SIR of a chain's improvement is predicted. A smaller
-/// limit holds the relays back, so that the prediction would be too low.
+/// Minimum trust at which an improvement's final target is predicted. A smaller one makes the prediction too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Limit of a relay's move below which the improvement of a chain ends without progress. It is a fraction of the
-/// relay's distance from the interferer.
+/// Trust below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising target SIR is assumed to shorten the chain. It is in units of the distance Tx to Rx
-/// per ln(SIR). The computed rate is a divisor, so it must not be near 0; it is usually 0.5.
+/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain. The unit is the distance Tx to Rx. The
+/// computed rate is a divisor, so it must not be near 0; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of a chain's target SIR is raised, in ln(SIR). The limit is raised when the chain's target has reached
-/// it and is still below the upper bound for all chains.
+/// First amount by which the limit of the target is raised, in ln(SIR). It is raised if the chain meets it, but not
+/// the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's slack, as a fraction of the distance from Tx to Rx. Slack above the cap does not count, so that it cannot
-/// outweigh a penalty.
+/// First cap on the chain's slack, over the distance Tx to Rx. With it slack cannot outweigh a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's slack, as a fraction of the distance from Tx to Rx. Slack above the cap does not count, so that it cannot
-/// outweigh a penalty.
+/// Smallest cap on the chain's slack, over the distance Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of a negative slack relative to a positive slack, when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
-/// improvement.
+/// Increase of ln(target SIR) below which an iteration counts as idle. Two in a row end a chain's improvement.
 const CLOSE: f32 = 3e-6;
 
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
@@ -50,8 +45,7 @@ const SETTLED: f32 = 0.3 * CLOSE;
 /// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
 const FORESEEN: f32 = 1e-4;
 
-/// Number of iterations after which a chain's improvement is checked for divergence. It diverges if the chain falls
-/// far short of Rx.
+/// Number of iterations after which a chain that falls far short of Rx counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
@@ -83,7 +77,7 @@ pub(crate) struct Ascent {
     floor: f32,
     /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If it misses the
     /// bound, this limit is raised.
-    limit: f32,
+    pub(crate) limit: f32,
     /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
     excess: f32,
     /// Cap on the chain's slack, as a fraction of the distance from Tx to Rx. The cap is lowered if relays are too near the interferer,
@@ -143,10 +137,6 @@ impl Ascent {
             excess: EXCESS,
             ..self
         }
-    }
-
-    pub(crate) const fn limit(&self) -> f32 {
-        self.limit
     }
 
     /// Returns the cap on the chain's slack, m. Slack above the cap does not count when chains are compared.

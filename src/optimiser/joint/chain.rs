@@ -10,20 +10,26 @@ use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};
 use crate::power_ratio::PowerRatio;
-use crate::sir::{Sender, square};
+use crate::root::sqrt;
+use crate::sir::{Sender, square, transmitter_gain};
+
+/// Profiles of the relays of a chain: a function of a relay's index, 1 to N.
+pub(super) trait SeatOf: Fn(u16) -> Seat {}
+
+impl<F: Fn(u16) -> Seat> SeatOf for F {}
 
 /// Chain to be solved: its mission, and the profiles of its relays.
 #[derive(Clone, Copy)]
-pub(in crate::optimiser::joint) struct SolverContext<'a, F> {
-    pub(in crate::optimiser::joint) mission: &'a Mission,
-    pub(in crate::optimiser::joint) interferer: &'a Interferer,
-    pub(in crate::optimiser::joint) seat_of: &'a F,
-    pub(super) gain: PowerRatio,
+pub(super) struct Chain<'a, F> {
+    pub(super) mission: &'a Mission,
+    pub(super) interferer: &'a Interferer,
+    seat_of: &'a F,
+    gain: PowerRatio,
 }
 
-impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
+impl<'a, F: SeatOf> Chain<'a, F> {
     /// Creates the chain of `mission`; `None` in an interference field.
-    pub(in crate::optimiser::joint) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
+    pub(super) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
         Some(Self {
             mission,
             interferer: mission.interferer()?,
@@ -32,8 +38,26 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         })
     }
 
-    pub(in crate::optimiser::joint) fn distance_m(&self) -> f32 {
+    pub(super) fn distance_m(&self) -> f32 {
         self.mission.config().distance_m
+    }
+
+    pub(super) const fn relays(&self) -> u16 {
+        self.mission.relays()
+    }
+
+    pub(super) fn seat(&self, index: u16) -> Seat {
+        (self.seat_of)(index)
+    }
+
+    pub(super) fn room(&self, index: u16) -> Room {
+        self.seat(index).room
+    }
+
+    /// Returns the largest x of a relay, m, that leaves the relays after it their separation. `end_m` is that of the
+    /// relay before it, and `step` the minimum step between the two.
+    pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
+        (end_m + step).min(self.distance_m())
     }
 
     /// Returns the sender of the hop to relay `index`: Tx, or relay `index` - 1 at `from`.
@@ -41,7 +65,7 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
         if index <= 1 {
             return Sender::transmitter(self.mission);
         }
-        let power_w = (self.seat_of)(index - 1).power_w;
+        let power_w = self.seat(index - 1).power_w;
         let common = power_w.to_bits() == self.mission.config().common.power_w.to_bits();
         Sender {
             cross_section: from.cross_section(),
@@ -66,20 +90,20 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// Returns the altitude of relay `index`, m, if it is fixed. `None` if the relay may choose its altitude, or if
     /// the mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
-        let Room { band, .. } = (self.seat_of)(index).room;
+        let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
         (free && band.is_single()).then_some(band.least_m)
     }
 
     pub(super) fn holds(&self) -> bool {
-        (1..=self.mission.relays()).any(|index| self.held_at(index).is_some())
+        (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
     /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
     /// first and after the last of those relays the altitude is constant if `level` is true. Otherwise it falls to the
     /// band's lowest altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
-        let relays = self.mission.relays();
+        let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
         let before = (1..=index).rev().find_map(held);
         let after = (index..=relays).find_map(held);
@@ -103,15 +127,21 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// Returns the last hop's maximum length for `target` less its length, m, and the derivatives. This difference is the chain's slack.
     /// The last relay is at `at`; the derivatives are by its coordinates.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
-        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
-        site::tail(self.mission, power_w, room, target, at)
+        let Seat { room, power_w } = self.seat(self.relays());
+        let most = site::last_most(self.mission, power_w, room);
+        let reach_m = sqrt(self.mission.receiver_gain(power_w) / target.min(most));
+        let (slack, mut outlook) = Outlook::tail(reach_m, self.distance_m(), at);
+        if target > most {
+            outlook.by_target = 0.0;
+        }
+        (slack, outlook)
     }
 
     /// Returns the upper bound of the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
     /// the last hop.
     pub(super) fn ceiling(&self) -> f32 {
-        let Seat { room, power_w } = (self.seat_of)(self.mission.relays());
-        let first = (self.seat_of)(1).room;
+        let Seat { room, power_w } = self.seat(self.relays());
+        let first = self.room(1);
         let first = site::first_most(self.mission, self.interferer, first);
         let last = site::last_most(self.mission, power_w, room);
         libm::logf(first.min(last).clamp(1e-30, 1e30))
@@ -120,16 +150,80 @@ impl<'a, F: Fn(u16) -> Seat> SolverContext<'a, F> {
     /// Returns the target, as ln(SIR), from which on every hop has a maximum length. It is just above the largest
     /// gain of a hop: with a lower target a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
-        let own = (1..self.mission.relays()).map(|index| (self.seat_of)(index).power_w);
+        let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
         let gain = self.mission.relay_gain(relay).value();
         libm::logf(self.mission.tx_gain().value().max(gain)) + 0.01
     }
 }
 
+/// Gains of the hops of a chain in both directions. The SIR of a hop is its gain times the inverse interference at the
+/// receiver, over the squared length; at Rx and Tx the gain includes the interference.
+///
+/// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as their logarithms.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gains {
+    /// Position (x, y, h) of the interferer.
+    pub(super) source: Triple,
+    /// Receiver noise over the interferer's power received at the distance D (nu).
+    pub(super) noise: f32,
+    relay: f32,
+    to_rx: f32,
+    to_tx: f32,
+    from_tx: f32,
+    from_rx: f32,
+}
+
+impl Gains {
+    pub(super) const NONE: Self = Self {
+        source: [0.0; 3],
+        noise: 0.0,
+        relay: 0.0,
+        to_rx: 0.0,
+        to_tx: 0.0,
+        from_tx: 0.0,
+        from_rx: 0.0,
+    };
+
+    /// Returns the gains for relays of `power_w` watts; each is stored as `stored` returns it.
+    pub(super) fn new(
+        chain: &Chain<'_, impl SeatOf>,
+        power_w: f32,
+        stored: impl Fn(f32) -> f32,
+    ) -> Self {
+        let (mission, interferer, d) = (chain.mission, chain.interferer, chain.distance_m());
+        let on_ground = |gain: f32| stored(gain / d / d);
+        Self {
+            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
+            noise: mission.noise_at_a_metre() * d * d,
+            relay: stored(mission.relay_gain(power_w).value()),
+            to_rx: on_ground(mission.receiver_gain(power_w)),
+            to_tx: on_ground(transmitter_gain(mission, power_w)),
+            from_tx: stored(mission.tx_gain().value()),
+            from_rx: stored(Sender::receiver(mission).gain.value()),
+        }
+    }
+
+    /// Returns the gains of hop `k` forward and backward. `k` is 1 (from Tx) to N + 1 (to Rx), and `relays` is N.
+    /// `sent_by` returns a gain for the power of the relay with the given index.
+    pub(super) fn of(&self, k: u16, relays: u16, sent_by: impl Fn(f32, u16) -> f32) -> [f32; 2] {
+        let there = match k {
+            1 => self.from_tx,
+            _ if k > relays => sent_by(self.to_rx, k - 1),
+            _ => sent_by(self.relay, k - 1),
+        };
+        let back = match k {
+            _ if k > relays => self.from_rx,
+            1 => sent_by(self.to_tx, k),
+            _ => sent_by(self.relay, k),
+        };
+        [there, back]
+    }
+}
+
 /// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. Candidates are the
 /// limits of the ranges in `room`, and the lateral offset 0.
-pub(super) fn far_off(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, room: Room) -> CrossSection {
+pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
     for y_m in [room.lateral.least_m, 0.0, room.lateral.most_m] {

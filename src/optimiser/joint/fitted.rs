@@ -17,12 +17,12 @@
 //! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
 //! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
 
-use super::chain::{Seat, SolverContext};
+use super::chain::{Chain, Gains, SeatOf};
 use super::hop::{Triple, minus};
 use crate::mission::{Band, FINEST_STEP};
 use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
-use crate::sir::{Sender, in_noise, square, transmitter_gain};
+use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
@@ -33,7 +33,7 @@ const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
 /// Number of bits in which a relay's choice among the states of the relay before it is stored.
 const BITS: usize = 3;
 
-/// Step width at which the search from one initial chain ends. It is a fraction of the distance from Tx to Rx.
+/// Step width at which the search from one initial chain ends, in units of D.
 const NARROWEST: f32 = 1.0 / 131_072.0;
 /// Relative gain of a round of passes below which the step width of the moves is halved.
 const LITTLE: f32 = 1e-3;
@@ -45,11 +45,11 @@ const AT_ONCE: u16 = 3;
 /// Number of relays that one call of the solver handles in all work but passes.
 const OTHERS_AT_ONCE: u16 = 10;
 
-/// Amount added to each squared hop length, so that no hop time is 0. In units of the squared distance Tx to Rx.
+/// Amount added to each squared hop length, in units of D^2, so that no hop time is 0.
 const SHORTEST: f32 = 1e-12;
 
-/// Initial chains: first and last x of the relays, and first step width of the moves. All are fractions of the
-/// distance from Tx to Rx. If both x are equal, the relays start there, at their minimum separation.
+/// Initial chains: first and last x of the relays, and first step width of the moves, in units of D. If both x are
+/// equal, the relays start there, at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -63,7 +63,7 @@ const STARTS: [[f32; 3]; 8] = [
 /// Number of the initial chain that starts from the best one along the line. Used only if relays may leave the common
 /// altitude.
 const BEST: u8 = 8;
-/// First step width of the moves from the best chain along the line. It is a fraction of the distance from Tx to Rx.
+/// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
 /// Lateral offset and altitude of further initial chains, as two fractions. The first is of the largest lateral
 /// offset away from the interferer, the second of the altitude range above the common altitude.
@@ -91,20 +91,6 @@ pub struct SlotShares {
     pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
     pub bits_per_hz: f32,
-}
-
-/// Gains of the hops, each divided by the SNR gap. SINR over the gap is the gain times the inverse interference at
-/// the receiver, over the squared hop length. At Rx and Tx the gain includes the interference.
-#[derive(Clone, Copy, Debug)]
-struct Gains {
-    source: Triple,
-    /// Receiver noise over the interferer's power received at the distance from Tx to Rx.
-    noise: f32,
-    relay_per_w: f32,
-    to_rx_per_w: f32,
-    to_tx_per_w: f32,
-    from_tx: f32,
-    from_rx: f32,
 }
 
 /// Position that is tried for a node, and the inverse interference there; 1 at Tx and Rx.
@@ -191,6 +177,7 @@ enum Work {
 /// Solver of a chain with fitted slots: time slots as long as each hop needs. It maximises the data rate.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<const RELAYS: usize> {
+    /// Gains of the hops from relays of 1 W, each divided by the SNR gap.
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
@@ -221,15 +208,7 @@ pub(super) struct Fitted<const RELAYS: usize> {
 impl<const RELAYS: usize> Fitted<RELAYS> {
     /// State of the solver before its first call. All its bytes are 0, so it takes no flash.
     pub(super) const NEW: Self = Self {
-        gains: Gains {
-            source: [0.0; 3],
-            noise: 0.0,
-            relay_per_w: 0.0,
-            to_rx_per_w: 0.0,
-            to_tx_per_w: 0.0,
-            from_tx: 0.0,
-            from_rx: 0.0,
-        },
+        gains: Gains::NONE,
         places: [[0.0; 3]; RELAYS],
         best_places: [[0.0; 3]; RELAYS],
         choices: [0; RELAYS],
@@ -247,11 +226,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     };
 
     /// Continues the solution by one bounded portion. Ready at the end, with the linear SIR of the worst hop.
-    pub(super) fn step(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Poll<Result<f32, Infeasible>> {
-        let relays = chain.mission.relays();
+    pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
+        let relays = chain.relays();
         match self.work {
             Work::Begin(0) if usize::from(self.number) >= starts(chain) => {
                 if !(self.best > 0.0) {
@@ -287,11 +263,12 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// Moves the next relays to their positions in the current initial chain. The first `done` relays are there
     /// already, and one call moves at most [`OTHERS_AT_ONCE`]. After the last relay, the first pass over the chain is
     /// due.
-    fn begin(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) {
+    fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         if done == 0 {
-            self.gains = Gains::new(chain);
+            let gap = chain.mission.fitted_gap();
+            self.gains = Gains::new(chain, 1.0, |gain| gain / gap);
         }
         let number = usize::from(self.number);
         let is_best = self.number == BEST;
@@ -307,20 +284,15 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         let end = (done + OTHERS_AT_ONCE).min(relays);
         let after = end + 1;
         for index in done + 1..after {
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let x = if first < last {
                 first + (last - first) * f32::from(index) / f32::from(relays + 1)
             } else {
                 at + f32::from(index - 1) * step
             };
-            let away_m = if chain.interferer.y_m > 0.0 {
-                room.lateral.least_m
-            } else {
-                room.lateral.most_m
-            };
             let low_m = config.common.altitude_m;
             let place = CrossSection {
-                y_m: aside * away_m,
+                y_m: aside * room.away_m(chain.interferer),
                 altitude_m: low_m + up * (room.band.most_m - low_m),
             };
             let place = room.nearest(place);
@@ -347,9 +319,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// Returns the position of node `index` moved by `by` along the current coordinate. The node stays within its
     /// limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
-    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, by: f32) -> Spot {
+    fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
         let place = self.places.get(usize::from(index).wrapping_sub(1));
-        let Some(&place) = place.filter(|_| index <= chain.mission.relays()) else {
+        let Some(&place) = place.filter(|_| index <= chain.relays()) else {
             let x = if index > 0 { 1.0 } else { 0.0 };
             return Spot {
                 at: [x, 0.0, 0.0],
@@ -357,7 +329,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             };
         };
         let unit = 1.0 / chain.distance_m();
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         let mut at = place;
         let limits = |band: Band| [band.least_m * unit, band.most_m * unit];
         let limits = [[0.0, 1.0], limits(room.lateral), limits(room.band)];
@@ -371,8 +343,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    fn pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, first: u16) {
-        let relays = chain.mission.relays();
+    fn pass(&mut self, chain: &Chain<'_, impl SeatOf>, first: u16) {
+        let relays = chain.relays();
         if first <= 1 {
             let spot = self.spot(chain, 0, 0.0);
             self.front = [State { spot, time: 0.0 }; STATES];
@@ -415,17 +387,17 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
 
     /// Continues after a pass. Its best combination of moves has the total hop time `time`, with the last relay in
     /// `state`.
-    fn conclude(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, time: f32, state: u8) {
+    fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
             self.time = time;
-            self.work = Work::Back(chain.mission.relays(), state);
+            self.work = Work::Back(chain.relays(), state);
         } else {
             self.next_pass(chain);
         }
     }
 
     /// Moves relays to their best positions, from relay `index` (which is in `state`) toward Tx.
-    fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16, state: u8) {
+    fn back(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, state: u8) {
         let end = index.saturating_sub(OTHERS_AT_ONCE);
         let mut state = usize::from(state);
         for index in (end + 1..=index).rev() {
@@ -444,7 +416,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
 
     /// Selects the coordinate and the step width of the next pass. After the last one the chain is kept if it is the
     /// best.
-    fn next_pass(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
+    fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
         if self.number < BEST {
@@ -476,11 +448,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 
     /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the hop's worse SIR.
-    fn hop_times(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        index: u16,
-    ) -> [f32; 2] {
+    fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
             self.spot(chain, index - 1, 0.0),
@@ -515,10 +483,10 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     /// Returns the position of relay `index`, and its slots, once the chain is solved.
     pub(super) fn place(
         &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         index: u16,
     ) -> (Placement, SlotShares) {
-        let bounds = |hop| self.bounds(chain.mission.relays(), hop);
+        let bounds = |hop| self.bounds(chain.relays(), hop);
         let [[begin, last], [middle, begin_back], [end, first_back]] = [
             bounds(index.saturating_sub(1)),
             bounds(index),
@@ -528,9 +496,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             .spot(chain, index, 0.0)
             .at
             .map(|d| d * chain.distance_m());
-        let at = (chain.seat_of)(index)
-            .room
-            .nearest(CrossSection { y_m, altitude_m });
+        let at = chain.room(index).nearest(CrossSection { y_m, altitude_m });
         let shares = SlotShares {
             to_rx: [middle, end],
             to_tx: [begin_back, last],
@@ -543,7 +509,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
 }
 
 /// Returns the number of initial chains. More chains are tried if relays may choose lateral offsets or altitudes.
-fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
+fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {
         STARTS.len()
@@ -553,46 +519,20 @@ fn starts(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> usize {
 }
 
 impl Gains {
-    fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
-        let (mission, interferer) = (chain.mission, chain.interferer);
-        let d = mission.config().distance_m;
-        let gap = mission.fitted_gap();
-        let on_ground = |gain: f32| gain / d / d / gap;
-        Self {
-            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
-            noise: mission.noise_at_a_metre() * d * d,
-            relay_per_w: mission.relay_gain(1.0).value() / gap,
-            to_rx_per_w: on_ground(mission.receiver_gain(1.0)),
-            to_tx_per_w: on_ground(transmitter_gain(mission, 1.0)),
-            from_tx: mission.tx_gain().value() / gap,
-            from_rx: Sender::receiver(mission).gain.value() / gap,
-        }
-    }
-
     fn quiet(&self, at: Triple) -> f32 {
         let [x, y, h] = minus(at, self.source);
         in_noise(square(x) + square(y) + square(h), self.noise)
     }
 
-    /// Returns the gains of the hop to node `index`, 1 to N + 1 (Rx).
-    fn hop(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Hop {
-        let config = chain.mission.config();
-        let relays = config.relays;
-        let power_w = |index: u16| (chain.seat_of)(index).power_w;
-        let there = match index {
-            1 => self.from_tx,
-            _ if index > relays => self.to_rx_per_w * power_w(relays),
-            _ => self.relay_per_w * power_w(index - 1),
-        };
-        let back = match index {
-            _ if index > relays => self.from_rx,
-            1 => self.to_tx_per_w * power_w(1),
-            _ => self.relay_per_w * power_w(index),
-        };
+    /// Returns the hop to node `index`, 1 to N + 1 (Rx).
+    fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Hop {
+        let (config, relays) = (chain.mission.config(), chain.relays());
         let is_between = index > 1 && index <= relays;
         let least = config.min_separation_m / config.distance_m + 0.5 * FINEST_STEP;
         Hop {
-            gains: [there, back],
+            gains: self.of(index, relays, |gain, index| {
+                gain * chain.seat(index).power_w
+            }),
             reverse: chain.mission.reverse(),
             apart: is_between.then_some(square(least)),
         }

@@ -166,44 +166,39 @@ pub(crate) type Triple = [f32; 3];
 impl Coordinate {
     /// Returns (x, y, h) reordered: the coordinate `self` first, then the other two in their order.
     #[inline(never)] // called from many places
-    pub(crate) const fn first(self, [x, y, h]: Triple) -> Triple {
-        match self {
-            Self::X => [x, y, h],
-            Self::Y => [y, x, h],
-            Self::H => [h, x, y],
-        }
+    pub(crate) const fn first(self, at: Triple) -> Triple {
+        self.ordered(at)
     }
 
     /// Restores the order (x, y, h); the inverse of [`Coordinate::first`].
     #[inline(never)] // called from many places
-    pub(crate) const fn back(self, [first, second, third]: Triple) -> Triple {
-        match self {
-            Self::X => [first, second, third],
-            Self::Y => [second, first, third],
-            Self::H => [second, third, first],
-        }
+    pub(crate) const fn back(self, at: Triple) -> Triple {
+        self.restored(at)
     }
 
     /// Returns a symmetric matrix with rows and columns reordered as by [`Coordinate::first`].
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
-        self.first_row(bend).map(|row| self.first(row))
+        self.ordered(bend).map(|row| self.first(row))
     }
 
     /// Restores a matrix to rows and columns (x, y, h); the inverse of [`Coordinate::first_of`].
     pub(crate) fn back_of(self, bend: [Triple; 3]) -> [Triple; 3] {
-        let [a, b, c] = bend.map(|row| self.back(row));
-        match self {
-            Self::X => [a, b, c],
-            Self::Y => [b, a, c],
-            Self::H => [b, c, a],
-        }
+        self.restored(bend.map(|row| self.back(row)))
     }
 
-    const fn first_row(self, [x, y, h]: [Triple; 3]) -> [Triple; 3] {
+    const fn ordered<T: Copy>(self, [x, y, h]: [T; 3]) -> [T; 3] {
         match self {
             Self::X => [x, y, h],
             Self::Y => [y, x, h],
             Self::H => [h, x, y],
+        }
+    }
+
+    const fn restored<T: Copy>(self, [first, second, third]: [T; 3]) -> [T; 3] {
+        match self {
+            Self::X => [first, second, third],
+            Self::Y => [second, first, third],
+            Self::H => [second, third, first],
         }
     }
 }

@@ -24,8 +24,7 @@ pub(crate) struct Outlook {
     /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of their computed moves that this relay
     /// and the relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of their computed moves that this relay
-    /// and the relays toward Rx make.
+    /// Coefficient b of that gain, m.
     pub(crate) square: f32,
 }
 
@@ -194,22 +193,21 @@ impl Policy {
         let along_y = |h: f32| cut(-(gy + yh * h) / yy, ly, uy);
         let along_h = |y: f32| cut(-(gh + yh * y) / hh, lh, uh);
         let det = yy * hh - yh * yh;
+        let mut policy = Self {
+            rising: true,
+            ..Self::default()
+        };
+        let [fy, fh] = &mut policy.follow;
         if free_y && free_h && det > 0.0 {
             let y = (-gy * hh + gh * yh) / det;
             let h = (-gh * yy + gy * yh) / det;
             if y >= ly && y <= uy && h >= lh && h <= uh {
-                let mut follow = [[0.0; 3]; 2];
-                let [fy, fh] = &mut follow;
                 for (((fy, fh), ay), ah) in fy.iter_mut().zip(fh.iter_mut()).zip(ay).zip(ah) {
                     *fy = (-ay * hh + ah * yh) / det;
                     *fh = (-ah * yy + ay * yh) / det;
                 }
-                return Self {
-                    axis: Coordinate::X,
-                    rising: true,
-                    step: [y, h],
-                    follow,
-                };
+                policy.step = [y, h];
+                return policy;
             }
         }
         // Optimum on the edges of the box.
@@ -227,23 +225,13 @@ impl Policy {
             }
         }
         let (_, y, h) = best;
-        let mut follow = [[0.0; 3]; 2];
-        let [fy, fh] = &mut follow;
         if y > ly && y < uy {
-            for (cell, a) in fy.iter_mut().zip(ay) {
-                *cell = -a / yy;
-            }
+            *fy = ay.map(|a| -a / yy);
         } else if h > lh && h < uh {
-            for (cell, a) in fh.iter_mut().zip(ah) {
-                *cell = -a / hh;
-            }
+            *fh = ah.map(|a| -a / hh);
         }
-        Self {
-            axis: Coordinate::X,
-            rising: true,
-            step: [y, h],
-            follow,
-        }
+        policy.step = [y, h];
+        policy
     }
 
     /// Returns the relay's move in its two free coordinates, m; the third one follows from the hop.

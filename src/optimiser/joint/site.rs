@@ -10,7 +10,7 @@ use super::outlook::{Outlook, Policy};
 use crate::mission::{Band, Interferer, Mission};
 use crate::optimiser::spacing::Hop;
 use crate::place::{CrossSection, Placement};
-use crate::root::sqrt;
+use crate::root::{bisected, sqrt};
 use crate::sir::{Sender, in_noise, square};
 
 /// Fraction of a hop's squared maximum length that the joint method uses. The rest is a margin for rounding.
@@ -66,14 +66,6 @@ impl<'a> Site<'a> {
             } else {
                 f32::INFINITY
             },
-        }
-    }
-
-    /// Returns this relay without the required minimum separation from its sender.
-    pub(crate) fn unparted(self) -> Self {
-        Self {
-            apart_m: 0.0,
-            ..self
         }
     }
 
@@ -184,16 +176,11 @@ impl<'a> Site<'a> {
             altitude_m: near.altitude_m + share * (wanted.altitude_m - near.altitude_m),
         };
         let mut found = self.stretched(target, from_m, near)?;
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if let Some(place) = self.stretched(target, from_m, self.room.nearest(way(middle))) {
-                found = place;
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        bisected(0.0, 1.0, HALVINGS, |share: f32| {
+            let place = self.stretched(target, from_m, self.room.nearest(way(share)));
+            found = place.unwrap_or(found);
+            place.is_some()
+        });
         Some(found)
     }
 
@@ -212,7 +199,7 @@ impl<'a> Site<'a> {
     ) -> CrossSection {
         let target = target.min(self.most);
         let by = policy.apply(share, change);
-        let [_, a, b] = policy.axis.first(triple(nominal));
+        let [own, a, b] = policy.axis.first(triple(nominal));
         let (a, b) = (a + by[0], b + by[1]);
         match policy.axis {
             Coordinate::X => {
@@ -230,31 +217,17 @@ impl<'a> Site<'a> {
                     _ => wanted,
                 }
             }
-            Coordinate::Y => {
-                let b = self.room.band.nearest(b);
-                let y = self.along(
-                    policy,
-                    target,
-                    from,
-                    [a.max(from.x_m).min(self.distance_m), b],
-                );
-                CrossSection {
-                    y_m: y.unwrap_or(nominal.y_m),
-                    altitude_m: b,
-                }
-            }
-            Coordinate::H => {
-                let b = self.room.lateral.nearest(b);
-                let h = self.along(
-                    policy,
-                    target,
-                    from,
-                    [a.max(from.x_m).min(self.distance_m), b],
-                );
-                CrossSection {
-                    y_m: b,
-                    altitude_m: h.unwrap_or(nominal.altitude_m),
-                }
+            axis => {
+                let limits = if axis == Coordinate::Y {
+                    self.room.band
+                } else {
+                    self.room.lateral
+                };
+                let free = [a.max(from.x_m).min(self.distance_m), limits.nearest(b)];
+                let found = self.along(policy, target, from, free);
+                let [a, b] = free;
+                let [_, y_m, altitude_m] = axis.back([found.unwrap_or(own), a, b]);
+                CrossSection { y_m, altitude_m }
             }
         }
     }
@@ -438,6 +411,15 @@ impl Room {
         }
     }
 
+    /// Returns the largest lateral offset, m, on the side away from the interferer.
+    pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
+        if interferer.y_m > 0.0 {
+            self.lateral.least_m
+        } else {
+            self.lateral.most_m
+        }
+    }
+
     /// Returns the allowed lateral offset and altitude that are nearest to `at`.
     #[inline(never)] // called from many places
     pub const fn nearest(self, at: CrossSection) -> CrossSection {
@@ -477,16 +459,7 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
             let s = across + square(1.0 + t) * along;
             squared - t * (across - squared + along) - square(t) * along > noise * t * s * s
         };
-        let (mut low, mut high) = (0.0, -far);
-        for _ in 0..END_HALVINGS {
-            let t = 0.5 * (low + high);
-            if rises(t) {
-                low = t;
-            } else {
-                high = t;
-            }
-        }
-        far = -low;
+        far = -bisected(0.0, -far, END_HALVINGS, rises).0;
     }
     let at = room.nearest(CrossSection {
         y_m: far * m.y_m,
@@ -503,32 +476,6 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
         .nearest(CrossSection::default())
         .apart_squared(CrossSection::default());
     LITTLE * mission.receiver_gain(power_w) / across
-}
-
-/// Returns the last hop's maximum length for `target` less its length, m, and the derivatives.
-///
-/// This difference is the chain's slack. The derivatives are by the position of the last relay, which is at `at`, with `power_w` watts.
-/// `room` has the lateral offsets and altitudes from which the relay may choose.
-pub(super) fn tail(
-    mission: &Mission,
-    power_w: f32,
-    room: Room,
-    target: f32,
-    at: Placement,
-) -> (f32, Outlook) {
-    let most = last_most(mission, power_w, room);
-    let reach_m = sqrt(mission.receiver_gain(power_w) / target.min(most));
-    let (slack, outlook) = Outlook::tail(reach_m, mission.config().distance_m, at);
-    if target > most {
-        return (
-            slack,
-            Outlook {
-                by_target: 0.0,
-                ..outlook
-            },
-        );
-    }
-    (slack, outlook)
 }
 
 /// Weight of the penalty for a violated minimum separation. The unit is the distance from Tx to Rx. The weight is so large that no gain of

@@ -44,8 +44,7 @@ pub(super) enum Start {
     Far,
 }
 
-/// Parabolas that are tried as initial chains. Each has the lateral offset and the height of its middle, in units of
-/// half the distance from Tx to Rx.
+/// Parabolas that are tried as initial chains: `aside` and `up` of each, as in [`Start::Arch`].
 const ARCHES: [(f32, f32); 7] = [
     (0.0, 0.0),
     (0.0, 1.0),
@@ -59,9 +58,7 @@ const ARCHES: [(f32, f32); 7] = [
 /// Number of first entries of [`ARCHES`] that are also tried without the minimum separation of relays.
 const THROUGH: usize = 3;
 
-/// Initial chains for relays of which some have a fixed altitude. Each has the lateral offset of its middle, in units
-/// of half the distance from Tx to Rx. The `bool` is true if the altitude is constant before the first and after the
-/// last fixed one.
+/// Initial chains for relays of which some have a fixed altitude, as in [`Start::FixedAltitudes`].
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -71,9 +68,7 @@ const HELD: [(f32, bool); 6] = [
     (0.25, true),
 ];
 
-/// Spiral initial chains: `aside`, `up` and `far` of each. `aside` and `up` are the direction of an intermediate
-/// position from the interferer. `far` is its distance from the interferer, relative to the geometric mean of those
-/// of Tx and Rx.
+/// Spiral initial chains: `aside`, `up` and `far` of each, as in [`Start::Around`].
 const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 1.0),
     (1.0, 0.0, 1.0),
@@ -302,8 +297,8 @@ impl Seek {
 
     /// Records if the chain meets the target that was tried; returns true if there is another one to try.
     ///
-    /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
+    /// `met` is `None` if the target is infeasible, else true if some relays have to stay short of their farthest
+    /// positions to meet it.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),

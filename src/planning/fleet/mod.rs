@@ -18,9 +18,9 @@
 //! within the reach of the first hop.
 
 use crate::mission::{MAX_RELAYS, Mission, Profile};
-use crate::optimiser::pass::{Walk, before};
-use crate::optimiser::spacing::RequiredPosition;
+use crate::optimiser::pass::{Walk, origin};
 use crate::place::Placement;
+use crate::root::bisected;
 #[cfg(feature = "internals")]
 use crate::root::sqrt;
 use crate::side::Heading;
@@ -99,17 +99,12 @@ impl Most {
         if let Some(most) = meets(ceiling) {
             return Some(most);
         }
-        let (mut low, mut high) = (libm::logf(DEPTH), 0.0);
         let mut best = None;
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if let Some(most) = meets(ceiling * libm::expf(middle)) {
-                best = Some(most);
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        bisected(libm::logf(DEPTH), 0.0, HALVINGS, |sigma| {
+            let most = meets(ceiling * libm::expf(sigma));
+            best = most.or(best);
+            most.is_some()
+        });
         best
     }
 }
@@ -128,7 +123,8 @@ impl Mission {
         let Some(places) = places.get_mut(..usize::from(self.relays())) else {
             return false;
         };
-        required_places(self, target, &profile_of, places)
+        let chain = Walk::new(self, target, false, &profile_of);
+        settled(&chain, places).is_some() || settled(&chain.plainly(), places).is_some()
     }
 }
 
@@ -158,7 +154,7 @@ fn fewest_by_reaches(
         // Profiles are indexed from Tx, so every number of relays is another chain.
         Heading::TowardTx => (1..=MAX_RELAYS)
             .map_while(|relays| mission.with_relays(relays).ok())
-            .find(|mission| chain(mission, target, profile_of).is_met())
+            .find(|mission| Walk::new(mission, target, false, profile_of).is_met())
             .map(|mission| Fewest {
                 relays: mission.relays(),
                 proven: false,
@@ -177,7 +173,7 @@ fn toward_rx(
     for index in 1..=MAX_RELAYS {
         let mission = mission.with_relays(index).ok()?;
         // The last relay of its chain may go to the very end.
-        let last = chain(&mission, target, profile_of);
+        let last = Walk::new(&mission, target, false, profile_of);
         let link = last.link(index);
         let before_m = from_m;
         from_m = link.reach(target, from_m)?;
@@ -199,39 +195,12 @@ fn toward_rx(
     None
 }
 
-fn chain<'a, F: Fn(u16) -> Profile>(
-    mission: &'a Mission,
-    target: f32,
-    profile_of: &'a F,
-) -> Walk<'a, F> {
-    Walk {
-        mission,
-        target,
-        plain: false,
-        profile_of,
-    }
-}
-
-fn required_places(
-    mission: &Mission,
-    target: f32,
-    profile_of: &impl Fn(u16) -> Profile,
-    places: &mut [Placement],
-) -> bool {
-    let chain = chain(mission, target, profile_of);
-    let plain = Walk {
-        plain: true,
-        ..chain
-    };
-    settled(&chain, places).is_some() || settled(&plain, places).is_some()
-}
-
 /// Writes positions that meet the target to `places`; `None` if there are none. It first computes each relay's reach,
 /// the farthest x at which its hop meets the target; then, from the last relay back, the x that the next hop
 /// requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
-    let (slack, mut place) = chain.ends(|index, reach| {
+    let (slack, place) = chain.ends(|index, reach| {
         if let Some(own) = places.get_mut(slot(index)) {
             *own = chain.link(index).own.cross_section.at(reach);
         }
@@ -239,27 +208,14 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
     if !(slack >= 0.0) {
         return None;
     }
-    let mut at = match chain.mission.heading() {
-        Heading::TowardRx => chain.mission.relays(),
-        Heading::TowardTx => 1,
-    };
-    loop {
+    chain.settle(place, |at, place, before| {
         places.get_mut(slot(at))?.x_m = place;
-        let before = before(chain.mission, at);
-        let from_m = match before {
-            Some(index) => places.get(slot(index))?.x_m,
-            None => crate::optimiser::pass::origin(chain.mission),
-        };
-        place = match chain
-            .link(at)
-            .required_position(chain.target, from_m, place)?
-        {
-            RequiredPosition::AtReach => from_m,
-            RequiredPosition::At(x_m) => x_m,
-        };
-        let Some(index) = before else { return Some(()) };
-        at = index;
-    }
+        match before {
+            Some(index) => Some(places.get(slot(index))?.x_m),
+            None => Some(origin(chain.mission)),
+        }
+    })?;
+    Some(())
 }
 
 /// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
@@ -269,13 +225,7 @@ const MORE: u16 = 32;
 const TARGETS: u8 = 48;
 
 fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
-    let chain = Walk {
-        mission,
-        target,
-        plain: false,
-        profile_of: &|_| profile,
-    };
-    chain.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
+    Walk::new(mission, target, false, &|_| profile).closes()
 }
 
 /// Returns the minimum number of relays for `target` in an interference field; `None` if there is none. All relays

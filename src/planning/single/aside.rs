@@ -70,10 +70,11 @@
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use super::Found;
-use super::edge::{Edge, TwoHops, best_in_corridor, narrow, touching_inside};
+use super::edge::{Edge, best_in_corridor, narrow, squared, touching_inside};
+use super::{Found, TwoHops};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::place::Placement;
+use crate::root::bisected;
 
 pub use super::edge::EdgeCoordinate;
 
@@ -272,16 +273,9 @@ impl Plane {
         if self.first(hill) <= self.second(far) {
             return (hill, AsideCase::Hilltop);
         }
-        let (mut low, mut high) = (0.0, far);
-        for _ in 0..HALVINGS {
-            let s = 0.5 * (low + high);
-            if self.first(self.loudest(s)) < self.second(s) {
-                low = s;
-            } else {
-                high = s;
-            }
-        }
-        (self.loudest(high), AsideCase::Touching)
+        let is_inside = |s| self.first(self.loudest(s)) < self.second(s);
+        let (_, s) = bisected(0.0, far, HALVINGS, is_inside);
+        (self.loudest(s), AsideCase::Touching)
     }
 
     /// Returns the first hop's SIR over its gain A, with the relay at (x, y) in this plane.
@@ -301,17 +295,11 @@ impl Plane {
         if !(self.noise > 0.0) {
             return t;
         }
-        let (mut low, mut high) = (0.0, t);
-        for _ in 0..HALVINGS {
-            let t = 0.5 * (low + high);
+        let rises = |t: f64| {
             let s = squared(1.0 + t) * q + self.h2;
-            if self.h2 > t * q + squared(t) * q + self.noise * t * squared(s) {
-                low = t;
-            } else {
-                high = t;
-            }
-        }
-        low
+            self.h2 > t * q + squared(t) * q + self.noise * t * squared(s)
+        };
+        bisected(0.0, t, HALVINGS, rises).0
     }
 
     /// Returns the point on a circle about Rx at which the first hop has its largest SIR, with noise. The point is (x, y), m. `s` is the
@@ -323,22 +311,16 @@ impl Plane {
         if !(squared(self.x) + squared(self.y) > 0.0) {
             far = 0.0;
         }
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
-            let part = 0.5 * (low + high);
+        let rises = |part: f64| {
             let w = part * far;
             let (x, y) = at(w);
             let (dx, dy) = (s * libm::sin(w) * far, s * libm::cos(w) * far);
             let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
             let from = squared(x) + squared(y) + self.h2;
             let more = (x - self.x) * dx + (y - self.y) * dy;
-            if more * from > (x * dx + y * dy) * heard * (1.0 + self.noise * heard) {
-                low = part;
-            } else {
-                high = part;
-            }
-        }
-        at(low * far)
+            more * from > (x * dx + y * dy) * heard * (1.0 + self.noise * heard)
+        };
+        at(bisected(0.0, 1.0, HALVINGS, rises).0 * far)
     }
 
     /// Returns the second hop's SIR over the first hop's gain A. `s` is the relay's distance from Rx along the
@@ -368,8 +350,4 @@ impl Plane {
             (self.d - s, 0.0)
         }
     }
-}
-
-fn squared(x: f64) -> f64 {
-    x * x
 }

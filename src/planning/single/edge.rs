@@ -65,10 +65,11 @@
 //! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
 //! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
-use super::{Found, HALVINGS};
+use super::{Found, HALVINGS, TwoHops};
 use crate::mission::{Band, Interferer, Mission};
 use crate::place::Placement;
-use crate::sir::{self, Sender};
+use crate::root::bisected;
+use crate::sir::Slope;
 
 /// Coordinate that varies along an edge of the box in which a relay may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -81,28 +82,6 @@ pub enum EdgeCoordinate {
     Across = 5,
     /// Vertical edge: the altitude varies.
     Upward = 6,
-}
-
-/// SIRs of both hops of a mission with a single relay, for any position of that relay.
-#[derive(Clone, Copy)]
-pub(super) struct TwoHops<'a> {
-    pub(super) mission: &'a Mission,
-    pub(super) power_w: f32,
-}
-
-impl TwoHops<'_> {
-    fn both(&self, at: Placement) -> (f32, f32) {
-        let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
-        (first, sir::at_receiver(self.mission, at, self.power_w))
-    }
-
-    pub(super) fn found(&self, place: Placement) -> Found {
-        let (first, second) = self.both(place);
-        Found {
-            place,
-            sir: first.min(second),
-        }
-    }
 }
 
 /// Edge of the box in which a relay may be. On it the coordinate `free` varies within `room`, m, and the other two
@@ -129,7 +108,6 @@ impl Edge {
     /// are NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
-        let squared = |x: f64| x * x;
         let at = self.through;
         let (x, y, h) = (wide(at.x_m), wide(at.y_m), wide(at.altitude_m));
         let (past, beside) = (wide(interferer.x_m), wide(interferer.y_m));
@@ -158,11 +136,8 @@ impl Edge {
             let [behind, valley, hill] = noisy_turns(p, a, b, noise).map(narrow);
             return [behind, valley, hill, end];
         }
-        let half = 0.5 * (squared(p) + a - b);
-        // The larger root first, the other one from their product: neither cancels.
-        let root = libm::sqrt(squared(half) + squared(p) * b);
-        let sum = half + libm::copysign(root, half);
-        [narrow(sum / p), narrow(-p * b / sum), end, f32::NAN]
+        let [one, other] = noise_free_turns(p, a, b).map(narrow);
+        [one, other, end, f32::NAN]
     }
 
     /// Returns the position on the edge with the best SIR of the worse hop.
@@ -198,20 +173,8 @@ impl Edge {
         if !apart || better(at_low) == better(at_high) {
             return end;
         }
-        let (mut low, mut high) = (low, high);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if !(middle > low && middle < high) {
-                break;
-            }
-            if better(both(middle)) == better(at_low) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let crossing = hops.found(self.place(low));
-        end.or(crossing).or(hops.found(self.place(high)))
+        let is_low = |t| better(both(t)) == better(at_low);
+        end.or(hops.crossing(low, high, is_low, |t| self.place(t)))
     }
 }
 
@@ -234,8 +197,14 @@ pub(super) fn narrow(value: f64) -> f32 {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Maximum number of doublings of t until a condition no longer holds.
-const DOUBLINGS: u8 = 100;
+/// Returns the two t, m, at which the first hop's SIR has an extremum on an edge, without noise.
+fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
+    let half = 0.5 * (squared(p) + a - b);
+    // The larger root first, the other one from their product: neither cancels.
+    let root = libm::sqrt(squared(half) + squared(p) * b);
+    let sum = half + libm::copysign(root, half);
+    [sum / p, -p * b / sum]
+}
 
 /// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. Missing ones are NaN.
 ///
@@ -253,85 +222,20 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
     }
     let slope = Slope {
         p: libm::fabs(p),
+        q: p * p + a - b,
         a,
         b,
         noise,
+        halvings: NOISY_HALVINGS,
     };
-    slope.turns().map(|t| libm::copysign(1.0, p) * t)
-}
-
-/// Function phi(t) with the sign of the slope of the first hop's SIR along an edge, for t > 0. t is the position on
-/// the edge. `p`, the t closest to the interferer, is above 0.
-struct Slope {
-    p: f64,
-    a: f64,
-    b: f64,
-    noise: f64,
-}
-
-impl Slope {
-    fn phi(&self, t: f64) -> f64 {
-        let Self { p, a, b, noise } = *self;
-        let s = (t - p) * (t - p) + a;
-        p * t - (p * p + a - b) - p * b / t - noise * s * s
-    }
-
-    fn bend(&self, t: f64) -> f64 {
-        let Self { p, a, b, noise } = *self;
-        let s = (t - p) * (t - p) + a;
-        p + p * b / (t * t) - 4.0 * noise * s * (t - p)
-    }
-
-    fn turns(&self) -> [f64; 3] {
-        let Self { p, a, b, .. } = *self;
-        let half = 0.5 * (p * p + a - b);
-        let root = libm::sqrt(half * half + p * p * b);
-        // Extrema without noise; neither cancels.
-        let (valley, before) = if half > 0.0 {
-            ((half + root) / p, p * b / (half + root))
-        } else {
-            (p * b / (root - half), (root - half) / p)
-        };
-        let behind = -last(0.0, before, |t| self.phi(-t) > 0.0);
-        let rises = |t: f64| self.bend(t) > 0.0;
-        let none = [behind, f64::NAN, f64::NAN];
-        if !rises(valley) {
-            return none;
-        }
-        let top = last(valley, beyond(valley, rises), rises);
-        let above = |t: f64| self.phi(t) > 0.0;
-        if !above(top) {
-            return none;
-        }
-        let low = last(valley, top, |t| !above(t));
-        [behind, low, last(top, beyond(top, above), above)]
-    }
-}
-
-/// Returns the last t in [`low`, `high`] at which `holds` returns true. It must be true at `low` and become false
-/// once.
-fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (low, high);
-    for _ in 0..NOISY_HALVINGS {
-        let middle = 0.5 * (low + high);
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
-}
-
-fn beyond(from: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    let mut at = 2.0 * from;
-    for _ in 0..DOUBLINGS {
-        if !holds(at) {
-            break;
-        }
-        at *= 2.0;
-    }
-    at
+    let [one, other] = noise_free_turns(slope.p, a, b);
+    let (behind, valley) = (one.min(other), one.max(other));
+    let [low, high] = slope.valley_and_hill(valley).unwrap_or([f64::NAN; 2]);
+    let mirrored = Slope {
+        p: -slope.p,
+        ..slope
+    };
+    [-mirrored.hill(-behind), low, high].map(|t| libm::copysign(1.0, p) * t)
 }
 
 /// Number of lines of constant y on either side of y = 0 that the search at one altitude evaluates.
@@ -443,17 +347,11 @@ pub(super) fn touching_inside(
     if !(face.noise > 0.0 && face.x < face.d) {
         return None;
     }
-    let (mut low, mut high) = (0.0, libm::hypot(face.d, f64::from(band.most_m)));
-    for _ in 0..HALVINGS {
-        let r = 0.5 * (low + high);
-        if face.first(r) < face.g / (squared(r) + face.y) {
-            low = r;
-        } else {
-            high = r;
-        }
-    }
-    let z = face.best(high);
-    let across = squared(high) - squared(z);
+    let farthest = libm::hypot(face.d, f64::from(band.most_m));
+    let is_inside = |r| face.first(r) < face.g / (squared(r) + face.y);
+    let (_, r) = bisected(0.0, farthest, HALVINGS, is_inside);
+    let z = face.best(r);
+    let across = squared(r) - squared(z);
     let place = Placement {
         x_m: narrow(face.d + z),
         y_m,
@@ -496,6 +394,6 @@ impl Face {
     }
 }
 
-fn squared(x: f64) -> f64 {
+pub(super) fn squared(x: f64) -> f64 {
     x * x
 }

@@ -45,48 +45,96 @@ impl Found {
     }
 }
 
-/// SIRs of both hops of a chain with a single relay, above the line Tx to Rx at one altitude.
+/// SIRs of both hops of a mission with a single relay, for any position of that relay.
 #[derive(Clone, Copy)]
-struct Two<'a> {
+struct TwoHops<'a> {
     mission: &'a Mission,
-    profile: Profile,
+    power_w: f32,
 }
 
-impl Two<'_> {
-    fn at(&self, x_m: f32) -> Placement {
-        Placement::on_line(x_m, self.profile.altitude_m)
+impl TwoHops<'_> {
+    fn both(&self, at: Placement) -> (f32, f32) {
+        let first = Sender::transmitter(self.mission).sir_at(self.mission, 0.0, at);
+        (first, sir::at_receiver(self.mission, at, self.power_w))
     }
 
-    fn first(&self, x_m: f32) -> f32 {
-        Sender::transmitter(self.mission).sir_at(self.mission, 0.0, self.at(x_m))
-    }
-
-    fn second(&self, x_m: f32) -> f32 {
-        sir::at_receiver(self.mission, self.at(x_m), self.profile.power_w)
-    }
-
-    fn found(&self, x_m: f32) -> Found {
+    fn found(&self, place: Placement) -> Found {
+        let (first, second) = self.both(place);
         Found {
-            place: self.at(x_m),
-            sir: self.first(x_m).min(self.second(x_m)),
+            place,
+            sir: first.min(second),
         }
     }
 
-    /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's. Of the
-    /// two adjacent f32 values of x it is the better one.
-    fn crossing(&self, low: f32, high: f32) -> Found {
+    /// Returns the position on a line where both hops have the same SIR. Of the two adjacent f32 values of the
+    /// varying coordinate it is the better one.
+    ///
+    /// `is_low` returns true for a value of that coordinate, from `low` to `high`, m, before the position; `place`
+    /// returns the position for it.
+    fn crossing(
+        &self,
+        low: f32,
+        high: f32,
+        is_low: impl Fn(f32) -> bool,
+        place: impl Fn(f32) -> Placement,
+    ) -> Found {
         let (mut low, mut high) = (low, high);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
             if !(middle > low && middle < high) {
                 break;
             }
-            if self.first(middle) > self.second(middle) {
+            if is_low(middle) {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        self.found(low).or(self.found(high))
+        self.found(place(low)).or(self.found(place(high)))
+    }
+}
+
+/// SIRs of both hops of a chain with a single relay, above the line Tx to Rx at one altitude.
+#[derive(Clone, Copy)]
+struct Two<'a> {
+    hops: TwoHops<'a>,
+    altitude_m: f32,
+}
+
+impl<'a> Two<'a> {
+    const fn new(mission: &'a Mission, profile: Profile) -> Self {
+        let power_w = profile.power_w;
+        Self {
+            hops: TwoHops { mission, power_w },
+            altitude_m: profile.altitude_m,
+        }
+    }
+
+    fn at(&self, x_m: f32) -> Placement {
+        Placement::on_line(x_m, self.altitude_m)
+    }
+
+    fn first(&self, x_m: f32) -> f32 {
+        let mission = self.hops.mission;
+        Sender::transmitter(mission).sir_at(mission, 0.0, self.at(x_m))
+    }
+
+    fn second(&self, x_m: f32) -> f32 {
+        sir::at_receiver(self.hops.mission, self.at(x_m), self.hops.power_w)
+    }
+
+    fn found(&self, x_m: f32) -> Found {
+        self.hops.found(self.at(x_m))
+    }
+
+    /// Returns true if the first hop's SIR is at most the second's at `x_m`.
+    fn is_first_worse(&self, x_m: f32) -> bool {
+        self.first(x_m) <= self.second(x_m)
+    }
+
+    /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's.
+    fn crossing(&self, low: f32, high: f32) -> Found {
+        let is_low = |x_m| self.first(x_m) > self.second(x_m);
+        self.hops.crossing(low, high, is_low, |x_m| self.at(x_m))
     }
 }

@@ -73,8 +73,8 @@
 //! Computed in f64, and so exact to the last place of the f32 result. Accuracy: `the_locus_is_where_the_hops_are_equal` in
 //! `host-tests/tests/theorems/`.
 
-use super::edge::{TwoHops, touching_inside};
-use super::{Found, Two};
+use super::edge::{narrow, squared, touching_inside};
+use super::{Found, Two, TwoHops};
 use crate::mission::{Band, Interferer, Mission, Profile};
 use crate::root::sqrt;
 use crate::sir::{Extremum, first_hop_turn, square};
@@ -136,21 +136,20 @@ impl PlaceCase {
 /// Valid for any valid mission. Work: at most 90 evaluations of both hops, and with noise 230 more.
 pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, PlaceCase)> {
     let interferer = mission.interferer()?;
-    let two = Two { mission, profile };
+    let two = Two::new(mission, profile);
     let end_m = mission.config().distance_m;
     let above_rx = two.found(end_m);
     if !(two.second(end_m) > 0.0) {
         return Some((above_rx, PlaceCase::Drowned));
     }
-    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     // End of the falling part of SIR_1, and true if it rises again before Rx.
     let turn = first_hop_turn(mission, interferer, profile.altitude_m);
     let (to, valley) = match turn {
         Extremum::Level => return Some((above_rx, PlaceCase::Level)),
         Extremum::Hill(peak) => {
-            return Some(if peak >= end_m || !worse_first(end_m) {
+            return Some(if peak >= end_m || !two.is_first_worse(end_m) {
                 (above_rx, PlaceCase::HillAboveRx)
-            } else if worse_first(peak) {
+            } else if two.is_first_worse(peak) {
                 (two.found(peak), PlaceCase::Hilltop)
             } else {
                 (two.crossing(peak, end_m), PlaceCase::BeyondHill)
@@ -165,7 +164,7 @@ pub fn best_at_altitude(mission: &Mission, profile: Profile) -> Option<(Found, P
         return Some((two.found(0.0), PlaceCase::AboveTx));
     }
     let second = second_hill(two, turn, end_m);
-    let first = match (worse_first(to), valley) {
+    let first = match (two.is_first_worse(to), valley) {
         (true, false) => (two.crossing(0.0, to), PlaceCase::Crossing),
         (true, true) => (two.crossing(0.0, to).or(above_rx), PlaceCase::BeforeValley),
         (false, false) => (above_rx, PlaceCase::AboveRx),
@@ -185,13 +184,12 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     let Extremum::ValleyAndHill(_, hill) = turn else {
         return None;
     };
-    let worse_first = |x_m: f32| two.first(x_m) <= two.second(x_m);
     if !(hill < end_m) {
         return None;
     }
-    Some(if worse_first(hill) {
+    Some(if two.is_first_worse(hill) {
         two.found(hill)
-    } else if worse_first(end_m) {
+    } else if two.is_first_worse(end_m) {
         two.crossing(hill, end_m)
     } else {
         two.found(end_m)
@@ -236,12 +234,12 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
         return None;
     }
     let band = mission.config().band;
-    let at = |altitude_m: f32| Two {
-        mission,
-        profile: Profile {
+    let at = |altitude_m: f32| {
+        let profile = Profile {
             altitude_m,
             power_w,
-        },
+        };
+        Two::new(mission, profile)
     };
     let (rises, top_m) = rising(mission, interferer, x_m, band);
     let (lowest, highest) = (at(band.least_m), at(top_m));
@@ -355,7 +353,7 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
         altitude_m,
         power_w: config.common.power_w,
     };
-    let two = Two { mission, profile };
+    let two = Two::new(mission, profile);
     let present = config.tx_power_w / profile.power_w;
     let equal_at = |x_m: f32| present * (two.second(x_m) / two.first(x_m));
     Some(Guide {
@@ -380,7 +378,6 @@ pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32
         return [None; 2];
     };
     let wide = |x: f32| f64::from(x);
-    let squared = |x: f64| x * x;
     let x = wide(x_m);
     let a = squared(x - wide(interferer.x_m)) + squared(wide(interferer.y_m));
     let b = squared(x);
@@ -403,12 +400,4 @@ pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32
     let far = far / square;
     [near.min(far), near.max(far)]
         .map(|u| (u > 0.0 && u.is_finite()).then(|| narrow(libm::sqrt(u))))
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "an altitude is given as an f32"
-)]
-fn narrow(value: f64) -> f32 {
-    value as f32
 }

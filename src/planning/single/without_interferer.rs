@@ -86,7 +86,7 @@ fn best_of(two: &Two, low: f32, high: f32) -> Found {
 /// loop.
 pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.heard()?;
-    let two = Two { mission, profile };
+    let two = Two::new(mission, profile);
     let end_m = mission.config().distance_m;
     let mut best = two.found(0.0);
     let mut from = 0.0_f32;
@@ -137,7 +137,7 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
 /// field that changes much between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
-    let two = Two { mission, profile };
+    let two = Two::new(mission, profile);
     let end_m = mission.config().distance_m;
     let start = two.second(end_m);
     let mut best: Option<Found> = None;

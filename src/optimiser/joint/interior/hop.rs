@@ -17,13 +17,18 @@
 //! The first has a convex direction, along the hop, and the second all across the direction to the interferer. In *convex* mode
 //! those are left out, so that the matrix of [`newton`](super::newton) is positive definite.
 
-use super::super::chain::{Seat, SolverContext};
+use super::super::chain::{Chain, Gains, SeatOf};
 use super::super::hop::{Triple, minus};
-use crate::sir::{Sender, transmitter_gain};
 
 /// Amount added to each squared hop length, so that its logarithm is finite. In units of the squared distance Tx to
 /// Rx.
 const SHORTEST: f32 = 1e-8;
+
+/// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
+///
+/// The factor r is the required ratio of backward to forward SIR. Other values for the two directions of a hop have the
+/// same order. The *slack* of a level is its excess over the target.
+pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
@@ -60,127 +65,71 @@ fn add_to_diagonal([xx, _, _, yy, _, hh]: &mut Symmetric, value: f32) {
     *hh += value;
 }
 
-/// Logarithms of the gains from which the SIR of each hop is computed. The SIR is the gain times the inverse
-/// interference at the receiver, over the squared hop length; at Rx and Tx the gain includes the interference.
-/// Lengths are in units of the distance from Tx to Rx.
+/// Logarithms of the gains of all hops, for relays of the mission's common power.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gains {
-    /// Position (x, y, h) of the interferer, in units of the distance from Tx to Rx.
-    source: Triple,
-    /// Receiver noise over the interferer's power received at the distance D (nu). D is the distance from Tx to Rx.
-    noise: f32,
+pub(super) struct LogGains {
+    gains: Gains,
     common_w: f32,
-    /// Logarithm of the gain of a hop between relays, if the sender has the mission's common relay power. The hop's
-    /// SIR is its gain times the inverse interference at the receiver, over the squared length.
-    relay: f32,
-    /// Logarithm of the gain of the hop to Rx, if the sender has the mission's common relay power. The SIR at Rx is
-    /// the gain over the squared length.
-    to_rx: f32,
-    /// Logarithm of the gain of the return hop to Tx, if the sender has the mission's common relay power. The SIR at
-    /// Tx is the gain over the squared length.
-    to_tx: f32,
-    /// Logarithm of the gain of the hop from Tx to a relay. The hop's SIR is its gain times the inverse interference
-    /// at the relay, over the squared length.
-    from_tx: f32,
-    /// Logarithm of the gain of the return hop from Rx to a relay. The hop's SIR is its gain times the inverse
-    /// interference at the relay, over the squared length.
-    from_rx: f32,
     /// Logarithm of r, the required ratio of backward to forward SIR.
     reverse: f32,
 }
 
-impl Gains {
+impl LogGains {
     pub(super) const NONE: Self = Self {
-        source: [0.0; 3],
-        noise: 0.0,
+        gains: Gains::NONE,
         common_w: 0.0,
-        relay: 0.0,
-        to_rx: 0.0,
-        to_tx: 0.0,
-        from_tx: 0.0,
-        from_rx: 0.0,
         reverse: 0.0,
     };
 
-    pub(super) fn new(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Self {
-        let (mission, interferer) = (chain.mission, chain.interferer);
-        let d = mission.config().distance_m;
-        let common_w = mission.config().common.power_w;
-        let on_ground = |gain: f32| libm::logf(gain / d / d);
-        let from_rx = Sender::receiver(mission).gain.value();
+    pub(super) fn new(chain: &Chain<'_, impl SeatOf>) -> Self {
+        let common_w = chain.mission.config().common.power_w;
         Self {
-            source: [interferer.x_m / d, interferer.y_m / d, 0.0],
-            noise: mission.noise_at_a_metre() * d * d,
+            gains: Gains::new(chain, common_w, libm::logf),
             common_w,
-            relay: libm::logf(mission.relay_gain(common_w).value()),
-            to_rx: on_ground(mission.receiver_gain(common_w)),
-            to_tx: on_ground(transmitter_gain(mission, common_w)),
-            from_tx: libm::logf(mission.tx_gain().value()),
-            from_rx: libm::logf(from_rx),
-            reverse: libm::logf(mission.reverse()),
+            reverse: libm::logf(chain.mission.reverse()),
         }
     }
 
-    /// Returns the logarithms of two gains of hop `k`: forward (toward Rx), and backward divided by r. r is the
-    /// required ratio of backward to forward SIR. `k` is 1 (from Tx) to N + 1 (to Rx).
-    fn of(&self, k: u16, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> [f32; 2] {
-        let relays = chain.mission.relays();
-        let power = |index: u16| {
-            let power_w = (chain.seat_of)(index).power_w;
+    /// Returns the logarithms of both gains of hop `k`, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
+    fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
+        let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
+            let power_w = chain.seat(index).power_w;
             if power_w.to_bits() == self.common_w.to_bits() {
-                0.0
+                gain
             } else {
-                libm::logf(power_w / self.common_w)
+                gain + libm::logf(power_w / self.common_w)
             }
-        };
-        let there = match k {
-            1 => self.from_tx,
-            _ if k > relays => self.to_rx + power(k - 1),
-            _ => self.relay + power(k - 1),
-        };
-        let back = match k {
-            _ if k > relays => self.from_rx,
-            1 => self.to_tx + power(k),
-            _ => self.relay + power(k),
-        };
+        });
         [there, back - self.reverse]
     }
 
     /// Returns ln q at the position `at`; q is the inverse of interference plus noise. Interference is relative to
     /// the interferer's power at the distance from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
-        let w = minus(at, self.source);
+        let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
-        libm::logf(s / (1.0 + self.noise * s))
+        libm::logf(s / (1.0 + self.gains.noise * s))
     }
 
-    /// Returns the two levels of hop `k`: ln(forward SIR), and ln(backward SIR / r). r is the required ratio of
-    /// backward to forward SIR. The hop leads from `from` to `to`; `quiet_from` and `quiet_to` are ln(inverse
-    /// interference) at these two positions.
+    /// Returns the levels of hop `k` from `from` to `to`. `quiet_from` and `quiet_to` are ln q there.
     pub(super) fn levels(
         &self,
         k: u16,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         [from, to]: [Triple; 2],
         [quiet_from, quiet_to]: [f32; 2],
-    ) -> [f32; 2] {
+    ) -> Levels {
         let v = minus(to, from);
         let length = libm::logf(dot(&v, &v) + SHORTEST);
         let [there, back] = self.of(k, chain);
-        let there = there
-            + if k > chain.mission.relays() {
-                0.0
-            } else {
-                quiet_to
-            };
+        let there = there + if k > chain.relays() { 0.0 } else { quiet_to };
         let back = back + if k > 1 { quiet_from } else { 0.0 };
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s two levels by the positions of its ends `from` and `to`. The levels are
-    /// ln(forward SIR) and ln(backward SIR / r); r is the required ratio of backward to forward SIR. The second
-    /// derivatives are summed with the `weights` of both levels, and negated. If `convex` is true, terms that would
-    /// make that sum indefinite are left out.
+    /// Returns the derivatives of hop `k`'s levels by the positions of its ends `from` and `to`. The second ones are
+    /// summed with the `weights` of both levels. If `convex` is true, terms that would make that sum indefinite are
+    /// left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -230,12 +179,12 @@ impl Gains {
         slope: &mut Triple,
         bend: &mut Symmetric,
     ) {
-        let w = minus(at, self.source);
+        let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
-        let inverse = 1.0 / (1.0 + self.noise * s);
+        let inverse = 1.0 / (1.0 + self.gains.noise * s);
         let (first, second) = (
             inverse / s,
-            (self.noise * inverse) * (self.noise * inverse) - 1.0 / (s * s),
+            (self.gains.noise * inverse) * (self.gains.noise * inverse) - 1.0 / (s * s),
         );
         add_scaled(slope, &w, 2.0 * first);
         if convex {
@@ -248,8 +197,7 @@ impl Gains {
     }
 }
 
-/// Derivatives of a hop's two levels by the positions of its ends. The levels are ln(forward SIR) and ln(backward SIR
-/// / r); r is the required ratio of backward to forward SIR. The second derivatives (`bend...`) are weighted sums
+/// Derivatives of a hop's levels by the positions of its ends. The second derivatives (`bend...`) are weighted sums
 /// over both levels, negated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {

@@ -18,6 +18,9 @@
 //! | `hop` | levels of a hop and their derivatives |
 //! | `newton` | block tridiagonal system of a step |
 //!
+//! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are the Lagrange
+//! multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the merit gains little.
+//!
 //! This file has the state and one portion of the work. Lengths are in units of D; across the line the positions are stored as
 //! those of the other solver, six bytes each. The memory of a segment of ten relays has its front during the elimination, and
 //! then its steps.
@@ -25,52 +28,46 @@
 mod hop;
 mod newton;
 
-use super::chain::{Seat, SolverContext};
+use super::chain::{Chain, SeatOf};
 use super::hop::{Triple, minus};
 use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
-use hop::{Derivatives, Gains, add_scaled, dot};
+use hop::{Derivatives, Levels, LogGains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight mu of the interior-point method for a start far from the result. It is divided among all hops
-/// and directions.
+/// First barrier weight for a start far from the result.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight mu of the interior-point method for a start near the result. It is divided among all hops and
-/// directions.
+/// First barrier weight for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight mu of the interior-point method, divided among all hops and directions. The result is within
-/// this of a local optimum, in ln(SIR), if the problem is concave around it.
+/// Last barrier weight. The result is within this of a local optimum, in ln(SIR), if the problem is concave around it.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the interior-point method's barrier weight mu falls once positions have settled.
+/// Factor by which the barrier weight falls once the positions have settled.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
-/// number of levels. For steps of more than half a Newton step.
+/// Gain of the merit, over the barrier weight, below which positions have settled. For more than half a Newton step.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit (target plus barrier) below which positions count as settled. It is in units of mu times the
-/// number of levels. For Newton steps shortened by any factor.
+/// Gain of the merit, over the barrier weight, below which positions have settled. For any fraction of a Newton step.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
 /// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened after a try that lowers the merit (target plus barrier).
+/// Factor by which a Newton step is shortened after a try that lowers the merit.
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and mu / s, its value at the optimum. mu is the barrier weight, s the
-/// excess of ln(SIR) of a hop over the target. Multipliers outside are moved to the limit.
+/// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers outside are moved to the limit.
 const APART: f32 = 5.0;
 
-/// Number of Newton steps for the target T that one call makes. T is slightly below the worst SIR, in ln(SIR).
+/// Number of Newton steps for the target that one call makes.
 const STEPS: u8 = 4;
-/// Index, from 0, of the last Newton step for the target T. T is slightly below the worst SIR, in ln(SIR).
+/// Index, from 0, of the last Newton step for the target.
 const TARGETS: u8 = 12;
-/// Relative error at which the Newton steps for the target T end. T is slightly below the worst SIR, in ln(SIR).
+/// Relative error at which the Newton steps for the target end.
 const EXACT: f32 = 5e-4;
 
 /// Number of relays in a segment, the part of the chain that one call handles.
@@ -80,11 +77,10 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Both levels of a hop, and their Lagrange multipliers `lambda`. The levels are ln(forward SIR) and ln(backward SIR
-/// / r). r is the required ratio of backward to forward SIR. A multiplier is the upper half of an f32.
+/// Levels of a hop, and their Lagrange multipliers `lambda`, each of which is the upper half of an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
-    level: [f32; 2],
+    level: Levels,
     lambda: [u16; 2],
 }
 
@@ -153,12 +149,11 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of all hops' levels (logarithms of their SIRs) at the tried positions. The field is the next hop.
+    /// Computation of all hops' levels at the tried positions. The field is the next hop.
     Levels(u16),
-    /// Computation of the target T from all levels; the field is the number of Newton steps done. T is slightly below
-    /// the worst SIR, in ln(SIR).
+    /// Computation of the target from all levels; the field is the number of Newton steps done.
     Target(u8),
-    /// Summation of the merit (target plus barrier), which decides if a step is accepted. The field is the next hop.
+    /// Summation of the merit, which decides if a step is accepted. The field is the next hop.
     Merit(u16),
     /// Storage of the accepted positions and of new Lagrange multipliers; the field is the next hop.
     Accept(u16),
@@ -173,7 +168,7 @@ enum Work {
 /// directions.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
-    gains: Gains,
+    gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
     /// Lengths of the line Tx-Rx that are closed to two relays. They are next to Rx for relay 1, and next to Tx for
@@ -190,8 +185,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit (target plus barrier) at the stored positions, before the current step. The step is accepted if it does
-    /// not lower the merit.
+    /// Merit at the stored positions. The current step is accepted if it does not lower the merit.
     merit: f32,
     /// Sum of the barrier's logarithms over the hops handled so far, at the positions that are tried.
     sum: f32,
@@ -199,8 +193,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     share: f32,
     sums: Sums,
     by_target: f32,
-    /// True to replace the stored Lagrange multipliers by mu / s, their values at the optimum. mu is the barrier
-    /// weight, s the excess of a level (ln(SIR) of a hop in one direction) over the target.
+    /// True to replace the stored Lagrange multipliers by their values at the optimum.
     resets: bool,
     convex: bool,
     tries: u8,
@@ -209,7 +202,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
 
 impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     pub(super) const NEW: Self = Self {
-        gains: Gains::NONE,
+        gains: LogGains::NONE,
         cells: Cells::NEW,
         closed: [0.0; 2],
         nodes: [Node {
@@ -237,12 +230,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if they
     /// are close to the result; the barrier weight is then smaller at first.
-    pub(super) fn start(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        is_close: bool,
-    ) {
-        self.gains = Gains::new(chain);
+    pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
+        self.gains = LogGains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
         self.iterations = 0;
         self.convex = false;
@@ -253,7 +242,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// fraction of the distance between a coordinate's lower and upper limit.
     pub(super) fn put(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         index: u16,
         place: Placement,
         margin: f32,
@@ -267,18 +256,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Stores the position (x, y, h) of relay `index`, in units of the distance from Tx to Rx.
     #[inline(never)]
-    fn settle(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        index: u16,
-        [x, y, h]: Triple,
-    ) {
+    fn settle(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16, [x, y, h]: Triple) {
         let distance_m = chain.distance_m();
         let at = CrossSection {
             y_m: y * distance_m,
             altitude_m: h * distance_m,
         };
-        (self.cells).set(index, Cell::of(at, (chain.seat_of)(index).room));
+        (self.cells).set(index, Cell::of(at, chain.room(index)));
         if let Some(node) = self.node(index) {
             node.x = x;
         }
@@ -304,24 +288,20 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Returns the stored position of node `index` and its limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
-    fn spot(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
-        if index > chain.mission.relays() {
+    fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
+        if index > chain.relays() {
             return Spot::fixed([1.0, 0.0, 0.0]);
         }
         let Some(node) = self.nodes.get(usize::from(index).wrapping_sub(1)) else {
             return Spot::fixed([0.0; 3]);
         };
         let unit = 1.0 / chain.distance_m();
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         let at = self.cells.get(index).place(room);
         let (lateral, band) = (room.lateral, room.band);
         let [far, near] = self.closed;
         let most = if index == 1 { 1.0 - far } else { 1.0 };
-        let least = if index == chain.mission.relays() {
-            near
-        } else {
-            0.0
-        };
+        let least = if index == chain.relays() { near } else { 0.0 };
         Spot {
             at: [node.x, at.y_m * unit, at.altitude_m * unit],
             low: [least, lateral.least_m * unit, band.least_m * unit],
@@ -344,7 +324,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Returns the position of node `index` after the tried fraction of its Newton step, and its limits.
     #[inline(never)]
-    fn moved(&self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> Spot {
+    fn moved(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> Spot {
         let mut spot = self.spot(chain, index);
         if self.share > 0.0 {
             add_scaled(&mut spot.at, &self.step_of(index), self.share);
@@ -376,11 +356,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by one bounded portion. After the last portion it is ready with a target
-    /// in ln(SIR), slightly below what the stored positions reach. Each forward SIR is above the target, and so is
-    /// each backward SIR over r, the required ratio of backward to forward SIR.
-    pub(super) fn step(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
-        let relays = chain.mission.relays();
+    /// Continues the interior-point method by one bounded portion. Ready at the end, with a target in ln(SIR) slightly
+    /// below all levels of the stored positions.
+    pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
+        let relays = chain.relays();
         let done = match self.work {
             Work::Levels(k) => {
                 self.levels(chain, k);
@@ -426,10 +405,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds their ends' barrier. The barrier is the sum of
-    /// ln(distance to a limit). A level is ln(forward SIR) or ln(backward SIR / r); r is the required ratio of both.
-    fn levels(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
-        let relays = chain.mission.relays();
+    /// Computes the levels of ten hops from hop `k` on, and adds ln(distance to a limit) of their ends.
+    fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
+        let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
         let mut from = self.moved(chain, k - 1).at;
         let mut quiet = self.gains.quiet(from);
@@ -458,11 +436,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1. mu is the
-    /// barrier weight, and each level c belongs to one hop in one direction.
+    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1.
     ///
-    /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to
-    /// it.
+    /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to it.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -485,8 +461,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Returns the Lagrange multipliers of hop `k`, the slacks of its levels, and the barrier weight mu. A slack is
-    /// ln(SIR) in one direction minus the target.
     fn weights(&mut self, relays: u16, k: u16) -> Weights {
         let (target, mu) = (self.target, self.mu);
         let Hop { level, lambda } = *self.hop(relays, k);
@@ -497,9 +471,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the tried step if it does not lower the merit (target plus barrier); else shortens the step. After the
-    /// last try the step is computed again without negative curvature, and after that the barrier weight falls.
-    fn judge(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+    /// Accepts the tried step if it does not lower the merit; else shortens the step. After the last try the step is
+    /// computed again without negative curvature, and after that the barrier weight falls.
+    fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
             return Poll::Pending;
@@ -520,15 +494,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the merit of the tried positions: the target plus the barrier's sum times its weight mu.
     fn summed(&self) -> f32 {
         self.target + self.mu * self.sum
     }
 
     /// Stores the new position of relay `k`, and limits the Lagrange multipliers of the hop to relay `k`. The multipliers stay within the
     /// factor [`APART`] of their optimal values.
-    fn accept(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, k: u16) {
-        let relays = chain.mission.relays();
+    fn accept(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
+        let relays = chain.relays();
         if self.share > 0.0 && k <= relays {
             let spot = self.moved(chain, k);
             self.settle(chain, k, spot.at);
@@ -545,9 +518,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight mu. Ready after the
-    /// maximum number of steps, with the target, in ln(SIR).
-    fn continue_with(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> Poll<f32> {
+    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. Ready after the maximum
+    /// number of steps, with the target, in ln(SIR).
+    fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
         let is_step = self.share > 0.0;
@@ -565,14 +538,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight mu and continues; after the last mu, ready with the target, in ln(SIR). `resets` is
-    /// true to replace the Lagrange multipliers, because no step with them has raised the merit (target plus
-    /// barrier).
-    fn lower(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        resets: bool,
-    ) -> Poll<f32> {
+    /// Lowers the barrier weight and continues; after the last one, ready with the target, in ln(SIR). `resets` is true
+    /// to replace the Lagrange multipliers, because no step with them has raised the merit.
+    fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
             return Poll::Ready(self.target);
@@ -583,8 +551,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, its multipliers and slacks. A level is
-    /// ln(SIR) in one direction, a slack its excess over the target.
+    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, and its multipliers and slacks.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);
@@ -597,7 +564,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     #[inline(never)]
     fn eliminate(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u16,
         count: u16,
         factors: &mut [Factor; FIRST],
@@ -608,7 +575,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             Some(Segment::Front(front)) if segment > 0 => (first + 1, *front),
             _ => (0, Front::NONE),
         };
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let mut at = self.spot(chain, from).at;
         let after = first + count + 1;
         for index in from..after {
@@ -628,12 +595,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
 
     /// Eliminates all relays of `segment`, then begins the next segment or the computation of steps. `None` if the
     /// Newton system cannot be solved.
-    fn forward(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        segment: u16,
-    ) -> Option<()> {
-        let relays = chain.mission.relays();
+    fn forward(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u16) -> Option<()> {
+        let relays = chain.relays();
         if segment == 0 {
             self.sums = Sums::NONE;
         }
@@ -657,7 +620,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// cannot be solved or a step is not finite.
     fn substitute(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u16,
         is_second: bool,
     ) -> Option<()> {
@@ -668,8 +631,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         } else {
             (first, middle)
         };
-        let end = end.min(chain.mission.relays());
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
+        let end = end.min(relays);
         let mut factors = [Factor::NONE; FIRST];
         self.eliminate(chain, segment, end - first, &mut factors)?;
         let mut steps = [[0; 3]; FIRST];
@@ -708,8 +671,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     /// Lowers the common factor on all Newton steps, so that the relay at `spot` stays within its limits. `step` is
     /// that relay's whole step.
     fn limit(&mut self, spot: &Spot, step: Triple) {
-        let spans = (spot.room_below(), spot.room_above());
-        for (step, (below, above)) in step.iter().zip(spans.0.iter().zip(&spans.1)) {
+        let (below, above) = (spot.room_below(), spot.room_above());
+        for (step, (below, above)) in step.iter().zip(below.iter().zip(&above)) {
             let room = if *step < 0.0 { below } else { above };
             let most = NEAR_BOX * room / step.abs();
             if *below > 0.0 && *above > 0.0 && most < self.share {
@@ -731,7 +694,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns the number of levels: two for each hop, the logarithms of its forward and backward SIR.
-fn levels(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> f32 {
-    2.0 * f32::from(chain.mission.relays() + 1)
+/// Returns the number of levels, two for each hop.
+fn levels(chain: &Chain<'_, impl SeatOf>) -> f32 {
+    2.0 * f32::from(chain.relays() + 1)
 }

@@ -65,8 +65,7 @@ pub(super) struct Sums {
     column: f32,
 }
 
-/// Lagrange multipliers of both directions of a hop, their slacks, and the barrier weight `mu`. A slack is ln(forward
-/// SIR) or ln(backward SIR / r) minus the target; r is the required ratio of both.
+/// Lagrange multipliers of a hop's levels, the slacks of the levels, and the barrier weight `mu`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
     pub(super) lambda: [f32; 2],
@@ -75,21 +74,18 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier over the slack for each direction of the hop. The slack is ln(SIR) in that
-    /// direction minus the target.
+    /// Returns the Lagrange multiplier over the slack for each direction of the hop.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns the barrier weight mu over the slack for each direction of the hop. These are the Lagrange multipliers
-    /// at the optimum. The slack is ln(SIR) in that direction minus the target.
+    /// Returns mu over the slack for each direction of the hop: the Lagrange multipliers at the optimum.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
 
-    /// Returns the hop's Lagrange multipliers after a Newton step that changes its slacks by a and b. A slack is
-    /// ln(SIR) in one direction minus the target.
+    /// Returns the hop's Lagrange multipliers after a Newton step that changes its slacks by a and b.
     pub(super) fn after(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let ([l, m], [s, t]) = (self.lambda, self.slack);
         [(self.mu - l * a) / s, (self.mu - m * b) / t]
@@ -192,8 +188,7 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`, from this node's equations. Also
-    /// updates `sums`, from which the target's Newton step follows.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`. It is added to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {

@@ -13,14 +13,12 @@
 //! mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
-use super::passes::end_after;
-use crate::optimiser::joint::chain::{Seat, SolverContext};
+use crate::optimiser::joint::chain::{Chain, SeatOf};
 use crate::optimiser::joint::interior::Interior;
 use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;
 use crate::optimiser::pass::{Behind, Link};
 use crate::optimiser::search::Infeasible;
-use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
 use crate::root::sqrt;
 use crate::sir::square;
@@ -95,13 +93,8 @@ const STARTS: [Start; 6] = [
 
 impl Start {
     /// Returns the lateral offset and altitude in `room` of relay `index` of this initial chain.
-    fn cross_section(
-        self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        index: u16,
-        room: Room,
-    ) -> CrossSection {
-        let (relays, before) = (chain.mission.relays(), before(chain, index));
+    fn cross_section(self, chain: &Chain<'_, impl SeatOf>, index: u16, room: Room) -> CrossSection {
+        let (relays, before) = (chain.relays(), before(chain, index));
         // 0 for the relay at the end with more power, 1 for the relay at the other end.
         let share = if relays > 1 {
             f32::from(before) / f32::from(relays - 1)
@@ -112,7 +105,7 @@ impl Start {
             Along::Arc => quarter(before, relays + 1)[0],
             Along::Line | Along::Even(_) => 1.0,
         };
-        let Room { lateral, band } = room;
+        let Room { band, .. } = room;
         let ([near, middle, far], [first, last]) = (self.aside, self.up);
         let bent = 2.0 * share - 1.0;
         let aside = middle
@@ -122,13 +115,8 @@ impl Start {
                 } else {
                     far - middle
                 };
-        let away_m = if chain.interferer.y_m > 0.0 {
-            lateral.least_m
-        } else {
-            lateral.most_m
-        };
         room.nearest(CrossSection {
-            y_m: scale * aside * away_m,
+            y_m: scale * aside * room.away_m(chain.interferer),
             altitude_m: scale * (band.least_m + (first + share * (last - first)) * band.span_m()),
         })
     }
@@ -217,10 +205,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
 
     /// Continues the solution by one portion; ready with the target SIR, linear, at the end. A portion is two relays
     /// of Algorithm 1, ten relays of a Newton step, or twenty relays of other work.
-    pub(super) fn step(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Poll<Result<f32, Infeasible>> {
+    pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let next = match self.work {
             Work::Begin(done) => self.begin_start(chain, done),
             Work::Put(done) => self.begin_interior(chain, done),
@@ -285,18 +270,18 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
     /// relays have theirs already. After the last initial chain, the next work is the final search for the best
     /// chain's target.
-    fn begin_start(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, done: u16) -> Work {
+    fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
             let sigma = self.best.unwrap_or_default();
             return Work::Seek(Seek::up(sigma, true, 1e-5, 1e-6), Purpose::Last);
         };
         let config = chain.mission.config();
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let end = (done + PUT).min(relays);
         let after = end + 1;
         for index in done + 1..after {
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let at = if self.number > 0 {
                 start.cross_section(chain, index, room)
             } else {
@@ -325,14 +310,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
     /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The interferer is taken
     /// for as far from the line as the relay's cross-section from the interferer.
-    fn close_beyond(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>) {
+    fn close_beyond(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
-        let index = if is_turned { chain.mission.relays() } else { 1 };
-        let at = self
-            .interior
-            .cells
-            .get(index)
-            .place((chain.seat_of)(index).room);
+        let index = if is_turned { chain.relays() } else { 1 };
+        let at = self.interior.cells.get(index).place(chain.room(index));
         let a_squared = square(at.y_m - chain.interferer.y_m) + square(at.altitude_m);
         let x_m = if is_turned {
             distance_m - chain.interferer.x_m
@@ -379,13 +360,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// Chooses the positions at which the interior-point method starts, and starts it. The lateral offsets and
     /// altitudes are the stored ones. Each x is that of Algorithm 1, or evenly spaced. The first `done` relays have
     /// their positions already.
-    fn begin_interior(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        done: u16,
-    ) -> Work {
+    fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let along = match self.start() {
             Some(start) if self.again == 0 => start.along,
             _ => Along::Line,
@@ -396,7 +373,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         let end = (done + PUT).min(relays);
         let after = end + 1;
         for index in done + 1..after {
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let place = self.interior.cells.get(index).place(room).at(0.0);
             let share = f32::from(index) / f32::from(relays + 1);
             let turned = |x: f32| if is_turned(chain) { 1.0 - x } else { x };
@@ -421,15 +398,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
 
     /// Continues Algorithm 1 by two relays, for the target `sigma`, in ln(SIR). Ready with `Some` once all relays
     /// have an x, which is stored; ready with `None` if the target cannot be met.
-    fn line(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        sigma: f32,
-    ) -> Poll<Option<()>> {
+    fn line(&mut self, chain: &Chain<'_, impl SeatOf>, sigma: f32) -> Poll<Option<()>> {
         let mut pass = self.pass;
         let target = libm::expf(sigma);
         if pass.index == 0 && !pass.is_back {
-            pass.end_m = self.interior.cells.end_m(chain.mission, chain.seat_of, 0);
+            pass.end_m = self.interior.cells.end_m(chain, 0);
         }
         for _ in 0..LINE {
             let met = if pass.is_back {
@@ -451,16 +424,13 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// `None` if the target cannot be met.
     fn line_there(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         target: f32,
         pass: &mut Pass,
     ) -> Option<()> {
         let index = pass.index + 1;
-        let step = self
-            .interior
-            .cells
-            .least_step(chain.mission, chain.seat_of, index);
-        pass.end_m = end_after(chain.mission, pass.end_m, step);
+        let step = self.interior.cells.least_step(chain, index);
+        pass.end_m = chain.end_after(pass.end_m, step);
         let end_m = if index == 1 {
             let [far, _] = self.interior.closed;
             pass.end_m.min((1.0 - far) * chain.distance_m())
@@ -469,7 +439,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         };
         let link = self.line_link(chain, index, end_m);
         let mut x_m = link.reach(target, pass.x_m)?;
-        if index >= chain.mission.relays() {
+        if index >= chain.relays() {
             let (slack, place) = link.ending(target, pass.x_m, x_m)?;
             let [_, near] = self.interior.closed;
             if !(slack >= 0.0 && place >= near * chain.distance_m()) {
@@ -487,7 +457,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     /// be met.
     fn line_back(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         target: f32,
         pass: &mut Pass,
     ) -> Option<()> {
@@ -495,24 +465,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         let before = pass.index.saturating_sub(1);
         let [reach, before_m] = self.interior.noted(before);
         let link = self.line_link(chain, pass.index, end_m);
-        pass.x_m = match link.required_position(target, reach, pass.x_m)? {
-            RequiredPosition::AtReach => reach,
-            RequiredPosition::At(x_m) => x_m,
-        };
+        let required = link.required_position(target, reach, pass.x_m)?;
+        pass.x_m = required.or_reach(reach);
         pass.index = before;
         self.interior.note(before, [pass.x_m, before_m]);
         Some(())
     }
 
     /// Returns relay `index` and its hop for Algorithm 1, computed exactly as the relay will compute them.
-    fn line_link<'a>(
-        &self,
-        chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
-        index: u16,
-        end_m: f32,
-    ) -> Link<'a> {
+    fn line_link<'a>(&self, chain: &Chain<'a, impl SeatOf>, index: u16, end_m: f32) -> Link<'a> {
         let station = |index: u16| {
-            let seat = (chain.seat_of)(index);
+            let seat = chain.seat(index);
             Station {
                 cross_section: self.interior.cells.get(index).place(seat.room),
                 power_w: seat.power_w,
@@ -536,16 +499,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
 
 /// Returns true if the initial chains are described from Rx. That is so if Rx has more power than Tx; with equal powers
 /// if less SIR is required on the way back, because on the ground Rx receives less interference than relay 1.
-fn is_turned(chain: &SolverContext<'_, impl Fn(u16) -> Seat>) -> bool {
+fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
     rx_w > tx_w || (rx_w >= tx_w && config.reverse < 1.0)
 }
 
 /// Returns the number of relays between relay `index` and the end with more power (Tx or Rx).
-fn before(chain: &SolverContext<'_, impl Fn(u16) -> Seat>, index: u16) -> u16 {
+fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     if is_turned(chain) {
-        chain.mission.relays() - index
+        chain.relays() - index
     } else {
         index - 1
     }

@@ -6,7 +6,7 @@
 use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
-use crate::optimiser::joint::chain::{Seat, SolverContext, far_off, last_of};
+use crate::optimiser::joint::chain::{Chain, SeatOf, far_off, last_of};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
@@ -28,7 +28,7 @@ const PROBED: f32 = 3e-4;
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     pub(super) fn seek(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         seek: Seek,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -51,7 +51,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Bounded by twenty relays.
     pub(super) fn try_hold_back(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u8,
         place_m: f32,
         seek: Seek,
@@ -71,11 +71,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Records if the chain meets the target that was tried, and selects the next piece of work.
     ///
-    /// `met` is `None` if the target is infeasible. `Some(false)`: it is met with every relay at its farthest
-    /// position. `Some(true)`: it is met only if some relays stay short of their farthest positions.
+    /// `met` is as in [`Seek::tried`].
     pub(super) fn tried(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         mut seek: Seek,
         purpose: Purpose,
         met: Option<bool>,
@@ -125,7 +124,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
                     self.given_up()
                 }
                 (Some((sigma, _)), Purpose::Raise) => {
-                    Work::Settle(sigma.min(self.ascent.limit()), purpose)
+                    Work::Settle(sigma.min(self.ascent.limit), purpose)
                 }
                 (Some((sigma, _)), _) => Work::Settle(sigma, purpose),
                 (None, Purpose::Last) if self.again => return Poll::Ready(Err(Infeasible)),
@@ -137,7 +136,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     pub(super) fn settle(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         sigma: f32,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
@@ -207,11 +206,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
     }
 
-    pub(super) fn next(
-        &mut self,
-        turn: AscentStep,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Work {
+    pub(super) fn next(&mut self, turn: AscentStep, chain: &Chain<'_, impl SeatOf>) -> Work {
         self.restart();
         match turn {
             AscentStep::Try { share, sigma } => Work::Forward(share, sigma, false),
@@ -272,15 +267,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// constraint is active.
     pub(super) fn polish(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         sigma: f32,
     ) -> Poll<Result<f32, Infeasible>> {
         let (index, way, halved) = self.move_of(chain.mission);
-        let polished = chain.mission.relays() <= POLISHED || chain.holds();
+        let polished = chain.relays() <= POLISHED || chain.holds();
         if !polished || halved > HALVINGS || self.moved >= MOVES {
             return Poll::Ready(Ok(libm::expf(sigma)));
         }
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         self.kept = self.cells.get(index);
         let part = FIRST_MOVE
             * libm::ldexpf(1.0, -i32::from(halved))
@@ -298,14 +293,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             } else {
                 index.saturating_sub(2)
             };
-            if other < 1 || other > chain.mission.relays() {
+            if other < 1 || other > chain.relays() {
                 self.moving += 1;
                 return Poll::Pending;
             }
-            moved = Cell::of(
-                self.cells.get(other).place((chain.seat_of)(other).room),
-                room,
-            );
+            moved = Cell::of(self.cells.get(other).place(chain.room(other)), room);
         }
         if moved == self.kept {
             self.moving += 1;
@@ -321,7 +313,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Begins the improvement of the next initial chain, or ends the search after the last one.
     pub(super) fn begin(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
     ) -> Poll<Result<f32, Infeasible>> {
         let next = Start::number(self.number, Room::of(chain.mission));
         let Some(start) = next else {
@@ -337,35 +329,19 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             }
             return Poll::Pending;
         };
-        let Some(start) = start else {
+        let Some(start) = start.filter(|start| !self.is_skipped(chain, *start)) else {
             self.number += 1;
             return Poll::Pending;
         };
-        let floor = chain.floor();
-        if matches!(start, Start::Near)
-            && !self.again
-            && self.best.is_some_and(|(best, _)| best > floor)
-        {
-            self.number += 1;
-            return Poll::Pending;
-        }
-        if matches!(start, Start::Through { .. } | Start::Turns) && !self.walled {
-            self.number += 1;
-            return Poll::Pending;
-        }
-        if matches!(start, Start::FixedAltitudes { .. }) && !chain.holds() {
-            self.number += 1;
-            return Poll::Pending;
-        }
         self.start = start;
         self.ascent = Ascent::new(chain.distance_m(), 0.0, 0.0, 0.0);
         (self.judged_at, self.is_whole) = (None, true);
         self.restart();
         self.work = match start {
-            Start::Near => Work::Settle(floor + 0.04, Purpose::Start),
+            Start::Near => Work::Settle(chain.floor() + 0.04, Purpose::Start),
             Start::Turns => {
-                for index in 1..=chain.mission.relays() {
-                    let room = (chain.seat_of)(index).room;
+                for index in 1..=chain.relays() {
+                    let room = chain.room(index);
                     let apart_m = MARGIN * chain.mission.config().min_separation_m;
                     let at = Start::in_turn(index, chain.interferer, room, apart_m);
                     self.keep(index, 0.0, Cell::of(at, room));
@@ -384,6 +360,17 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
+    /// Returns true if `start` cannot lead to a better chain.
+    fn is_skipped(&self, chain: &Chain<'_, impl SeatOf>, start: Start) -> bool {
+        match start {
+            Start::Near if self.again => false,
+            Start::Near => self.best.is_some_and(|(best, _)| best > chain.floor()),
+            Start::Through { .. } | Start::Turns => !self.walled,
+            Start::FixedAltitudes { .. } => !chain.holds(),
+            Start::Arch { .. } | Start::Around { .. } | Start::Far => false,
+        }
+    }
+
     pub(super) fn given_up(&mut self) -> Work {
         self.number += 1;
         Work::Begin
@@ -393,7 +380,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// initial chain, else the stored ones.
     pub(super) fn shaped(
         &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         index: u16,
         room: Room,
         target: f32,
@@ -405,7 +392,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         let wanted = match self.start {
             Start::Far => {
                 let top = far_off(chain, room);
-                let relays = f32::from(chain.mission.relays().saturating_sub(1).max(1));
+                let relays = f32::from(chain.relays().saturating_sub(1).max(1));
                 let down = f32::from(index - 1) / relays;
                 CrossSection {
                     y_m: top.y_m * (1.0 - down),

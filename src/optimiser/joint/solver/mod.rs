@@ -21,7 +21,7 @@ mod passes;
 
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
-use crate::optimiser::joint::chain::{Mark, SEGMENT, STAGES, Seat, SolverContext, Stage};
+use crate::optimiser::joint::chain::{Chain, Mark, SEGMENT, STAGES, Seat, SeatOf, Stage};
 use crate::optimiser::joint::fitted::{Fitted, SlotShares};
 use crate::optimiser::joint::site::{Cell, Cells};
 use crate::optimiser::joint::starts::{Seek, Start};
@@ -84,22 +84,20 @@ enum Purpose {
     Raise,
     /// The chain's slack is computed again, after the cap on the slack was lowered.
     Tighten,
-    /// The search finds the highest target of an improved chain, with the improvement's margins. It does not compute
-    /// hops as the relays do.
+    /// The search finds the highest target of an improved chain, with the improvement's margins.
     Judge,
-    /// The search finds the highest target of an improved chain. Hops are computed exactly as the relays compute them
-    /// from their messages. Some relays may then stay short of their farthest position.
+    /// The search finds the highest target of an improved chain by the sweep's rules.
     Last,
-    /// The search checks if the chain meets the upper bound of all chains. Hops are computed exactly as the relays
-    /// compute them from their messages.
+    /// The search checks if the chain meets the upper bound of all chains by the sweep's rules.
     Probe,
-    /// The search checks a trial move of one relay. Hops are computed exactly as the relays compute them from their
-    /// messages.
+    /// The search checks a trial move of one relay by the sweep's rules.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if the search computes hops as the relays compute them from their messages.
+    /// Returns true for the sweep's rules: hops are computed as the relays compute them from messages.
+    ///
+    /// Some relays may then stay short of their farthest position.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -116,22 +114,18 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target SIR that the improvement of the best chain reached, in ln(SIR). The improvement of another chain is
-    /// stopped once it is predicted to end below this target.
+    /// Target that the improvement of the best chain reached, in ln(SIR). Others are stopped if predicted to end below.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target, as ln(SIR), at which the improvement of the best chain ended. The last search starts from this target and need not improve
-    /// the chain again. `None` if the improvement was stopped early, because the target is then not final.
+    /// Target at which the improvement of the best chain ended: its `judged_at`. The last search starts there, and
+    /// need not improve the chain again.
     best_judged: Option<f32>,
-    /// Target at which the current chain's improvement ended, in ln(SIR). The final search starts there. `None`
-    /// before the end, and if the improvement was cut short.
+    /// Target at which the current chain's improvement ended, in ln(SIR). `None` before the end, and if it was stopped early.
     judged_at: Option<f32>,
-    /// True if the current chain's improvement ran to its end. False if it was stopped early, because the chain was not expected to become
-    /// the best one.
+    /// True unless the current chain's improvement was stopped early, as it would not become the best.
     is_whole: bool,
-    /// True in the last phase, which improves the best chain. This phase has a finer search for the chain's highest target, and other
-    /// positions of single relays.
+    /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
@@ -183,10 +177,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         cells: Cells::NEW,
     };
 
-    fn step(
-        &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-    ) -> Poll<Result<f32, Infeasible>> {
+    fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         match self.work {
             Work::Begin => self.begin(chain),
             Work::Seek(seek, purpose) => self.seek(chain, seek, purpose),
@@ -307,8 +298,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     ///
     /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
-        let cells = self.cells();
-        cells.map_or(0.0, |cells| cells.end_m(mission, seat_of, index))
+        let chain = Chain::new(mission, seat_of);
+        let solved = chain.zip(self.cells());
+        solved.map_or(0.0, |(chain, cells)| cells.end_m(&chain, index))
     }
 
     /// Returns true if some relays have to stay short of their farthest x to meet the target found.
@@ -333,20 +325,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         mission: &Mission,
         seat_of: impl Fn(u16) -> Seat,
     ) -> Poll<Result<f32, Infeasible>> {
-        let Some(chain) = SolverContext::new(mission, &seat_of) else {
+        let Some(chain) = Chain::new(mission, &seat_of) else {
             return Poll::Ready(Err(Infeasible));
         };
-        match &mut self.0 {
-            Way::OneWay(solver) => solver.step(&chain),
-            Way::Both(solver) => match solver.first_mut() {
-                Some(solver) => solver.step(&chain),
-                None => Poll::Ready(Err(Infeasible)),
-            },
-            Way::Fitted(solver) => match solver.first_mut() {
-                Some(solver) => solver.step(&chain),
-                None => Poll::Ready(Err(Infeasible)),
-            },
-        }
+        let solved = match &mut self.0 {
+            Way::OneWay(solver) => Some(solver.step(&chain)),
+            Way::Both(solver) => solver.first_mut().map(|solver| solver.step(&chain)),
+            Way::Fitted(solver) => solver.first_mut().map(|solver| solver.step(&chain)),
+        };
+        solved.unwrap_or(Poll::Ready(Err(Infeasible)))
     }
 
     /// Returns the position of relay `index` and its slots, once the chain is solved. `None` unless the mission has
@@ -360,7 +347,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         let Way::Fitted(solver) = &self.0 else {
             return None;
         };
-        let chain = SolverContext::new(mission, seat_of)?;
+        let chain = Chain::new(mission, seat_of)?;
         Some(solver.first()?.place(&chain, index))
     }
 }
@@ -378,7 +365,7 @@ mod tests {
     use core::task::Poll;
 
     use super::{Seat, Solver, Way};
-    use crate::channel::{AirGround, Channel};
+    use crate::mission::tests::paper;
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
     /// Uniform random numbers in 0..1: Knuth's MMIX generator.
@@ -411,9 +398,7 @@ mod tests {
         } else {
             rng.between(80.0, 300.0)
         };
-        let channel = Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los).expect("in range");
         let mission = Mission::try_new(MissionConfig {
-            relays,
             distance_m: rng.between(400.0, 4000.0),
             min_separation_m: rng.between(1.0, 12.0),
             tx_power_w: rng.between(1.0, 100.0),
@@ -421,7 +406,6 @@ mod tests {
                 altitude_m: least_m,
                 power_w: 1.0,
             },
-            channel,
             band: Band { least_m, most_m },
             lateral: Band {
                 least_m: -side,
@@ -432,11 +416,7 @@ mod tests {
                 x_m: rng.between(-500.0, 4000.0),
                 y_m: rng.between(10.0, 900.0),
             }),
-            noise_w: 0.0,
-            reverse: 0.0,
-            rx_power_w: 80.0,
-            fitted_gap: 0.0,
-            tolerance: 1e-4,
+            ..paper(relays)
         });
         let holds = rng.next() < 0.3;
         let held =

@@ -7,13 +7,13 @@ use super::{ForwardPass, OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::AscentStep;
 use crate::optimiser::joint::chain::{
-    SEGMENT, SEGMENT_RELAYS, Seat, SolverContext, Stage, last_of, relays_of,
+    Chain, SEGMENT, SEGMENT_RELAYS, Seat, SeatOf, Stage, last_of, relays_of,
 };
 use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site::{Cell, Cells, Room, Site};
 use crate::optimiser::joint::starts::Start;
-use crate::optimiser::spacing::{Hop, RequiredPosition};
+use crate::optimiser::spacing::Hop;
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use core::task::Poll;
@@ -30,16 +30,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// `None` if a hop cannot meet the target. Bounded by ten relays.
     pub(super) fn recall(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u8,
         before: Placement,
     ) -> Option<Outlook> {
         let target = libm::expf(self.ascent.sigma);
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let mut places = [before; SEGMENT];
         let mut from = before;
         for (k, index) in relays_of(segment, relays) {
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let wanted = self.cells.get(index).place(room);
             let to = self
                 .link(chain, index, from, room)
@@ -62,7 +62,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         let mut to = from;
         for (k, index) in relays_of(segment, relays).rev() {
             let from = *places.get(k)?;
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let link = self.link(chain, index, from, room);
             let policy = link.weigh(target, self.ascent.trust, from, to, &mut outlook);
             self.stages.get_mut(k)?.policy = Brief::of(&policy);
@@ -72,7 +72,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Some(outlook)
     }
 
-    pub(super) fn back(&mut self, chain: &SolverContext<'_, impl Fn(u16) -> Seat>, segment: u8) {
+    pub(super) fn back(&mut self, chain: &Chain<'_, impl SeatOf>, segment: u8) {
         let before = self.nominal_before(chain, segment);
         let Some(outlook) = self.recall(chain, segment, before) else {
             self.work = self.next(AscentStep::Over, chain);
@@ -95,11 +95,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 
     /// Returns the position in the current chain of the relay before `segment`.
-    pub(super) fn nominal_before(
-        &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        segment: u8,
-    ) -> Placement {
+    pub(super) fn nominal_before(&self, chain: &Chain<'_, impl SeatOf>, segment: u8) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
             return Placement::default();
@@ -108,7 +104,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             .marks
             .get(usize::from(segment))
             .map_or(0.0, |mark| mark.x_m);
-        let room = (chain.seat_of)(index).room;
+        let room = chain.room(index);
         self.cells.get(index).place(room).at(x_m)
     }
 
@@ -116,12 +112,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
     pub(super) fn forward(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         share: f32,
         sigma: f32,
         kept: bool,
     ) {
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let target = libm::expf(sigma);
         if self.pass.done >= relays {
             let (slack, _) = chain.tail(target, self.pass.from);
@@ -158,15 +154,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// offsets and altitudes are stored. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u8,
         target: f32,
         share: f32,
         kept: bool,
     ) -> Option<()> {
-        for (k, index) in relays_of(segment, chain.mission.relays()) {
+        for (k, index) in relays_of(segment, chain.relays()) {
             let ForwardPass { from, old, .. } = self.pass;
-            let Seat { room, .. } = (chain.seat_of)(index);
+            let Seat { room, .. } = chain.seat(index);
             let Stage { x_m, policy } = *self.stages.get(k)?;
             let policy = policy.policy();
             let nominal = self.cells.get(index).place(room).at(x_m);
@@ -202,21 +198,21 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// chain if `kept`. At the end of the pass returns the chain's slack, m, or `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         sigma: f32,
         purpose: Purpose,
         kept: bool,
     ) -> Poll<Option<f32>> {
         let target = libm::expf(sigma);
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         if purpose.is_sweep() && self.pass.done == 0 {
-            self.pass.end_m = self.cells.end_m(chain.mission, chain.seat_of, 0);
+            self.pass.end_m = self.cells.end_m(chain, 0);
         }
         for _ in 0..PLAIN {
             let index = self.pass.done + 1;
             if index > relays {
                 if purpose.is_sweep() {
-                    let power_w = (chain.seat_of)(relays).power_w;
+                    let power_w = chain.seat(relays).power_w;
                     let reach_m = sqrt(chain.mission.receiver_gain(power_w) / target);
                     let (slack, _) = Outlook::tail(reach_m, chain.distance_m(), self.pass.from);
                     return Poll::Ready(Some(slack));
@@ -228,12 +224,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
                 }
                 return Poll::Ready(Some(slack.min(self.ascent.spare_m()) - penalty));
             }
-            let room = (chain.seat_of)(index).room;
+            let room = chain.room(index);
             let wanted = self.shaped(chain, index, room, target, purpose);
             let from = self.pass.from;
             let place = if purpose.is_sweep() {
-                let step = self.cells.least_step(chain.mission, chain.seat_of, index);
-                self.pass.end_m = end_after(chain.mission, self.pass.end_m, step);
+                let step = self.cells.least_step(chain, index);
+                self.pass.end_m = chain.end_after(self.pass.end_m, step);
                 if let Some(mark) = self.mark(index) {
                     // The slope is unused between two backward passes, so it stores x.
                     mark.slope = [from.x_m, 0.0, 0.0];
@@ -266,29 +262,24 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// minimum separation is required.
     pub(super) fn link<'a>(
         &self,
-        chain: &SolverContext<'a, impl Fn(u16) -> Seat>,
+        chain: &Chain<'a, impl SeatOf>,
         index: u16,
         from: Placement,
         room: Room,
     ) -> Site<'a> {
-        let link = chain.link(index, from, room);
-        match self.start {
-            Start::Through { .. } => link.unparted(),
-            _ => link,
+        let mut link = chain.link(index, from, room);
+        if let Start::Through { .. } = self.start {
+            link.apart_m = 0.0;
         }
+        link
     }
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the hop to relay `index` of the current chain, computed as the relay does from its messages. The hop
     /// ends at x = `end_m`, m, at most.
-    pub(super) fn hop(
-        &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
-        index: u16,
-        end_m: f32,
-    ) -> Hop {
-        let at = |index| (self.cells.get(index)).place((chain.seat_of)(index).room);
+    pub(super) fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16, end_m: f32) -> Hop {
+        let at = |index| (self.cells.get(index)).place(chain.room(index));
         let before = if index > 1 {
             at(index - 1)
         } else {
@@ -312,34 +303,27 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// `None` if a relay of the segment cannot take the position that the next one requires.
     pub(super) fn held_back_x_m(
         &self,
-        chain: &SolverContext<'_, impl Fn(u16) -> Seat>,
+        chain: &Chain<'_, impl SeatOf>,
         segment: u8,
         mut place_m: f32,
         target: f32,
     ) -> Option<f32> {
-        let relays = chain.mission.relays();
+        let relays = chain.relays();
         let [mut x_m, ..] = self.marks.get(usize::from(segment))?.slope;
-        let mut end_m = self.cells.end_m(
-            chain.mission,
-            chain.seat_of,
-            u16::from(segment) * SEGMENT_RELAYS,
-        );
+        let mut end_m = self.cells.end_m(chain, u16::from(segment) * SEGMENT_RELAYS);
         let mut before = [(0.0, 0.0); SEGMENT];
         for (k, index) in relays_of(segment, relays) {
-            let step = self.cells.least_step(chain.mission, chain.seat_of, index);
-            end_m = end_after(chain.mission, end_m, step);
+            let step = self.cells.least_step(chain, index);
+            end_m = chain.end_after(end_m, step);
             *before.get_mut(k)? = (x_m, end_m);
             x_m = self.hop(chain, index, end_m).outermost(target, x_m)?;
         }
         for (k, index) in relays_of(segment, relays).rev() {
             let (from_m, end_m) = *before.get(k)?;
-            place_m = match self
-                .hop(chain, index, end_m)
+            let hop = self.hop(chain, index, end_m);
+            place_m = hop
                 .required_position(target, from_m, place_m)?
-            {
-                RequiredPosition::AtReach => from_m,
-                RequiredPosition::At(x_m) => x_m,
-            };
+                .or_reach(from_m);
         }
         Some(place_m)
     }
@@ -347,35 +331,21 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
 impl<const RELAYS: usize> Cells<RELAYS> {
     /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
-    pub(super) fn least_step(
-        &self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        index: u16,
-    ) -> f32 {
+    pub(super) fn least_step(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
         if index <= 1 {
             return 0.0;
         }
-        let at = |index| self.get(index).place(seat_of(index).room);
+        let at = |index| self.get(index).place(chain.room(index));
         let across = at(index).apart_squared(at(index - 1));
-        mission.step_with_room(across)
+        chain.mission.step_with_room(across)
     }
 
     /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
-    pub(super) fn end_m(
-        &self,
-        mission: &Mission,
-        seat_of: &impl Fn(u16) -> Seat,
-        index: u16,
-    ) -> f32 {
-        let steps = (1..=mission.relays()).map(|at| self.least_step(mission, seat_of, at));
-        let first = mission.config().distance_m - steps.clone().sum::<f32>();
+    pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
+        let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
+        let first = chain.distance_m() - steps.clone().sum::<f32>();
         steps
             .take(index.into())
-            .fold(first, |end_m, step| end_after(mission, end_m, step))
+            .fold(first, |end_m, step| chain.end_after(end_m, step))
     }
-}
-
-pub(super) fn end_after(mission: &Mission, end_m: f32, step: f32) -> f32 {
-    (end_m + step).min(mission.config().distance_m)
 }
