@@ -208,8 +208,10 @@ impl TerrainReport {
     fn name(&self, hop: usize) -> String {
         let node = |at: usize| match at {
             0 => "Tx".to_owned(),
-            at if at > self.heights.len() => "Rx".to_owned(),
-            at => format!("relay {at}"),
+            at => self
+                .heights
+                .get(at - 1)
+                .map_or("Rx".to_owned(), |relay| format!("relay {}", relay.index)),
         };
         format!("hop {} ({} to {})", hop + 1, node(hop), node(hop + 1))
     }

@@ -19,10 +19,15 @@ use std::process::Command;
 use files::Raster;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::Value;
+use uav_relay::Placement;
+use uav_relay_scenario::PlannedMethod;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::scene::Scene;
+use uav_relay_terrain::profile::State;
+use uav_relay_tools::plan::flown::flown;
 use uav_relay_tools::plan::over_terrain::{self, Candidate, Search};
 use uav_relay_tools::plan::terrain::Elevation;
+use uav_relay_tools::plan::terrain_flight::{Flight, with_altitudes};
 use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 const EXAMPLE: &str = "../../examples/hills.toml";
@@ -208,8 +213,97 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     );
 }
 
+/// Compares the flights of relays that choose x by themselves with their plans, and tries random positions in their rooms.
+#[test]
+fn relays_fly_over_the_terrain_by_themselves() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = std::env::var("COUNT").map_or(4, |text| text.parse().unwrap());
+    let (mut losses, mut clear, mut rooms_m, mut warned) = (Vec::new(), 0_u64, Vec::new(), 0);
+    for seed in 1..=count {
+        let rng = &mut rng(seed);
+        let scenario = scene(folder.path(), rng, "");
+        let elevation = elevation(&scenario);
+        let relays = rng.random_range(2..=8);
+        let known = over_terrain::best(&scenario, &elevation, relays, 1e-4).unwrap();
+        let best = elevation.report(&scenario, &known).unwrap();
+        let own = with_altitudes(&scenario, &elevation, &known, 1e-4).unwrap();
+        assert_eq!(own.relays.len(), usize::from(relays));
+        let by_themselves = flown(&own, relays, PlannedMethod::Align, 1e-4).unwrap();
+        let how = (PlannedMethod::Align, 1e-4);
+        let flight = Flight::new(&own, &elevation, &by_themselves.plan, how, false).unwrap();
+        for (relay, (place, _)) in flight.relays.iter().zip(&by_themselves.plan.places) {
+            // The tolerance on the SIR is 1e-4.
+            let off_m = (relay.x_m - place.x_m).abs();
+            assert!(off_m < 0.5, "seed {seed}: {relay:?} {place:?}");
+            assert_eq!(relay.altitude_m, place.altitude_m);
+        }
+        let flight = flight.compared(&known, best.terrain_sir_db);
+        losses.push(flight.loss_db.unwrap());
+        warned += flight.warnings().count();
+        match &flight.problem {
+            Some(problem) => println!("seed {seed}, {relays} relays: {problem}"),
+            None => clear += 1,
+        }
+        assert_eq!(flight.without.len(), usize::from(relays));
+        let ground = elevation.ground(&own).unwrap();
+        let report = elevation.report(&own, &by_themselves.plan).unwrap();
+        for _ in 0..50 {
+            let somewhere = flight.relays.iter().map(|relay| {
+                let [from, to] = relay.room_m.unwrap_or([f64::from(relay.x_m); 2]);
+                let mut error = || rng.random_range(-0.57..0.57);
+                let [dx, dy, dh]: [f64; 3] = [error(), error(), error()];
+                let place = Placement {
+                    x_m: (rng.random_range(from..=to) + dx) as f32,
+                    y_m: dy as f32,
+                    altitude_m: relay.altitude_m + dh as f32,
+                };
+                (relay.room_m, ground.relay(place).unwrap())
+            });
+            let [tx, rx] = ground.ends;
+            let at = |node| (Some([0.0; 2]), node);
+            let nodes = [vec![at(tx)], somewhere.collect(), vec![at(rx)]].concat();
+            for (pair, hop) in nodes.windows(2).zip(&report.hops) {
+                let now = ground
+                    .profile([pair[0].1, pair[1].1])
+                    .unwrap()
+                    .clearance(0.1499);
+                let holds = match hop.state {
+                    State::Clear => now.state == State::Clear,
+                    State::Grazing => now.state != State::Blocked,
+                    State::Blocked => true,
+                };
+                let has_rooms = pair.iter().all(|(room, _)| room.is_some());
+                assert!(holds || !has_rooms, "seed {seed}: {hop:?} {now:?}");
+            }
+        }
+        rooms_m.extend(
+            flight
+                .relays
+                .iter()
+                .filter_map(|relay| relay.room_m)
+                .map(|[from, to]| to - from),
+        );
+    }
+    for numbers in [&mut losses, &mut rooms_m] {
+        numbers.sort_by(f64::total_cmp);
+    }
+    let at = |numbers: &[f64], share: f64| numbers[(share * (numbers.len() - 1) as f64) as usize];
+    println!(
+        "{clear} of {count} flights clear; loss: median {:.2}, 90 % {:.2} dB; {} rooms, median {:.0} m; {warned} warnings",
+        at(&losses, 0.5),
+        at(&losses, 0.9),
+        rooms_m.len(),
+        at(&rooms_m, 0.5)
+    );
+    assert!(2 * clear > count, "{clear}");
+}
+
 fn run(arguments: &str) -> (Option<i32>, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_plan"))
+    run_as(env!("CARGO_BIN_EXE_plan"), arguments)
+}
+
+fn run_as(program: &str, arguments: &str) -> (Option<i32>, String, String) {
+    let output = Command::new(program)
         .args(arguments.split_whitespace())
         .output()
         .unwrap();
@@ -355,6 +449,110 @@ fn positions_over_terrain_are_reported_with_their_gain() {
 }
 
 #[test]
+fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let plan = path("plan.toml");
+    let arguments = format!("--scenario {EXAMPLE} --uavs 5 --altitude terrain --json --out {plan}");
+    let (status, json, line) = run(&arguments);
+    assert_eq!((status, line.as_str()), (Some(0), ""));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let flight = &report["flight"];
+    let sir_db = flight["terrain_sir_db"].as_f64().unwrap();
+    let loss_db = report["terrain_sir_db"].as_f64().unwrap() - sir_db;
+    assert!(
+        (flight["loss_db"].as_f64().unwrap() - loss_db).abs() < 1e-9 && loss_db < 6.0,
+        "{flight}"
+    );
+    let without = flight["without"].as_array().unwrap();
+    let blocked = without[4]["problem"].as_str().unwrap();
+    assert!(
+        blocked.starts_with("hop 5 (relay 4 to Rx) is blocked: the ground at x = 44"),
+        "{blocked}"
+    );
+    let lowest = without[0]["problem"].as_str().unwrap();
+    assert!(
+        lowest.contains("relay 2 on its way from x = 1899 m to 1470 m is 13.9 m above the ground"),
+        "{lowest}"
+    );
+    let blocks = path("blocks");
+    let provision = |more: &str| {
+        run_as(
+            env!("CARGO_BIN_EXE_provision"),
+            &format!("--scenario {plan} {more}"),
+        )
+    };
+    let (status, said, line) = provision(&format!("--all --out-dir {blocks}"));
+    assert_eq!(status, Some(0), "{line}");
+    assert!(
+        line.contains(blocked) && said.contains(blocked),
+        "{line} {said}"
+    );
+    assert!(
+        said.contains(&format!("worst hop {sir_db:.3} dB with terrain")),
+        "{said}"
+    );
+    assert!(said.contains("relay 2: x "), "{said}");
+    // Each relay has its own altitude.
+    let written = Scenario::load(Path::new(&plan)).unwrap();
+    for (relay, own) in flight["relays"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(written.relays.values())
+    {
+        let altitude = own.altitude_m.unwrap();
+        assert!((relay["altitude_m"].as_f64().unwrap() - altitude).abs() < 1e-3);
+        assert!(
+            said.contains(&format!(" {altitude:.2} ")),
+            "{altitude} {said}"
+        );
+    }
+    let bundle = path("bundle");
+    let (status, _, line) = provision(&format!("--bundle {bundle}"));
+    assert_eq!(status, Some(0), "{line}");
+    let page = std::fs::read_to_string(path("bundle/relay3/page.txt")).unwrap();
+    assert!(
+        page.contains("room over the terrain: x ") && page.contains(blocked),
+        "{page}"
+    );
+    // The terrain is not below this scenario's own altitudes.
+    let low = std::fs::read_to_string(&plan).unwrap();
+    let low = low.split("\n[[relay]]").next().unwrap();
+    std::fs::write(&plan, low).unwrap();
+    let (status, _, line) = provision(&format!("--uavs 6 --all --out-dir {blocks} --force"));
+    assert!(
+        status == Some(2)
+            && line.contains("plan.toml: relay 1 is -13.0 m, ")
+            && line.contains("hop 2 (relay 1 to relay 2) is blocked"),
+        "{line}"
+    );
+    let of = |more: &str| provision(&format!("--uavs 6 --index 1 --out {} {more}", path("one")));
+    let (status, _, line) = of("--method adjust");
+    assert!(
+        status == Some(0) && line.contains("terrain not checked: the method adjust"),
+        "{line}"
+    );
+    let (_, _, line) = of("--allow-blocked");
+    assert!(
+        line.contains("relay 1 is -13.0 m, ") && !line.contains("is blocked"),
+        "{line}"
+    );
+    let arguments = format!(
+        "--scenario {EXAMPLE} --uavs 3 --altitude terrain --out {}",
+        path("three.toml")
+    );
+    let (status, _, line) = run(&arguments);
+    assert!(
+        status == Some(1)
+            && line.contains("hop 4 (relay 3 to Rx) is blocked")
+            && line.contains("give another --uavs"),
+        "{line}"
+    );
+    assert!(!Path::new(&path("three.toml")).exists());
+}
+
+#[test]
 fn wrong_elevation_files_and_options_are_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
@@ -422,10 +620,6 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         (
             "--altitude terrain".to_owned(),
             "--altitude terrain: needs elevation files",
-        ),
-        (
-            format!("{scenario} --altitude terrain --out {}", path("o.toml")),
-            "--altitude terrain: cannot be used with --out",
         ),
         (
             format!("{scenario} --altitude terrain --bandwidth-hz 1e7"),

@@ -9,7 +9,7 @@
 //! | a field, both directions | `source`: Algorithm 4 |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
 //! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer |
-//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective |
+//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective; `terrain_flight`: altitudes with which relays fly over it by themselves |
 //! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
 //! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
@@ -31,6 +31,7 @@ pub mod report;
 mod source;
 mod steps;
 pub mod terrain;
+pub mod terrain_flight;
 
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;

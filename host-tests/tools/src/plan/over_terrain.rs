@@ -198,19 +198,59 @@ impl<'a> Search<'a> {
     /// # Errors
     /// A line that names the place: it is not covered by the elevation files, or a hole.
     pub fn grid(&self, columns: u32, levels: u32) -> Result<Vec<Vec<Candidate>>, String> {
-        let free = |[low, high]: [f64; 2]| {
-            let level =
-                |level: u32| low + (high - low) * f64::from(level) / f64::from((levels - 1).max(1));
-            (0..levels).map(level).collect()
-        };
         let relays = 0..self.scene.relays.len();
         let each = relays.map(|relay| {
             let x = (1..=columns)
                 .map(|column| self.scene.distance_m * f64::from(column) / f64::from(columns + 1));
-            let columns = x.map(|x_m| self.column(relay, x_m, free));
+            let columns = x.map(|x_m| self.above(relay, x_m, levels));
             Ok(columns.collect::<Result<Vec<_>, String>>()?.concat())
         });
         each.collect()
+    }
+
+    /// Returns the candidates for relay `relay` (from 0) at `x_m` and `levels` altitudes, from the lowest allowed one to the highest.
+    pub(super) fn above(
+        &self,
+        relay: usize,
+        x_m: f64,
+        levels: u32,
+    ) -> Result<Vec<Candidate>, String> {
+        self.column(relay, x_m, |[low, high]| {
+            let share = |level: u32| f64::from(level) / f64::from((levels - 1).max(1));
+            let level = |level: u32| low + (high - low) * share(level);
+            (0..levels).map(level).collect()
+        })
+    }
+
+    /// Returns the position at `x_m` and the altitude `h_m`, allowed or not.
+    pub(super) fn candidate(&self, x_m: f64, h_m: f64) -> Result<Candidate, String> {
+        let amsl_m = self.datum_m(x_m)? + h_m;
+        Ok(Candidate { x_m, h_m, amsl_m })
+    }
+
+    /// Returns the SIR of the worst hop of a chain as [`worst_sir`](Self::worst_sir) does, but less for altitudes that are not allowed.
+    ///
+    /// Every chain with such an altitude ranks behind all chains without one.
+    pub(super) fn rank(&mut self, chain: &[Candidate]) -> Result<f64, String> {
+        let mut off_m: f64 = 0.0;
+        for at in chain {
+            let off = match self.band_m(at.x_m)? {
+                Some([low, high]) => (low - at.h_m).max(at.h_m - high),
+                None => 1e4,
+            };
+            let inside = self
+                .no_fly
+                .iter()
+                .filter_map(|area| area.depth_m([at.x_m, 0.0], at.h_m));
+            off_m += inside.fold(off.max(0.0), f64::max);
+        }
+        let is_allowed = off_m < 1e-3;
+        let factor = if is_allowed {
+            1.0
+        } else {
+            BLOCKED * BLOCKED / (1.0 + off_m)
+        };
+        Ok(factor * self.worst_sir(chain))
     }
 
     /// Returns the candidates around `chain`, at steps of `step_m` along x and `climb_m` in altitude.

@@ -12,6 +12,7 @@ use uav_relay_terrain::report::TerrainReport;
 use super::area::AreaReport;
 use super::over_terrain::OverTerrain;
 use super::rate::{BestRate, Rate, RateOf};
+use super::terrain_flight::Flight;
 use super::{Number, Plan, Unit, Why};
 
 /// Hypothetical interferer that replaces several, with its error and its effect on the plan.
@@ -369,6 +370,9 @@ pub struct PlanReport {
     /// Gain of positions that are chosen for the terrain; absent for other positions.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
+    /// Simulated flight over the terrain, with the loss of each relay; only with `--out`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flight: Option<Flight>,
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
@@ -432,6 +436,7 @@ impl PlanReport {
             hypothetical,
             terrain: None,
             over_terrain: None,
+            flight: None,
             area: None,
             room: !plan.mission.config().lateral.is_single(),
             unit,
@@ -556,6 +561,9 @@ impl PlanReport {
         }
         if let Some(over) = &self.over_terrain {
             _ = writeln!(text, "{over}");
+        }
+        if let Some(flight) = &self.flight {
+            _ = writeln!(text, "{flight}");
         }
         let not_modelled = self
             .terrain

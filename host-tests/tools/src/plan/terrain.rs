@@ -11,6 +11,9 @@ use uav_relay_terrain::report::{FreeSpace, TerrainReport};
 use super::Plan;
 use crate::figures::chart::{Axis, Chart, Line, Look, Stroke};
 
+/// Position error of a relay, m, unless `companion.position_error_m` says another one. It is the companion's default.
+pub const POSITION_ERROR_M: f64 = 1.0;
+
 /// Elevation model of a scenario.
 #[expect(missing_debug_implementations, reason = "millions of heights")]
 pub struct Elevation {
@@ -96,6 +99,12 @@ impl Elevation {
 
     pub(super) const fn position_error_m(&self) -> f64 {
         self.position_error_m
+    }
+
+    /// Returns the least and the greatest height of a relay above the ground, m.
+    pub(super) fn band_m(&self) -> [f64; 2] {
+        let most_m = self.spec.above_ground_max_m;
+        [self.spec.above_ground_m, most_m.unwrap_or(f64::INFINITY)]
     }
 }
 
