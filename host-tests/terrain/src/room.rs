@@ -50,7 +50,7 @@ impl Ridge {
                 let y_m = f64::from(aside) * aside_m - error_m;
                 highest = highest.max(ground.height_m(x_m, y_m)?);
             }
-            Ok(highest - datum(x_m)?)
+            Ok(highest + ground.raise_m(x_m) - datum(x_m)?)
         });
         let heights_m = heights_m.collect::<Result<_, String>>()?;
         Ok((

@@ -22,7 +22,6 @@ use serde_json::Value;
 use uav_relay::Placement;
 use uav_relay_scenario::PlannedMethod;
 use uav_relay_scenario::Scenario;
-use uav_relay_scenario::scene::Scene;
 use uav_relay_terrain::profile::State;
 use uav_relay_tools::plan::flown::flown;
 use uav_relay_tools::plan::over_terrain::{self, Candidate, Search};
@@ -124,7 +123,7 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
         };
         let scenario = scene(folder.path(), &mut rng(seed), more);
         let elevation = elevation(&scenario);
-        let scene = Scene::new(&scenario, relays).unwrap();
+        let scene = elevation.scene(&scenario, relays).unwrap().unwrap();
         let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
         let grid = search.grid(columns, levels).unwrap();
         let (chain, sir) = search.best(&grid, 0.0).unwrap();
@@ -172,7 +171,7 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
         let known = over_terrain::best(&scenario, &elevation, relays, 1e-4).unwrap();
         let report = elevation.report(&scenario, &known).unwrap();
         // The terrain is sampled more finely in the report.
-        let scene = Scene::new(&scenario, relays).unwrap();
+        let scene = elevation.scene(&scenario, relays).unwrap().unwrap();
         assert!(
             report.terrain_sir
                 <= scene.chain_sir(
@@ -445,6 +444,183 @@ fn positions_over_terrain_are_reported_with_their_gain() {
             .unwrap()
             .iter()
             .all(|relay| relay["above_obstacle_m"].as_f64().unwrap() >= 29.99)
+    );
+}
+
+/// Compares SIRs with interferers on hills with a computation from the heights of the hills, and the search with brute force.
+#[test]
+fn interferers_stand_on_the_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let height =
+        |x: f64, y: f64| 500.0 + 0.06 * x + 80.0 * (-(x - 2000.0).hypot(y + 400.0) / 500.0).exp();
+    let metres = |lon: f64, lat: f64| ((lon - 8.5) * 75_744.0, (47.2 - lat) * 111_180.0);
+    let raster = Raster::geographic(8.495, 47.21, 1.0 / 3600.0, [280, 73]);
+    raster.write(&folder.path().join("hills.tif"), |lon, lat| {
+        let (x, y) = metres(lon, lat);
+        height(x, y)
+    });
+    let text = |place: &str| {
+        format!(
+            "[geometry]\naltitude_m = 150\naltitude_max_m = 300\nmin_separation_m = 50\n[site]\ntx = {{ lat_deg = 47.2, lon_deg = 8.5, amsl_m = {:.2} }}\n\
+         rx = {{ lat_deg = 47.2, lon_deg = 8.566, amsl_m = {:.2} }}\n[power]\ntx_w = 5\nuav_w = 1\n[terrain]\nfiles = [\"hills.tif\"]\n\
+         above_ground_m = 40\n[link]\nreverse = 0.7\n{place}",
+            height(0.0, 0.0),
+            height(5000.0, 0.0)
+        )
+    };
+    let read = |place: &str| {
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text(place)).unwrap();
+        Scenario::load(&file).unwrap()
+    };
+    let scenario = read(
+        "[[interferer]]\npower_w = 3\nx_m = 1900\ny_m = -350\nmast_m = 25\n[[interferer]]\npower_w = 0.5\nx_m = 3000\ny_m = 300\n\
+         [[interferer]]\npower_w = 2\nx_m = 2500\ny_m = 4000\n",
+    );
+    let elevation = elevation(&scenario);
+    let known = over_terrain::best(&scenario, &elevation, 3, 1e-4).unwrap();
+    let report = elevation.report(&scenario, &known).unwrap();
+    // The third one is not covered.
+    assert_eq!(report.interferers[2].altitude_m, None);
+    assert!(
+        report
+            .table()
+            .contains("interferer 3: not covered by the elevation files")
+    );
+    let line = |x: f64| {
+        height(0.0, 0.0) + (height(5000.0, 0.0) - height(0.0, 0.0)) * x / scenario.distance_m
+    };
+    let sources = [
+        (3.0, 1900.0, -350.0, height(1900.0, -350.0) + 25.0),
+        (0.5, 3000.0, 300.0, height(3000.0, 300.0)),
+        (2.0, 2500.0, 4000.0, line(2500.0)),
+    ];
+    assert!(
+        (report.interferers[0].altitude_m.unwrap()[0] - (sources[0].3 - line(1900.0))).abs() < 3.0
+    );
+    let free =
+        |d: f64| (4.0 * std::f64::consts::PI * d * 2e9 / 299_792_458.0).powi(2) * 10_f64.powf(0.01);
+    let heard = |x: f64, amsl: f64| -> f64 {
+        let each = sources.iter();
+        each.map(|(w, sx, sy, sz)| w / free((x - sx).hypot(*sy).hypot(amsl - sz)))
+            .sum()
+    };
+    let relays: Vec<(f64, f64)> = known
+        .places
+        .iter()
+        .map(|(place, _)| {
+            let [x, h] = [place.x_m, place.altitude_m].map(f64::from);
+            (x, line(x) + h)
+        })
+        .collect();
+    let mut from = (0.0, line(0.0), 5.0);
+    for (hop, (x, amsl)) in report.hops.iter().zip(&relays) {
+        let signal = from.2 / free((x - from.0).hypot(amsl - from.1));
+        let sir_db = 10.0 * (signal / heard(*x, *amsl)).log10() - hop.diffraction_db;
+        assert!((hop.sir_db - sir_db).abs() < 0.1, "{} {sir_db}", hop.sir_db);
+        from = (*x, *amsl, 1.0);
+    }
+    // A hilltop with the interferer below a relay costs more than the interferer at the line between the sites.
+    let scene = elevation.scene(&scenario, 3).unwrap().unwrap();
+    let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
+    let grid = search.grid(7, 3).unwrap();
+    let (chain, sir) = search.best(&grid, 0.0).unwrap();
+    let all = brute_force(
+        &mut search,
+        &grid,
+        &mut Vec::new(),
+        scenario.min_separation_m,
+    );
+    assert!(
+        (sir / all - 1.0).abs() < 1e-12 && chain.len() == 3,
+        "{sir} {all}"
+    );
+    // An area: the nearest altitude of its ground.
+    let scenario = read(
+        "[[interferer]]\npower_w = 3\narea = { circle = [2000.0, -400.0, 200.0] }\nmast_m = 5\n",
+    );
+    let scene = elevation.scene(&scenario, 3).unwrap().unwrap();
+    let [low, high] = scene.heights_m[&0];
+    let top = height(2000.0, -400.0) - line(2000.0) + 5.0;
+    assert!(
+        (high - top).abs() < 6.0 && low < high - 20.0,
+        "{low} {high} {top}"
+    );
+    let near = scene.interference_w(uav_relay_scenario::scene::Place {
+        x: 2000.0,
+        y: -400.0,
+        h: high + 50.0,
+    });
+    assert!((near / (3.0 / free(50.0)) - 1.0).abs() < 1e-3, "{near}");
+}
+
+/// Checks plans over a long line with narrow hills, and the error of the heights.
+#[test]
+fn long_lines_and_errors_of_the_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    // Ridges 150 m wide, each 3.1 km, and 60 m high: narrower than a column of the first grid.
+    let height = |x: f64| {
+        300.0
+            + 60.0 * (-((x - 1700.0).rem_euclid(3100.0) - 1550.0).powi(2) / 75.0_f64.powi(2)).exp()
+    };
+    let raster = Raster::geographic(8.495, 47.202, 1.0 / 3600.0, [1925, 15]);
+    raster.write(&folder.path().join("hills.tif"), |lon, _| {
+        height((lon - 8.5) * 75_744.0)
+    });
+    let read = |error: &str| {
+        let text = format!(
+            "[geometry]\naltitude_m = 100\n[site]\ntx = {{ lat_deg = 47.2, lon_deg = 8.5, amsl_m = 300 }}\n\
+             rx = {{ lat_deg = 47.2, lon_deg = 9.02, amsl_m = 300 }}\n[power]\ntx_w = 5\nuav_w = 5\n[noise]\nbandwidth_hz = 1e6\n\
+             [terrain]\nfiles = [\"hills.tif\"]\nmast_m = 10\nabove_ground_m = 20\nabove_ground_max_m = 40\n{error}\
+             [[interferer]]\npower_w = 0.01\nx_m = 20000\ny_m = 4000\n"
+        );
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text).unwrap();
+        Scenario::load(&file)
+    };
+    let scenario = read("").unwrap();
+    let of = elevation(&scenario);
+    let start = std::time::Instant::now();
+    let plan = over_terrain::best(&scenario, &of, 13, 1e-4).unwrap();
+    println!("{:.1} s", start.elapsed().as_secs_f64());
+    let report = of.report(&scenario, &plan).unwrap();
+    // Only hops from ridge to ridge are clear.
+    assert!(of.problem(&report, false).is_none(), "{}", report.table());
+    assert!(report.interferers[0].altitude_m.is_none());
+    println!("{}", report.table());
+    let with_error = read("error_m = 8\n").unwrap();
+    let raised = elevation(&with_error);
+    let same = raised.report(&with_error, &plan).unwrap();
+    let is_inside = |x_m: f64| (200.0..scenario.distance_m - 200.0).contains(&x_m);
+    for (hop, other) in report.hops.iter().zip(&same.hops) {
+        if is_inside(hop.obstacle_x_m) && is_inside(other.obstacle_x_m) {
+            let lost_m = hop.clearance_m - other.clearance_m;
+            assert!((lost_m - 8.0).abs() < 0.5, "{hop:?} {other:?}");
+        }
+        assert!(other.clearance_m < hop.clearance_m + 1e-9 && !(hop.state == State::Blocked));
+        assert!(other.diffraction_db >= hop.diffraction_db);
+    }
+    for (relay, other) in report.heights.iter().zip(&same.heights) {
+        assert!((relay.above_obstacle_m - other.above_obstacle_m - 8.0).abs() < 1e-6);
+        assert!((relay.above_ground_m - other.above_ground_m).abs() < 1e-9);
+    }
+    let plan = over_terrain::best(&with_error, &raised, 13, 1e-4).unwrap();
+    let report = raised.report(&with_error, &plan).unwrap();
+    assert!(
+        raised.problem(&report, false).is_none(),
+        "{}",
+        report.table()
+    );
+    assert!(
+        report
+            .heights
+            .iter()
+            .all(|relay| relay.above_ground_m >= 27.99)
+    );
+    let wrong = read("error_m = 101\n").unwrap_err().to_string();
+    assert!(
+        wrong.contains("terrain.error_m = 101") && wrong.contains("0 to 100 m"),
+        "{wrong}"
     );
 }
 

@@ -9,7 +9,6 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::{Duration, Method, Placement};
-use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{PlannedMethod, Scenario, mission};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
@@ -19,7 +18,7 @@ use uav_relay_terrain::profile::Ground;
 use uav_relay_terrain::room::{Limits, rooms};
 
 use super::flown::{alone, shortest};
-use super::over_terrain::{Candidate, MOST_RELAYS, Search};
+use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
 use super::{NoPlan, Plan, ProfiledMission, source};
 
@@ -85,8 +84,10 @@ pub fn with_altitudes(
     tolerance: f64,
 ) -> Result<Scenario, NoPlan> {
     let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
-    let scene = Scene::new(scenario, relays).ok_or_else(source::nothing)?;
-    let mut search = Search::new(scenario, &scene, elevation).map_err(NoPlan::Wrong)?;
+    let scene = elevation.scene(scenario, relays).map_err(NoPlan::Wrong)?;
+    let scene = scene.ok_or_else(source::nothing)?;
+    let search = Search::with_points(scenario, &scene, elevation, FINE_POINTS);
+    let mut search = search.map_err(NoPlan::Wrong)?;
     let rounded = |chain: &[Candidate]| -> Vec<f64> {
         let places = chain.iter().map(Candidate::placement);
         places.map(|place| shortest(place.altitude_m)).collect()
@@ -341,18 +342,14 @@ fn simulated(setup: Setup) -> Result<Outcome, NoPlan> {
     run(setup).map_err(|error| NoPlan::Wrong(error.to_string()))
 }
 
-/// Returns the plan with relays at `places`, with the SIRs against all interferers.
+/// Returns the plan with relays at `places`.
 fn settled(
     scenario: &Scenario,
     relays: u16,
     tolerance: f64,
     places: &[Placement],
 ) -> Result<Plan, NoPlan> {
-    let plan = ProfiledMission::new(scenario, relays, tolerance)?.plan(places, "", false);
-    Ok(match Scene::new(scenario, relays) {
-        Some(scene) => plan.against(&scene),
-        None => plan,
-    })
+    Ok(ProfiledMission::new(scenario, relays, tolerance)?.plan(places, "", false))
 }
 
 /// Simulates the loss of relay `lost` from a chain at `places`, and returns the terrain below the others.
