@@ -14,9 +14,10 @@ use uav_relay_terrain::report::TerrainReport;
 use uav_relay_tools::figures::draw::draw;
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::area::{self, AreaReport, Criterion};
-use uav_relay_tools::plan::area_map;
+use uav_relay_tools::plan::area_map::{self, Shown};
 use uav_relay_tools::plan::carried::Carried;
 use uav_relay_tools::plan::flown::{flown, planned, with_altitudes, with_files, with_plan};
+use uav_relay_tools::plan::locating::Locating;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
 use uav_relay_tools::plan::rate::{Rate, Rates};
@@ -78,7 +79,7 @@ fn run(options: &Options) -> Result<(), Failure> {
             let (terrain, error) =
                 terrain(options, &scenario, elevation.as_ref(), (&plan, number))?;
             let error = joined([error, no_fly(options, &scenario, &plan)]);
-            write_area_map(options, &scenario, &plan)?;
+            let locating = over_area(options, &scenario, &plan)?;
             write_map(options, &scenario, &plan, terrain.as_ref())?;
             let (next, flight) = match error {
                 Some(_) => Default::default(),
@@ -104,6 +105,7 @@ fn run(options: &Options) -> Result<(), Failure> {
                 &PlanReport {
                     over_terrain,
                     flight,
+                    locating,
                     area: AreaReport::new(&scenario, &ask, &plan, options.area.quantile),
                     ..report
                 },
@@ -528,9 +530,14 @@ struct AreaOptions {
     /// Draw the SIR of the worst hop for each position of the interferer (SVG). Needs an interferer with an area
     #[arg(long, value_name = "FILE")]
     area_svg: Option<PathBuf>,
-    /// Write the same as squares with geographic coordinates (GeoJSON). Needs a scenario with a site as well
+    /// Write the same as squares with geographic coordinates (GeoJSON), with the errors of --listen-svg. Needs a scenario with a site as well
     #[arg(long, value_name = "FILE")]
     area_geojson: Option<PathBuf>,
+    /// Draw the error with which relays that measure the interference locate the interferer, for each of its positions (SVG)
+    ///
+    /// Needs [listen] and a single interferer, with an area
+    #[arg(long, value_name = "FILE")]
+    listen_svg: Option<PathBuf>,
     /// Accept a plan in which the way between two neighbours crosses a no-fly area
     #[arg(long)]
     allow_crossing: bool,
@@ -606,6 +613,7 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         quantile,
         area_svg,
         area_geojson,
+        listen_svg,
         ..
     } = &options.area;
     let refuse = |line: String| Err(Failure::input(line));
@@ -614,6 +622,7 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         ("--quantile", quantile.map(|quantile| quantile.to_string())),
         ("--area-svg", area_svg.as_ref().map(file)),
         ("--area-geojson", area_geojson.as_ref().map(file)),
+        ("--listen-svg", listen_svg.as_ref().map(file)),
     ];
     let Some(first) = scenario.areas.keys().next() else {
         return match asked
@@ -644,6 +653,13 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
             "cannot be used with --out, because relays compute with one position of an interferer",
         );
     }
+    let is_located = scenario.listen.is_some() && scenario.sources().len() == 1;
+    if let Some(path) = listen_svg.as_ref().filter(|_| !is_located) {
+        return refuse(format!(
+            "--listen-svg {}: needs [listen] and a single [[interferer]]",
+            file(path)
+        ));
+    }
     if quantile.is_some() && options.altitude == Altitude::Terrain {
         return refuse("--quantile: cannot be used with --altitude terrain".to_owned());
     }
@@ -661,26 +677,39 @@ fn joined(lines: [Option<String>; 2]) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("; "))
 }
 
-/// Writes the files of `--area-svg` and `--area-geojson`.
-fn write_area_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
+/// Computes the location of the interferer by relays with `[listen]`, and writes the files of `--area-svg`, `--area-geojson` and
+/// `--listen-svg`.
+fn over_area(
+    options: &Options,
+    scenario: &Scenario,
+    plan: &Plan,
+) -> Result<Option<Locating>, Failure> {
     let AreaOptions {
         area_svg,
         area_geojson,
+        listen_svg,
         ..
     } = &options.area;
-    if area_svg.is_none() && area_geojson.is_none() {
-        return Ok(());
+    let is_drawn = area_svg.is_some() || area_geojson.is_some();
+    if scenario.areas.is_empty() || !is_drawn && scenario.listen.is_none() {
+        return Ok(None);
     }
-    let cells = area::cells(scenario, plan);
-    if let Some(file) = area_svg {
-        save(file, "--area-svg", &area_map::svg(scenario, plan, &cells))?;
+    let mut cells = area::cells(scenario, plan);
+    let locating = Locating::new(scenario, plan, &mut cells).map_err(Failure::input)?;
+    for (file, option, shown) in [
+        (area_svg, "--area-svg", Shown::Sir),
+        (listen_svg, "--listen-svg", Shown::Error),
+    ] {
+        if let Some(file) = file {
+            save(file, option, &area_map::svg(scenario, plan, &cells, shown))?;
+        }
     }
     if let (Some(file), Some(line)) = (area_geojson, &scenario.line) {
         let text = area_map::geojson(line, &cells)
             .map_err(|line| Failure::input(format!("--area-geojson: {line}")))?;
         save(file, "--area-geojson", &text)?;
     }
-    Ok(())
+    Ok(locating)
 }
 
 /// Rejects a target SIR for relays that choose the positions of the largest data rate.

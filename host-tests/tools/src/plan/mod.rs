@@ -8,7 +8,7 @@
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
 //! | a field, both directions | `source`: Algorithm 4 |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
-//! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer |
+//! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer; `locating`: its location by relays that measure it |
 //! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective; `terrain_flight`: altitudes with which relays fly over it by themselves |
 //! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
@@ -21,6 +21,7 @@ pub mod area_map;
 pub mod bound;
 pub mod carried;
 pub mod flown;
+pub mod locating;
 pub mod map;
 mod multi_interferer;
 pub mod one_both_ways;

@@ -10,6 +10,7 @@ use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, db, hops_table, re
 use uav_relay_terrain::report::TerrainReport;
 
 use super::area::AreaReport;
+use super::locating::Locating;
 use super::over_terrain::OverTerrain;
 use super::rate::{BestRate, Rate, RateOf};
 use super::terrain_flight::Flight;
@@ -376,6 +377,9 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
+    /// Location of the interferer in its area by relays with `[listen]`; absent without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub locating: Option<Locating>,
     /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
@@ -438,6 +442,7 @@ impl PlanReport {
             over_terrain: None,
             flight: None,
             area: None,
+            locating: None,
             room: !plan.mission.config().lateral.is_single(),
             unit,
         }
@@ -553,6 +558,9 @@ impl PlanReport {
         }
         if let Some(area) = &self.area {
             text.push_str(&area.describe());
+        }
+        if let Some(locating) = &self.locating {
+            text.push_str(&locating.to_string());
         }
         let is_for_both = self.way_back.is_some_and(|back| back.reverse.is_some());
         let one_way = if is_for_both { "" } else { ONE_WAY };
