@@ -66,9 +66,9 @@ pub struct Scene {
     /// Each receiver gets the interference from the nearest point of the area. An SIR is then that of the source's worst position
     /// for this hop, and the SIR of the worst hop is that of the source's worst position.
     pub areas: BTreeMap<usize, Area>,
-    /// Least and greatest altitude of the sources, m, by index in `sources`; 0 for a source that is not in the map.
+    /// Least and greatest altitude of the sources, m, by index in `sources`.
     ///
-    /// Each receiver gets the interference from the nearest altitude between the two.
+    /// It is 0 for a source that is not in the map. Each receiver gets the interference from the nearest altitude between the two.
     pub heights_m: BTreeMap<usize, [f64; 2]>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,

@@ -45,9 +45,9 @@ pub struct Scenario {
     pub interference: Interference,
     /// Areas of interferers that may be anywhere in them, by the index (from 0) of the interferer.
     pub areas: BTreeMap<usize, SourceArea>,
-    /// Heights of the interferers' antennas above the ground, m, 0 to 1000, by index (from 0); 0 for an interferer that is not in the map.
+    /// Heights of the interferers' antennas above the ground, m, 0 to 1000, by index (from 0).
     ///
-    /// The planner uses them with elevation files.
+    /// It is 0 for an interferer that is not in the map. The planner uses them with elevation files.
     pub masts_m: BTreeMap<usize, f64>,
     /// Areas in which relays may not fly, for the planner.
     pub no_fly: Vec<NoFly>,
@@ -84,7 +84,9 @@ pub struct TerrainSpec {
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground below it, m; `None` for no limit.
     pub above_ground_max_m: Option<f64>,
-    /// Error of the heights in the elevation files, m, 0 (its default) to 100: the ground between antennas counts as higher by it.
+    /// Error of the heights in the elevation files, m, 0 (its default) to 100.
+    ///
+    /// The ground between antennas counts as higher by it.
     pub error_m: f64,
 }
 

@@ -54,9 +54,9 @@ pub struct RelayHeight {
 pub struct InterfererHeight {
     /// Number of the interferer in the scenario file, from 1.
     pub index: usize,
-    /// Least and greatest altitude of its antenna above the straight line between the sites, m; absent if the files do not cover it.
+    /// Least and greatest altitude of its antenna above the straight line between the sites, m.
     ///
-    /// They differ for an interferer with an area.
+    /// Absent if the files do not cover it. They differ for an interferer with an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub altitude_m: Option<[f64; 2]>,
 }

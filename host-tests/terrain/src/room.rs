@@ -30,7 +30,7 @@ struct Stretch {
     h_m: f64,
 }
 
-/// Heights of the ground above the datum along the line, at equal steps, m: the highest within the position error.
+/// Highest ground within the position error along the line, at equal steps, m above the datum.
 struct Ridge {
     step_m: f64,
     heights_m: Vec<f64>,
@@ -73,7 +73,7 @@ impl Ridge {
             .take_while(move |[x_m, _]| *x_m <= to_m)
     }
 
-    /// Returns true if no hop between the two intervals has less than `share` of its first Fresnel zone free of the ground.
+    /// Returns true if `share` of the first Fresnel zone of every hop between the two intervals is free.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
         self.between([a, d]).all(|[x, height]| {
@@ -108,7 +108,7 @@ fn steps_of(length_m: f64, step_m: f64) -> (f64, u32) {
     (length_m / steps.max(1.0), steps as u32)
 }
 
-/// Returns the interval of x, m, in which each relay's hops stay clear or grazing, as they are in `report`.
+/// Returns the interval of x, m, in which each relay's hops stay as clear as they are in `report`.
 ///
 /// While all relays are in their intervals, within the position error, no hop gets worse than that, and each relay keeps its height above
 /// the ground. `None` for a relay for which that does not hold within the position error of its position.

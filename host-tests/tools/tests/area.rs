@@ -692,7 +692,7 @@ fn the_error_of_the_location_is_that_of_fits() {
                 each.map(|((at, heard), error)| ((heard - ln(of, at)) / error).powi(2))
                     .sum()
             };
-            // Coordinate search along the directions of a Gauss-Newton step by differences.
+            // Gauss-Newton steps with slopes by differences.
             let mut fit = truth;
             for _ in 0..8 {
                 let step = [1e-4, 1e-2, 1e-2];
@@ -719,8 +719,9 @@ fn the_error_of_the_location_is_that_of_fits() {
                 for i in 0..3 {
                     for j in i + 1..3 {
                         let share = normal[j][i] / normal[i][i];
-                        for k in i..3 {
-                            normal[j][k] -= share * normal[i][k];
+                        let row = normal[i];
+                        for (below, above) in normal[j].iter_mut().zip(row) {
+                            *below -= share * above;
                         }
                         right[j] -= share * right[i];
                     }
@@ -744,7 +745,7 @@ fn the_error_of_the_location_is_that_of_fits() {
     }
 }
 
-/// Checks the report and the maps of the location by relays with `[listen]` against their simulated searches.
+/// Checks the report and the map of the location against the simulated searches.
 #[test]
 fn the_command_says_from_where_relays_locate_the_interferer() {
     let folder = tempfile::tempdir().unwrap();

@@ -212,7 +212,7 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     );
 }
 
-/// Compares the flights of relays that choose x by themselves with their plans, and tries random positions in their rooms.
+/// Compares flights with their plans, and tries random positions in the rooms of the relays.
 #[test]
 fn relays_fly_over_the_terrain_by_themselves() {
     let folder = tempfile::tempdir().unwrap();
@@ -234,7 +234,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
             // The tolerance on the SIR is 1e-4.
             let off_m = (relay.x_m - place.x_m).abs();
             assert!(off_m < 0.5, "seed {seed}: {relay:?} {place:?}");
-            assert_eq!(relay.altitude_m, place.altitude_m);
+            assert_eq!(relay.altitude_m.to_bits(), place.altitude_m.to_bits());
         }
         let flight = flight.compared(&known, best.terrain_sir_db);
         losses.push(flight.loss_db.unwrap());
@@ -244,6 +244,22 @@ fn relays_fly_over_the_terrain_by_themselves() {
             None => clear += 1,
         }
         assert_eq!(flight.without.len(), usize::from(relays));
+        // The loss of a relay leaves the chain of the others, unless too few are left to agree.
+        for lost in flight.without.iter().filter(|_| relays > 2) {
+            let mut others = own.clone();
+            let left = own.relays.iter().filter(|(index, _)| **index != lost.lost);
+            let left = (1..).zip(left.map(|(_, relay)| relay.clone()));
+            others.relays = left.collect();
+            let closed = flown(&others, relays - 1, PlannedMethod::Align, 1e-4).unwrap();
+            let below = elevation.report(&others, &closed.plan).unwrap();
+            let off_db = below.terrain_sir_db - lost.terrain_sir_db.unwrap();
+            assert!(off_db.abs() < 0.3, "seed {seed}: {lost:?} {off_db}");
+            let is_low = lost
+                .problem
+                .as_ref()
+                .is_some_and(|line| line.contains(" is blocked: "));
+            assert_eq!(is_low, below.blocked().is_some(), "seed {seed}: {lost:?}");
+        }
         let ground = elevation.ground(&own).unwrap();
         let report = elevation.report(&own, &by_themselves.plan).unwrap();
         for _ in 0..50 {
@@ -447,7 +463,7 @@ fn positions_over_terrain_are_reported_with_their_gain() {
     );
 }
 
-/// Compares SIRs with interferers on hills with a computation from the heights of the hills, and the search with brute force.
+/// Compares SIRs with interferers on hills with a computation from the heights of the hills.
 #[test]
 fn interferers_stand_on_the_ground() {
     let folder = tempfile::tempdir().unwrap();
@@ -629,7 +645,7 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     let plan = path("plan.toml");
-    let arguments = format!("--scenario {EXAMPLE} --uavs 5 --altitude terrain --json --out {plan}");
+    let arguments = format!("--scenario {EXAMPLE} --uavs 4 --altitude terrain --json --out {plan}");
     let (status, json, line) = run(&arguments);
     assert_eq!((status, line.as_str()), (Some(0), ""));
     let report: Value = serde_json::from_str(&json).unwrap();
@@ -637,19 +653,15 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     let sir_db = flight["terrain_sir_db"].as_f64().unwrap();
     let loss_db = report["terrain_sir_db"].as_f64().unwrap() - sir_db;
     assert!(
-        (flight["loss_db"].as_f64().unwrap() - loss_db).abs() < 1e-9 && loss_db < 6.0,
+        (flight["loss_db"].as_f64().unwrap() - loss_db).abs() < 1e-9 && loss_db < 12.0,
         "{flight}"
     );
     let without = flight["without"].as_array().unwrap();
-    let blocked = without[4]["problem"].as_str().unwrap();
+    // Its last hop would be blocked.
+    let blocked = without[0]["problem"].as_str().unwrap();
     assert!(
-        blocked.starts_with("hop 5 (relay 4 to Rx) is blocked: the ground at x = 44"),
+        blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 44"),
         "{blocked}"
-    );
-    let lowest = without[0]["problem"].as_str().unwrap();
-    assert!(
-        lowest.contains("relay 2 on its way from x = 1899 m to 1470 m is 13.9 m above the ground"),
-        "{lowest}"
     );
     let blocks = path("blocks");
     let provision = |more: &str| {

@@ -533,9 +533,9 @@ struct AreaOptions {
     /// Write the same as squares with geographic coordinates (GeoJSON), with the errors of --listen-svg. Needs a scenario with a site as well
     #[arg(long, value_name = "FILE")]
     area_geojson: Option<PathBuf>,
-    /// Draw the error with which relays that measure the interference locate the interferer, for each of its positions (SVG)
+    /// Draw the error of the location of the interferer for each of its positions (SVG)
     ///
-    /// Needs [listen] and a single interferer, with an area
+    /// Relays locate it by measurements. Needs [listen] and a single interferer, with an area
     #[arg(long, value_name = "FILE")]
     listen_svg: Option<PathBuf>,
     /// Accept a plan in which the way between two neighbours crosses a no-fly area
@@ -677,8 +677,9 @@ fn joined(lines: [Option<String>; 2]) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("; "))
 }
 
-/// Computes the location of the interferer by relays with `[listen]`, and writes the files of `--area-svg`, `--area-geojson` and
-/// `--listen-svg`.
+/// Computes the location of the interferer by relays with `[listen]`, and writes the maps.
+///
+/// They are the files of `--area-svg`, `--area-geojson` and `--listen-svg`.
 fn over_area(
     options: &Options,
     scenario: &Scenario,

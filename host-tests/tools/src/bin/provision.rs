@@ -295,9 +295,11 @@ impl<'a> Asked<'a> {
         let error_m = self.deployment.companion.position_error_m;
         let error_m = error_m.map_or(POSITION_ERROR_M, f64::from);
         if self.scenario.terrain.is_none() {
-            return match self.options.allow_blocked {
-                true => Err("--allow-blocked: is only for a scenario with a [terrain]".to_owned()),
-                false => Ok(None),
+            let line = "--allow-blocked: is only for a scenario with a [terrain]";
+            return if self.options.allow_blocked {
+                Err(line.to_owned())
+            } else {
+                Ok(None)
             };
         }
         let method = match self.method {
@@ -477,7 +479,7 @@ impl<'a> Asked<'a> {
         }
         let mut text = summary(&heading, places, self.scenario.line.as_ref());
         if let Some(simulated) = simulated {
-            text.push_str(&format!("\n{simulated}\n"));
+            text = format!("{text}\n{simulated}\n");
         }
         files.push(("summary.txt".to_owned(), text.clone().into_bytes()));
         folder::write(dir, &files, self.options.folder.force)?;

@@ -780,9 +780,9 @@ pub struct Cell {
     pub side_m: f64,
     /// SIR of the worst hop, dB, with the interferer in the middle of the cell at its greatest power.
     pub sir_db: f64,
-    /// Standard deviation of the location of an interferer there by relays with `[listen]`, m; infinite if they cannot locate it.
+    /// Standard deviation of the location of an interferer there by relays with `[listen]`, m.
     ///
-    /// `None` if it is not computed.
+    /// Infinite if they cannot locate it. `None` if it is not computed.
     pub error_m: Option<f64>,
 }
 

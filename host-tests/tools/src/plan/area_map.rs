@@ -188,7 +188,7 @@ fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2];
     )
 }
 
-/// Returns `cells` as the text of a GeoJSON file: one square for each, with the properties `sir_db` and `error_m`.
+/// Returns `cells` as the text of a GeoJSON file: a square for each, with `sir_db` and `error_m`.
 ///
 /// # Errors
 /// A line that names a cell that is too far from the line.

@@ -1,4 +1,4 @@
-//! Location of an interferer in an area by the measurements of relays (`[listen]`): from where, how exactly, and how soon.
+//! Location of an interferer in an area by the measurements of relays (`[listen]`).
 //!
 //! The error of the location is the Cramer-Rao bound. Relays at their positions before an estimate and at their planned positions
 //! measure ln I once each, with the relative error of `[listen]`, increased by the receiver's noise. Unknown are the power, x and the
@@ -19,7 +19,7 @@ use super::area::Cell;
 use crate::figures::sheet::FigureError;
 use crate::listening::{RandomScene, quantile};
 
-/// Largest error of a located interferer, as a fraction of its distance from the line between Tx and Rx.
+/// Largest error of a located interferer, as a fraction of its distance from the line Tx-Rx.
 ///
 /// The interference at the nearest point of the line is then known within 0.9 dB.
 pub const LOCATED: f64 = 0.1;
@@ -41,10 +41,14 @@ pub struct Search {
     /// Time from the start of the drones beside Tx to the first estimate, s; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate_s: Option<f64>,
-    /// Time to positions whose worst hop is at most 1 dB worse than with a known interferer, s; absent if that is not reached.
+    /// Time to positions with an SIR at most 1 dB below that with a known interferer, s.
+    ///
+    /// Absent if the relays do not reach such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placed_s: Option<f64>,
-    /// Distance of the last estimate from the interferer or its mirror image at the line, m; absent without an estimate.
+    /// Distance of the last estimate from the interferer or its mirror image at the line, m.
+    ///
+    /// Absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Standard deviation of the location by the Cramer-Rao bound, m.
@@ -54,11 +58,13 @@ pub struct Search {
 /// Report of the places of an area from which relays can locate the interferer.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Locating {
-    /// Fraction of the area from which the relays locate the interferer within a tenth of its distance from the line, 0 to 1.
+    /// Fraction of the area, 0 to 1, from which the relays locate the interferer.
+    ///
+    /// The error is then at most a tenth of its distance from the line.
     pub located: f64,
     /// Median over the area of the standard deviation of the location, m.
     pub error_m: f64,
-    /// Largest standard deviation of the location, m, and the interferer's position [x, y] there, m.
+    /// Largest standard deviation of the location, m.
     pub worst_error_m: f64,
     /// Position [x, y] of the interferer with the largest error, m.
     pub worst_at: [f64; 2],
@@ -156,7 +162,7 @@ fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     places
 }
 
-/// Returns the standard deviation of the location of the only source of `scene`, m, by the Cramer-Rao bound.
+/// Returns the Cramer-Rao bound of the location of the only source of `scene`: a standard deviation, m.
 pub fn error_m(scene: &Scene, places: &[Place], relative_error: f64) -> f64 {
     let Some(source) = scene.sources.first() else {
         return f64::INFINITY;

@@ -241,7 +241,7 @@ impl<'a> Search<'a> {
         each.collect()
     }
 
-    /// Returns the candidates for relay `relay` (from 0) at `x_m` and `levels` altitudes, from the lowest allowed one to the highest.
+    /// Returns the candidates for relay `relay` (from 0) at `x_m` and `levels` allowed altitudes.
     pub(super) fn above(
         &self,
         relay: usize,
@@ -261,7 +261,7 @@ impl<'a> Search<'a> {
         Ok(Candidate { x_m, h_m, amsl_m })
     }
 
-    /// Returns the SIR of the worst hop of a chain as [`worst_sir`](Self::worst_sir) does, but less for altitudes that are not allowed.
+    /// Returns the SIR of the worst hop of a chain, linear, and much less for altitudes not allowed.
     ///
     /// Every chain with such an altitude ranks behind all chains without one.
     pub(super) fn rank(&mut self, chain: &[Candidate]) -> Result<f64, String> {

@@ -64,9 +64,9 @@ impl Elevation {
         Ok(ground.with_error_m(self.spec.error_m))
     }
 
-    /// Returns the scene of `relays` relays, whose interferers stand on the ground; `None` in a random field.
+    /// Returns the scene of `relays` relays, whose interferers stand on the ground.
     ///
-    /// An interferer that the files do not cover is at altitude 0.
+    /// `None` in a random field. An interferer that the files do not cover is at altitude 0.
     ///
     /// # Errors
     /// Those of [`ground`](Self::ground).
@@ -166,7 +166,7 @@ impl Elevation {
 /// Largest number of samples along one side of an area.
 const SAMPLES: f64 = 200.0;
 
-/// Returns points of an area at most `step_m` apart, or at a 200th of its sides; and points of its boundary.
+/// Returns points of an area and its boundary at most `step_m` apart, or at a 200th of its sides.
 fn sampled(area: &Area, step_m: f64) -> Vec<[f64; 2]> {
     let [low, high] = area.bounds();
     #[expect(
