@@ -76,6 +76,7 @@ pub fn scene_of(link: &Link) -> Option<Scene> {
             y_m: link.y_i,
         }],
         areas: std::collections::BTreeMap::new(),
+        heights_m: std::collections::BTreeMap::new(),
         mu_los: link.mu_los,
         mu_nlos: link.mu_nlos,
         eta: link.eta,

@@ -51,6 +51,7 @@ struct RawTerrain {
     mast_m: Option<f64>,
     above_ground_m: Option<f64>,
     above_ground_max_m: Option<f64>,
+    error_m: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -248,6 +249,10 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
     };
     let areas = source_areas(file, raw.interferer.as_deref().unwrap_or_default(), &room)?;
     let no_fly = no_fly(file, raw.no_fly, line.as_ref())?;
+    let masts = raw.interferer.iter().flatten().enumerate();
+    let masts_m = masts
+        .filter_map(|(at, raw)| Some((at, raw.mast_m?)))
+        .collect();
     let interference = interference(
         file,
         raw.interferer.as_deref(),
@@ -271,6 +276,7 @@ pub(super) fn build(file: &str, raw: RawFile) -> Result<Scenario, ScenarioError>
         channel: channel(file, &raw.channel)?,
         interference,
         areas,
+        masts_m,
         no_fly,
         listen: raw.listen.map(|raw| ListenSpec {
             following: raw.following,
@@ -327,6 +333,7 @@ fn terrain(file: &str, raw: &RawTerrain, has_site: bool) -> Result<TerrainSpec, 
         mast_m: raw.mast_m.unwrap_or(default.mast_m),
         above_ground_m: least,
         above_ground_max_m: raw.above_ground_max_m,
+        error_m: raw.error_m.unwrap_or(default.error_m),
         ..default
     })
 }
@@ -800,6 +807,7 @@ pub(super) struct RawSource {
     lat_deg: Option<f64>,
     lon_deg: Option<f64>,
     amsl_m: Option<f64>,
+    mast_m: Option<f64>,
 }
 
 pub(super) struct RelayArea<'a> {

@@ -190,6 +190,7 @@ const TERRAIN: Keys = &[
     optional("mast_m", Number(range(0.0, 200.0, "m"))),
     optional("above_ground_m", Number(range(0.0, 1e4, "m"))),
     optional("above_ground_max_m", Number(range(0.1, 1e4, "m"))),
+    optional("error_m", Number(range(0.0, 100.0, "m"))),
 ];
 
 const POWERS: Keys = &[
@@ -256,6 +257,7 @@ const INTERFERER: Keys = &[
     without(&["x_m", "area"], "lon_deg", Number(LONGITUDE)),
     without(&["x_m", "y_m", "area"], "amsl_m", Number(AMSL)),
     optional("area", Rule::Table(AREA)),
+    optional("mast_m", Number(range(0.0, 1000.0, "m"))),
 ];
 
 /// Largest number of corners of a polygon.

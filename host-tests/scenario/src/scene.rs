@@ -45,7 +45,7 @@ impl Corridor {
     }
 }
 
-/// A chain of relays from Tx at (0, 0) to Rx at (D, 0), and any number of interferers on the ground.
+/// A chain of relays from Tx at (0, 0) to Rx at (D, 0), and any number of interferers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Distance D from Tx to Rx, m, > 0.
@@ -66,6 +66,10 @@ pub struct Scene {
     /// Each receiver gets the interference from the nearest point of the area. An SIR is then that of the source's worst position
     /// for this hop, and the SIR of the worst hop is that of the source's worst position.
     pub areas: BTreeMap<usize, Area>,
+    /// Least and greatest altitude of the sources, m, by index in `sources`.
+    ///
+    /// It is 0 for a source that is not in the map. Each receiver gets the interference from the nearest altitude between the two.
+    pub heights_m: BTreeMap<usize, [f64; 2]>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,
     /// Path-loss factor mu between two points on the ground, 1/m^2, > 0. The path loss at distance d is mu d^2.
@@ -139,6 +143,7 @@ impl Scene {
                 .iter()
                 .map(|(at, source)| (*at, source.area.clone()))
                 .collect(),
+            heights_m: BTreeMap::new(),
             mu_los: channel.mu_los(),
             mu_nlos: channel.mu_nlos(),
             eta: channel.eta(),
@@ -156,9 +161,17 @@ impl Scene {
     /// Returns the interference power at a relay at the position `at`, W: the sum over all sources.
     pub fn interference_w(&self, at: impl Into<Place>) -> f64 {
         let Place { x, y, h } = at.into();
-        let each = self.offsets(x, y);
-        each.map(|(power_w, [dx, dy])| received_w(power_w, self.eta, dx, dy, h))
-            .sum()
+        let each = self.offsets(x, y).enumerate();
+        each.map(|(at, (power_w, [dx, dy]))| {
+            received_w(power_w, self.eta, dx, dy, self.climb_m(at, h))
+        })
+        .sum()
+    }
+
+    /// Returns the altitude of a receiver at `h_m` above source `at`, m.
+    fn climb_m(&self, at: usize, h_m: f64) -> f64 {
+        let [low, high] = self.heights_m.get(&at).copied().unwrap_or_default();
+        h_m - h_m.clamp(low, high)
     }
 
     /// Returns the interference power at Rx, W; infinite if an interferer is at the same point as Rx.
@@ -168,9 +181,11 @@ impl Scene {
 
     /// Returns the interference power on the ground at the distance `x_m` from Tx toward Rx, W.
     pub fn interference_on_ground_w(&self, x_m: f64) -> f64 {
-        let each = self.offsets(x_m, 0.0);
-        each.map(|(power_w, [dx, dy])| received_w(power_w, self.mu_nlos, dx, dy, 0.0))
-            .sum()
+        let each = self.offsets(x_m, 0.0).enumerate();
+        each.map(|(at, (power_w, [dx, dy]))| {
+            received_w(power_w, self.mu_nlos, dx, dy, self.climb_m(at, 0.0))
+        })
+        .sum()
     }
 
     /// Returns the power of each source, W, and the offset from it to (`x`, `y`), m.

@@ -45,6 +45,10 @@ pub struct Scenario {
     pub interference: Interference,
     /// Areas of interferers that may be anywhere in them, by the index (from 0) of the interferer.
     pub areas: BTreeMap<usize, SourceArea>,
+    /// Heights of the interferers' antennas above the ground, m, 0 to 1000, by index (from 0).
+    ///
+    /// It is 0 for an interferer that is not in the map. The planner uses them with elevation files.
+    pub masts_m: BTreeMap<usize, f64>,
     /// Areas in which relays may not fly, for the planner.
     pub no_fly: Vec<NoFly>,
     /// Settings for relays that locate the interferer by measurements; `None` if they do not.
@@ -80,6 +84,10 @@ pub struct TerrainSpec {
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground below it, m; `None` for no limit.
     pub above_ground_max_m: Option<f64>,
+    /// Error of the heights in the elevation files, m, 0 (its default) to 100.
+    ///
+    /// The ground between antennas counts as higher by it.
+    pub error_m: f64,
 }
 
 impl TerrainSpec {
@@ -90,6 +98,7 @@ impl TerrainSpec {
             mast_m: 2.0,
             above_ground_m: 0.0,
             above_ground_max_m: None,
+            error_m: 0.0,
         }
     }
 }
@@ -317,6 +326,7 @@ impl Default for Scenario {
                 y_m: 400.0,
             }]),
             areas: BTreeMap::new(),
+            masts_m: BTreeMap::new(),
             no_fly: Vec::new(),
             listen: None,
             noise: Noise::default(),

@@ -6,6 +6,7 @@
 //! | [`profile`] | [`profile::Ground`]: the terrain along the line from Tx to Rx; profile and clearance of a hop |
 //! | [`diffraction`] | the diffraction loss of a profile by Recommendation ITU-R P.526-15 |
 //! | [`report`] | what is reported for each hop and each relay of a chain |
+//! | [`room`] | the interval of x of each relay in which its hops stay clear |
 //!
 //! Heights are in metres above the mean sea level. Errors are lines of text that name the file, the place and the value.
 //!
@@ -20,3 +21,4 @@ pub mod diffraction;
 pub mod grid;
 pub mod profile;
 pub mod report;
+pub mod room;

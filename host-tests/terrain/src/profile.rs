@@ -26,6 +26,9 @@ const MOST_POINTS: f64 = 20_000.0;
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
 pub const SITE_ERROR_M: f64 = 15.0;
 
+/// Distance from a site over which the error of the heights grows, m.
+const GROWTH_M: f64 = 100.0;
+
 /// Terrain along the line from Tx to Rx.
 #[derive(Clone, Copy)]
 #[expect(missing_debug_implementations, reason = "millions of heights")]
@@ -33,6 +36,8 @@ pub struct Ground<'a> {
     terrain: &'a Terrain,
     axis: Axis,
     step_m: f64,
+    /// Error of the heights, m.
+    error_m: f64,
     /// Antennas of Tx and Rx, with their heights.
     pub ends: [Node; 2],
 }
@@ -118,8 +123,23 @@ impl<'a> Ground<'a> {
             terrain,
             axis,
             step_m,
+            error_m: 0.0,
             ends,
         })
+    }
+
+    /// Returns the terrain with an error of its heights: profiles and the highest ground are higher by it.
+    ///
+    /// From Tx and from Rx on the error grows over 100 m, because their antennas stand on the same ground.
+    #[must_use]
+    pub const fn with_error_m(self, error_m: f64) -> Self {
+        Self { error_m, ..self }
+    }
+
+    /// Returns by how much the ground counts as higher at `x_m` along the line, m.
+    pub fn raise_m(&self, x_m: f64) -> f64 {
+        let from_site_m = x_m.min(self.axis.distance_m() - x_m);
+        self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)
     }
 
     /// Returns the largest distance of two points of a profile, m: a quarter of a cell.
@@ -177,6 +197,7 @@ impl<'a> Ground<'a> {
     pub fn highest_m(&self, node: Node, radius_m: f64) -> Result<f64, String> {
         let rings = (radius_m / self.step_m).ceil().min(64.0);
         let mut highest = self.height_m(node.x_m, node.y_m)?;
+        let raise_m = self.raise_m(node.x_m);
         let mut ring = 1.0;
         while ring <= rings {
             let radius = radius_m * ring / rings;
@@ -192,7 +213,7 @@ impl<'a> Ground<'a> {
             }
             ring += 1.0;
         }
-        Ok(highest)
+        Ok(highest + raise_m)
     }
 
     /// Returns the profile of the hop between two antennas.
@@ -211,8 +232,9 @@ impl<'a> Ground<'a> {
         let steps = (length / self.step_m).ceil().clamp(16.0, MOST_POINTS) as u32;
         let points = (0..=steps).map(|step| {
             let share = f64::from(step) / f64::from(steps);
-            let height = self.height_m(from.x_m + share * dx, from.y_m + share * dy)?;
-            Ok([share * length, height])
+            let x_m = from.x_m + share * dx;
+            let height = self.height_m(x_m, from.y_m + share * dy)?;
+            Ok([share * length, height + self.raise_m(x_m)])
         });
         Ok(Profile {
             nodes,

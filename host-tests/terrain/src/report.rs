@@ -49,6 +49,18 @@ pub struct RelayHeight {
     pub above_obstacle_m: f64,
 }
 
+/// Altitude of an interferer on the ground.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct InterfererHeight {
+    /// Number of the interferer in the scenario file, from 1.
+    pub index: usize,
+    /// Least and greatest altitude of its antenna above the straight line between the sites, m.
+    ///
+    /// Absent if the files do not cover it. They differ for an interferer with an area.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub altitude_m: Option<[f64; 2]>,
+}
+
 /// Terrain below a chain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TerrainReport {
@@ -56,6 +68,9 @@ pub struct TerrainReport {
     pub hops: Vec<HopReport>,
     /// Heights of the relays above the terrain, from Tx to Rx.
     pub heights: Vec<RelayHeight>,
+    /// Altitudes of the interferers, with which the SIRs of the hops are computed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub interferers: Vec<InterfererHeight>,
     /// Position error within which obstacles below a relay count, m.
     pub position_error_m: f64,
     /// SIR of the worst hop with the diffraction losses, linear, as `sir` is without them.
@@ -140,6 +155,7 @@ impl TerrainReport {
         Ok(Self {
             hops,
             heights: heights.collect::<Result<_, String>>()?,
+            interferers: Vec::new(),
             position_error_m,
             terrain_sir,
             terrain_sir_db: 10.0 * terrain_sir.log10(),
@@ -208,8 +224,10 @@ impl TerrainReport {
     fn name(&self, hop: usize) -> String {
         let node = |at: usize| match at {
             0 => "Tx".to_owned(),
-            at if at > self.heights.len() => "Rx".to_owned(),
-            at => format!("relay {at}"),
+            at => self
+                .heights
+                .get(at - 1)
+                .map_or("Rx".to_owned(), |relay| format!("relay {}", relay.index)),
         };
         format!("hop {} ({} to {})", hop + 1, node(hop), node(hop + 1))
     }
@@ -243,9 +261,25 @@ impl TerrainReport {
                 relay.index, relay.amsl_m, relay.above_ground_m, relay.above_obstacle_m
             );
         }
+        for InterfererHeight { index, altitude_m } in &self.interferers {
+            _ = match altitude_m {
+                Some([low, high]) if high > low => writeln!(
+                    text,
+                    "interferer {index}: {low:.1} to {high:.1} m above the straight line between the sites"
+                ),
+                Some([low, _]) => writeln!(
+                    text,
+                    "interferer {index}: {low:.1} m above the straight line between the sites"
+                ),
+                None => writeln!(
+                    text,
+                    "interferer {index}: not covered by the elevation files, counts at the height of the line between the sites"
+                ),
+            };
+        }
         _ = writeln!(
             text,
-            "worst hop with terrain: {:.3} dB (diffraction by ITU-R P.526; the interference is that without terrain)",
+            "worst hop with terrain: {:.3} dB (diffraction by ITU-R P.526, but none of the interference)",
             self.terrain_sir_db
         );
         text

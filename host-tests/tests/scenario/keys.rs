@@ -134,6 +134,11 @@ fn channel_and_interferer_rows() -> Vec<Row> {
             source("power_w = 1\nx_m = 0\ny_m = @"),
             PLACES,
         ),
+        row(
+            "interferer[1].mast_m",
+            source("power_w = 1\nx_m = 0\ny_m = 0\nmast_m = @"),
+            (["-0.1", "0", "1000", "1000.1"], "0 to 1000 m"),
+        ),
     ]
 }
 

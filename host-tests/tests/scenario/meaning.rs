@@ -51,6 +51,7 @@ fn every_key_sets_its_value() {
         areas: BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
+        masts_m: BTreeMap::new(),
         plan: None,
         distance_m: 1500.0,
         altitude_m: 25.0,

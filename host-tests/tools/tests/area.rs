@@ -19,9 +19,10 @@ use chacha20::ChaCha8Rng;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::Value;
 use uav_relay::Placement;
-use uav_relay_scenario::Scenario;
-use uav_relay_scenario::scene::Scene;
+use uav_relay_scenario::scene::{Place, Scene};
+use uav_relay_scenario::{Interference, Scenario, Source};
 use uav_relay_tools::plan::area;
+use uav_relay_tools::plan::locating::error_m;
 use uav_relay_tools::plan::{Number, Plan, PlanRequest, plan};
 
 fn variable(name: &str, default: u64) -> u64 {
@@ -634,6 +635,189 @@ fn the_command_reports_the_area_and_draws_its_map() {
     let (succeeds, line) = provision(folder, "area.toml");
     assert!(
         !succeeds && line.contains("interferer[0].area") && line.contains("1300.0"),
+        "{line}"
+    );
+}
+
+/// Compares the error of the location with the scatter of least-squares fits to drawn measurements.
+#[test]
+fn the_error_of_the_location_is_that_of_fits() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(7);
+    let mut gauss = {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        move || (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>()
+    };
+    for case in 0..variable("COUNT", 12) {
+        let place = |rng: &mut ChaCha8Rng| Place {
+            x: rng.random_range(0.0..2000.0),
+            y: rng.random_range(-30.0..30.0) * f64::from(u32::from(case % 2 == 0)),
+            h: rng.random_range(20.0..120.0),
+        };
+        let places: Vec<Place> = (0..8).map(|_| place(rng)).collect();
+        let mut scenario = Scenario {
+            distance_m: 2000.0,
+            ..Scenario::default()
+        };
+        let truth = [
+            rng.random_range(0.1..10.0_f64).ln(),
+            rng.random_range(200.0..1800.0),
+            rng.random_range(300.0..700.0),
+        ];
+        let source = Source {
+            power_w: truth[0].exp(),
+            x_m: truth[1],
+            y_m: truth[2],
+        };
+        scenario.interference = Interference::Sources(vec![source]);
+        scenario.noise.power_dbm = (case % 3 == 0).then_some(-60.0);
+        let scene = Scene::new(&scenario, 2).unwrap();
+        let (relative, runs) = (0.003, 400);
+        let bound = error_m(&scene, &places, relative);
+        let ln = |[p, x, y]: [f64; 3], at: &Place| {
+            p - ((at.x - x).powi(2) + (at.y - y).powi(2) + at.h.powi(2)).ln()
+        };
+        let mut squares = 0.0;
+        for _ in 0..runs {
+            let errors: Vec<f64> = places
+                .iter()
+                .map(|at| relative * (1.0 + scene.noise_w / scene.interference_w(*at)))
+                .collect();
+            let heard: Vec<f64> = places
+                .iter()
+                .zip(&errors)
+                .map(|(at, error)| ln(truth, at) + error * gauss())
+                .collect();
+            let cost = |of: [f64; 3]| -> f64 {
+                let each = places.iter().zip(&heard).zip(&errors);
+                each.map(|((at, heard), error)| ((heard - ln(of, at)) / error).powi(2))
+                    .sum()
+            };
+            // Gauss-Newton steps with slopes by differences.
+            let mut fit = truth;
+            for _ in 0..8 {
+                let step = [1e-4, 1e-2, 1e-2];
+                let with = |axis: usize, sign: f64| {
+                    let mut of = fit;
+                    of[axis] += sign * step[axis];
+                    of
+                };
+                let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
+                for ((at, heard), error) in places.iter().zip(&heard).zip(&errors) {
+                    let slope = [0, 1, 2].map(|axis| {
+                        (ln(with(axis, 1.0), at) - ln(with(axis, -1.0), at))
+                            / (2.0 * step[axis] * error)
+                    });
+                    let off = (heard - ln(fit, at)) / error;
+                    for i in 0..3 {
+                        right[i] += slope[i] * off;
+                        for j in 0..3 {
+                            normal[i][j] += slope[i] * slope[j];
+                        }
+                    }
+                }
+                // Gaussian elimination.
+                for i in 0..3 {
+                    for j in i + 1..3 {
+                        let share = normal[j][i] / normal[i][i];
+                        let row = normal[i];
+                        for (below, above) in normal[j].iter_mut().zip(row) {
+                            *below -= share * above;
+                        }
+                        right[j] -= share * right[i];
+                    }
+                }
+                let mut change = [0.0; 3];
+                for i in (0..3).rev() {
+                    let known: f64 = (i + 1..3).map(|k| normal[i][k] * change[k]).sum();
+                    change[i] = (right[i] - known) / normal[i][i];
+                }
+                fit = [0, 1, 2].map(|axis| fit[axis] + change[axis]);
+            }
+            assert!(cost(fit) <= cost(truth) + 1e-6);
+            squares += (fit[1] - truth[1]).powi(2) + (fit[2] - truth[2]).powi(2);
+        }
+        let scatter = (squares / f64::from(runs)).sqrt();
+        println!("case {case}: bound {bound:.3} m, scatter {scatter:.3} m");
+        assert!(
+            (scatter / bound - 1.0).abs() < 0.15,
+            "case {case}: {bound} {scatter}"
+        );
+    }
+}
+
+/// Checks the report and the map of the location against the simulated searches.
+#[test]
+fn the_command_says_from_where_relays_locate_the_interferer() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "[geometry]\ndistance_m = 1000\naltitude_m = 20\nmin_separation_m = 4\n[power]\ntx_w = 80\nuav_w = 1\n[listen]\nrelative_error = 0.03\n\
+                [[interferer]]\npower_w = [40.0, 80.0]\narea = { rectangle = [[200.0, 150.0], [900.0, 700.0]] }\n";
+    std::fs::write(folder.path().join("listen.toml"), text).unwrap();
+    let args = [
+        "--scenario",
+        "listen.toml",
+        "--uavs",
+        "6",
+        "--listen-svg",
+        "error.svg",
+    ];
+    let (status, report) = json(folder.path(), &args);
+    assert_eq!(status, 0, "{report}");
+    let locating = &report["locating"];
+    println!("{locating:#}");
+    let number = |of: &Value, key: &str| of[key].as_f64();
+    assert!(
+        number(locating, "located").unwrap() > 0.2 && number(locating, "located").unwrap() <= 1.0
+    );
+    assert!(number(locating, "worst_error_m") >= number(locating, "error_m"));
+    let searches = locating["searches"].as_array().unwrap();
+    assert_eq!(searches.len(), 5);
+    for one in searches {
+        let (estimate, placed) = (
+            number(one, "estimate_s").unwrap(),
+            number(one, "placed_s").unwrap(),
+        );
+        assert!(estimate > 1.0 && placed < 280.0, "{one}");
+        // The relays measure many times: the bound is for one measurement at each position.
+        assert!(
+            number(one, "off_m").unwrap() < 3.0 * number(one, "error_m").unwrap(),
+            "{one}"
+        );
+    }
+    let svg = std::fs::read_to_string(folder.path().join("error.svg")).unwrap();
+    roxmltree::Document::parse(&svg).unwrap();
+    assert!(
+        svg.contains("Error of the location by [listen] with the interferer at each position, "),
+        "{svg}"
+    );
+    let output = cargo_plan(folder.path(), &["--scenario", "listen.toml", "--uavs", "6"]);
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        table.contains("listening: from ")
+            && table
+                .matches("simulated with the interferer at x = ")
+                .count()
+                == 5,
+        "{table}"
+    );
+    std::fs::write(
+        folder.path().join("deaf.toml"),
+        text.replace("[listen]\nrelative_error = 0.03\n", ""),
+    )
+    .unwrap();
+    let output = cargo_plan(
+        folder.path(),
+        &[
+            "--scenario",
+            "deaf.toml",
+            "--uavs",
+            "6",
+            "--listen-svg",
+            "error.svg",
+        ],
+    );
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.code() == Some(2) && line.contains("--listen-svg error.svg: needs [listen]"),
         "{line}"
     );
 }

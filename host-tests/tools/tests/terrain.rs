@@ -19,10 +19,14 @@ use std::process::Command;
 use files::Raster;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::Value;
+use uav_relay::Placement;
+use uav_relay_scenario::PlannedMethod;
 use uav_relay_scenario::Scenario;
-use uav_relay_scenario::scene::Scene;
+use uav_relay_terrain::profile::State;
+use uav_relay_tools::plan::flown::flown;
 use uav_relay_tools::plan::over_terrain::{self, Candidate, Search};
 use uav_relay_tools::plan::terrain::Elevation;
+use uav_relay_tools::plan::terrain_flight::{Flight, with_altitudes};
 use uav_relay_tools::plan::{Number, PlanRequest, plan};
 
 const EXAMPLE: &str = "../../examples/hills.toml";
@@ -119,7 +123,7 @@ fn the_search_finds_the_best_chain_of_a_small_grid() {
         };
         let scenario = scene(folder.path(), &mut rng(seed), more);
         let elevation = elevation(&scenario);
-        let scene = Scene::new(&scenario, relays).unwrap();
+        let scene = elevation.scene(&scenario, relays).unwrap().unwrap();
         let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
         let grid = search.grid(columns, levels).unwrap();
         let (chain, sir) = search.best(&grid, 0.0).unwrap();
@@ -167,7 +171,7 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
         let known = over_terrain::best(&scenario, &elevation, relays, 1e-4).unwrap();
         let report = elevation.report(&scenario, &known).unwrap();
         // The terrain is sampled more finely in the report.
-        let scene = Scene::new(&scenario, relays).unwrap();
+        let scene = elevation.scene(&scenario, relays).unwrap().unwrap();
         assert!(
             report.terrain_sir
                 <= scene.chain_sir(
@@ -208,8 +212,113 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
     );
 }
 
+/// Compares flights with their plans, and tries random positions in the rooms of the relays.
+#[test]
+fn relays_fly_over_the_terrain_by_themselves() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = std::env::var("COUNT").map_or(4, |text| text.parse().unwrap());
+    let (mut losses, mut clear, mut rooms_m, mut warned) = (Vec::new(), 0_u64, Vec::new(), 0);
+    for seed in 1..=count {
+        let rng = &mut rng(seed);
+        let scenario = scene(folder.path(), rng, "");
+        let elevation = elevation(&scenario);
+        let relays = rng.random_range(2..=8);
+        let known = over_terrain::best(&scenario, &elevation, relays, 1e-4).unwrap();
+        let best = elevation.report(&scenario, &known).unwrap();
+        let own = with_altitudes(&scenario, &elevation, &known, 1e-4).unwrap();
+        assert_eq!(own.relays.len(), usize::from(relays));
+        let by_themselves = flown(&own, relays, PlannedMethod::Align, 1e-4).unwrap();
+        let how = (PlannedMethod::Align, 1e-4);
+        let flight = Flight::new(&own, &elevation, &by_themselves.plan, how, false).unwrap();
+        for (relay, (place, _)) in flight.relays.iter().zip(&by_themselves.plan.places) {
+            // The tolerance on the SIR is 1e-4.
+            let off_m = (relay.x_m - place.x_m).abs();
+            assert!(off_m < 0.5, "seed {seed}: {relay:?} {place:?}");
+            assert_eq!(relay.altitude_m.to_bits(), place.altitude_m.to_bits());
+        }
+        let flight = flight.compared(&known, best.terrain_sir_db);
+        losses.push(flight.loss_db.unwrap());
+        warned += flight.warnings().count();
+        match &flight.problem {
+            Some(problem) => println!("seed {seed}, {relays} relays: {problem}"),
+            None => clear += 1,
+        }
+        assert_eq!(flight.without.len(), usize::from(relays));
+        // The loss of a relay leaves the chain of the others, unless too few are left to agree.
+        for lost in flight.without.iter().filter(|_| relays > 2) {
+            let mut others = own.clone();
+            let left = own.relays.iter().filter(|(index, _)| **index != lost.lost);
+            let left = (1..).zip(left.map(|(_, relay)| relay.clone()));
+            others.relays = left.collect();
+            let closed = flown(&others, relays - 1, PlannedMethod::Align, 1e-4).unwrap();
+            let below = elevation.report(&others, &closed.plan).unwrap();
+            let off_db = below.terrain_sir_db - lost.terrain_sir_db.unwrap();
+            assert!(off_db.abs() < 0.3, "seed {seed}: {lost:?} {off_db}");
+            let is_low = lost
+                .problem
+                .as_ref()
+                .is_some_and(|line| line.contains(" is blocked: "));
+            assert_eq!(is_low, below.blocked().is_some(), "seed {seed}: {lost:?}");
+        }
+        let ground = elevation.ground(&own).unwrap();
+        let report = elevation.report(&own, &by_themselves.plan).unwrap();
+        for _ in 0..50 {
+            let somewhere = flight.relays.iter().map(|relay| {
+                let [from, to] = relay.room_m.unwrap_or([f64::from(relay.x_m); 2]);
+                let mut error = || rng.random_range(-0.57..0.57);
+                let [dx, dy, dh]: [f64; 3] = [error(), error(), error()];
+                let place = Placement {
+                    x_m: (rng.random_range(from..=to) + dx) as f32,
+                    y_m: dy as f32,
+                    altitude_m: relay.altitude_m + dh as f32,
+                };
+                (relay.room_m, ground.relay(place).unwrap())
+            });
+            let [tx, rx] = ground.ends;
+            let at = |node| (Some([0.0; 2]), node);
+            let nodes = [vec![at(tx)], somewhere.collect(), vec![at(rx)]].concat();
+            for (pair, hop) in nodes.windows(2).zip(&report.hops) {
+                let now = ground
+                    .profile([pair[0].1, pair[1].1])
+                    .unwrap()
+                    .clearance(0.1499);
+                let holds = match hop.state {
+                    State::Clear => now.state == State::Clear,
+                    State::Grazing => now.state != State::Blocked,
+                    State::Blocked => true,
+                };
+                let has_rooms = pair.iter().all(|(room, _)| room.is_some());
+                assert!(holds || !has_rooms, "seed {seed}: {hop:?} {now:?}");
+            }
+        }
+        rooms_m.extend(
+            flight
+                .relays
+                .iter()
+                .filter_map(|relay| relay.room_m)
+                .map(|[from, to]| to - from),
+        );
+    }
+    for numbers in [&mut losses, &mut rooms_m] {
+        numbers.sort_by(f64::total_cmp);
+    }
+    let at = |numbers: &[f64], share: f64| numbers[(share * (numbers.len() - 1) as f64) as usize];
+    println!(
+        "{clear} of {count} flights clear; loss: median {:.2}, 90 % {:.2} dB; {} rooms, median {:.0} m; {warned} warnings",
+        at(&losses, 0.5),
+        at(&losses, 0.9),
+        rooms_m.len(),
+        at(&rooms_m, 0.5)
+    );
+    assert!(2 * clear > count, "{clear}");
+}
+
 fn run(arguments: &str) -> (Option<i32>, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_plan"))
+    run_as(env!("CARGO_BIN_EXE_plan"), arguments)
+}
+
+fn run_as(program: &str, arguments: &str) -> (Option<i32>, String, String) {
+    let output = Command::new(program)
         .args(arguments.split_whitespace())
         .output()
         .unwrap();
@@ -354,6 +463,283 @@ fn positions_over_terrain_are_reported_with_their_gain() {
     );
 }
 
+/// Compares SIRs with interferers on hills with a computation from the heights of the hills.
+#[test]
+fn interferers_stand_on_the_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let height =
+        |x: f64, y: f64| 500.0 + 0.06 * x + 80.0 * (-(x - 2000.0).hypot(y + 400.0) / 500.0).exp();
+    let metres = |lon: f64, lat: f64| ((lon - 8.5) * 75_744.0, (47.2 - lat) * 111_180.0);
+    let raster = Raster::geographic(8.495, 47.21, 1.0 / 3600.0, [280, 73]);
+    raster.write(&folder.path().join("hills.tif"), |lon, lat| {
+        let (x, y) = metres(lon, lat);
+        height(x, y)
+    });
+    let text = |place: &str| {
+        format!(
+            "[geometry]\naltitude_m = 150\naltitude_max_m = 300\nmin_separation_m = 50\n[site]\ntx = {{ lat_deg = 47.2, lon_deg = 8.5, amsl_m = {:.2} }}\n\
+         rx = {{ lat_deg = 47.2, lon_deg = 8.566, amsl_m = {:.2} }}\n[power]\ntx_w = 5\nuav_w = 1\n[terrain]\nfiles = [\"hills.tif\"]\n\
+         above_ground_m = 40\n[link]\nreverse = 0.7\n{place}",
+            height(0.0, 0.0),
+            height(5000.0, 0.0)
+        )
+    };
+    let read = |place: &str| {
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text(place)).unwrap();
+        Scenario::load(&file).unwrap()
+    };
+    let scenario = read(
+        "[[interferer]]\npower_w = 3\nx_m = 1900\ny_m = -350\nmast_m = 25\n[[interferer]]\npower_w = 0.5\nx_m = 3000\ny_m = 300\n\
+         [[interferer]]\npower_w = 2\nx_m = 2500\ny_m = 4000\n",
+    );
+    let elevation = elevation(&scenario);
+    let known = over_terrain::best(&scenario, &elevation, 3, 1e-4).unwrap();
+    let report = elevation.report(&scenario, &known).unwrap();
+    // The third one is not covered.
+    assert_eq!(report.interferers[2].altitude_m, None);
+    assert!(
+        report
+            .table()
+            .contains("interferer 3: not covered by the elevation files")
+    );
+    let line = |x: f64| {
+        height(0.0, 0.0) + (height(5000.0, 0.0) - height(0.0, 0.0)) * x / scenario.distance_m
+    };
+    let sources = [
+        (3.0, 1900.0, -350.0, height(1900.0, -350.0) + 25.0),
+        (0.5, 3000.0, 300.0, height(3000.0, 300.0)),
+        (2.0, 2500.0, 4000.0, line(2500.0)),
+    ];
+    assert!(
+        (report.interferers[0].altitude_m.unwrap()[0] - (sources[0].3 - line(1900.0))).abs() < 3.0
+    );
+    let free =
+        |d: f64| (4.0 * std::f64::consts::PI * d * 2e9 / 299_792_458.0).powi(2) * 10_f64.powf(0.01);
+    let heard = |x: f64, amsl: f64| -> f64 {
+        let each = sources.iter();
+        each.map(|(w, sx, sy, sz)| w / free((x - sx).hypot(*sy).hypot(amsl - sz)))
+            .sum()
+    };
+    let relays: Vec<(f64, f64)> = known
+        .places
+        .iter()
+        .map(|(place, _)| {
+            let [x, h] = [place.x_m, place.altitude_m].map(f64::from);
+            (x, line(x) + h)
+        })
+        .collect();
+    let mut from = (0.0, line(0.0), 5.0);
+    for (hop, (x, amsl)) in report.hops.iter().zip(&relays) {
+        let signal = from.2 / free((x - from.0).hypot(amsl - from.1));
+        let sir_db = 10.0 * (signal / heard(*x, *amsl)).log10() - hop.diffraction_db;
+        assert!((hop.sir_db - sir_db).abs() < 0.1, "{} {sir_db}", hop.sir_db);
+        from = (*x, *amsl, 1.0);
+    }
+    // A hilltop with the interferer below a relay costs more than the interferer at the line between the sites.
+    let scene = elevation.scene(&scenario, 3).unwrap().unwrap();
+    let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
+    let grid = search.grid(7, 3).unwrap();
+    let (chain, sir) = search.best(&grid, 0.0).unwrap();
+    let all = brute_force(
+        &mut search,
+        &grid,
+        &mut Vec::new(),
+        scenario.min_separation_m,
+    );
+    assert!(
+        (sir / all - 1.0).abs() < 1e-12 && chain.len() == 3,
+        "{sir} {all}"
+    );
+    // An area: the nearest altitude of its ground.
+    let scenario = read(
+        "[[interferer]]\npower_w = 3\narea = { circle = [2000.0, -400.0, 200.0] }\nmast_m = 5\n",
+    );
+    let scene = elevation.scene(&scenario, 3).unwrap().unwrap();
+    let [low, high] = scene.heights_m[&0];
+    let top = height(2000.0, -400.0) - line(2000.0) + 5.0;
+    assert!(
+        (high - top).abs() < 6.0 && low < high - 20.0,
+        "{low} {high} {top}"
+    );
+    let near = scene.interference_w(uav_relay_scenario::scene::Place {
+        x: 2000.0,
+        y: -400.0,
+        h: high + 50.0,
+    });
+    assert!((near / (3.0 / free(50.0)) - 1.0).abs() < 1e-3, "{near}");
+}
+
+/// Checks plans over a long line with narrow hills, and the error of the heights.
+#[test]
+fn long_lines_and_errors_of_the_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    // Ridges 150 m wide, each 3.1 km, and 60 m high: narrower than a column of the first grid.
+    let height = |x: f64| {
+        300.0
+            + 60.0 * (-((x - 1700.0).rem_euclid(3100.0) - 1550.0).powi(2) / 75.0_f64.powi(2)).exp()
+    };
+    let raster = Raster::geographic(8.495, 47.202, 1.0 / 3600.0, [1925, 15]);
+    raster.write(&folder.path().join("hills.tif"), |lon, _| {
+        height((lon - 8.5) * 75_744.0)
+    });
+    let read = |error: &str| {
+        let text = format!(
+            "[geometry]\naltitude_m = 100\n[site]\ntx = {{ lat_deg = 47.2, lon_deg = 8.5, amsl_m = 300 }}\n\
+             rx = {{ lat_deg = 47.2, lon_deg = 9.02, amsl_m = 300 }}\n[power]\ntx_w = 5\nuav_w = 5\n[noise]\nbandwidth_hz = 1e6\n\
+             [terrain]\nfiles = [\"hills.tif\"]\nmast_m = 10\nabove_ground_m = 20\nabove_ground_max_m = 40\n{error}\
+             [[interferer]]\npower_w = 0.01\nx_m = 20000\ny_m = 4000\n"
+        );
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text).unwrap();
+        Scenario::load(&file)
+    };
+    let scenario = read("").unwrap();
+    let of = elevation(&scenario);
+    let start = std::time::Instant::now();
+    let plan = over_terrain::best(&scenario, &of, 13, 1e-4).unwrap();
+    println!("{:.1} s", start.elapsed().as_secs_f64());
+    let report = of.report(&scenario, &plan).unwrap();
+    // Only hops from ridge to ridge are clear.
+    assert!(of.problem(&report, false).is_none(), "{}", report.table());
+    assert!(report.interferers[0].altitude_m.is_none());
+    println!("{}", report.table());
+    let with_error = read("error_m = 8\n").unwrap();
+    let raised = elevation(&with_error);
+    let same = raised.report(&with_error, &plan).unwrap();
+    let is_inside = |x_m: f64| (200.0..scenario.distance_m - 200.0).contains(&x_m);
+    for (hop, other) in report.hops.iter().zip(&same.hops) {
+        if is_inside(hop.obstacle_x_m) && is_inside(other.obstacle_x_m) {
+            let lost_m = hop.clearance_m - other.clearance_m;
+            assert!((lost_m - 8.0).abs() < 0.5, "{hop:?} {other:?}");
+        }
+        assert!(other.clearance_m < hop.clearance_m + 1e-9 && !(hop.state == State::Blocked));
+        assert!(other.diffraction_db >= hop.diffraction_db);
+    }
+    for (relay, other) in report.heights.iter().zip(&same.heights) {
+        assert!((relay.above_obstacle_m - other.above_obstacle_m - 8.0).abs() < 1e-6);
+        assert!((relay.above_ground_m - other.above_ground_m).abs() < 1e-9);
+    }
+    let plan = over_terrain::best(&with_error, &raised, 13, 1e-4).unwrap();
+    let report = raised.report(&with_error, &plan).unwrap();
+    assert!(
+        raised.problem(&report, false).is_none(),
+        "{}",
+        report.table()
+    );
+    assert!(
+        report
+            .heights
+            .iter()
+            .all(|relay| relay.above_ground_m >= 27.99)
+    );
+    let wrong = read("error_m = 101\n").unwrap_err().to_string();
+    assert!(
+        wrong.contains("terrain.error_m = 101") && wrong.contains("0 to 100 m"),
+        "{wrong}"
+    );
+}
+
+#[test]
+fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let plan = path("plan.toml");
+    let arguments = format!("--scenario {EXAMPLE} --uavs 4 --altitude terrain --json --out {plan}");
+    let (status, json, line) = run(&arguments);
+    assert_eq!((status, line.as_str()), (Some(0), ""));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let flight = &report["flight"];
+    let sir_db = flight["terrain_sir_db"].as_f64().unwrap();
+    let loss_db = report["terrain_sir_db"].as_f64().unwrap() - sir_db;
+    assert!(
+        (flight["loss_db"].as_f64().unwrap() - loss_db).abs() < 1e-9 && loss_db < 12.0,
+        "{flight}"
+    );
+    let without = flight["without"].as_array().unwrap();
+    // Its last hop would be blocked.
+    let blocked = without[0]["problem"].as_str().unwrap();
+    assert!(
+        blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 44"),
+        "{blocked}"
+    );
+    let blocks = path("blocks");
+    let provision = |more: &str| {
+        run_as(
+            env!("CARGO_BIN_EXE_provision"),
+            &format!("--scenario {plan} {more}"),
+        )
+    };
+    let (status, said, line) = provision(&format!("--all --out-dir {blocks}"));
+    assert_eq!(status, Some(0), "{line}");
+    assert!(
+        line.contains(blocked) && said.contains(blocked),
+        "{line} {said}"
+    );
+    assert!(
+        said.contains(&format!("worst hop {sir_db:.3} dB with terrain")),
+        "{said}"
+    );
+    assert!(said.contains("relay 2: x "), "{said}");
+    // Each relay has its own altitude.
+    let written = Scenario::load(Path::new(&plan)).unwrap();
+    for (relay, own) in flight["relays"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(written.relays.values())
+    {
+        let altitude = own.altitude_m.unwrap();
+        assert!((relay["altitude_m"].as_f64().unwrap() - altitude).abs() < 1e-3);
+        assert!(
+            said.contains(&format!(" {altitude:.2} ")),
+            "{altitude} {said}"
+        );
+    }
+    let bundle = path("bundle");
+    let (status, _, line) = provision(&format!("--bundle {bundle}"));
+    assert_eq!(status, Some(0), "{line}");
+    let page = std::fs::read_to_string(path("bundle/relay3/page.txt")).unwrap();
+    assert!(
+        page.contains("room over the terrain: x ") && page.contains(blocked),
+        "{page}"
+    );
+    // The terrain is not below this scenario's own altitudes.
+    let low = std::fs::read_to_string(&plan).unwrap();
+    let low = low.split("\n[[relay]]").next().unwrap();
+    std::fs::write(&plan, low).unwrap();
+    let (status, _, line) = provision(&format!("--uavs 6 --all --out-dir {blocks} --force"));
+    assert!(
+        status == Some(2)
+            && line.contains("plan.toml: relay 1 is -13.0 m, ")
+            && line.contains("hop 2 (relay 1 to relay 2) is blocked"),
+        "{line}"
+    );
+    let of = |more: &str| provision(&format!("--uavs 6 --index 1 --out {} {more}", path("one")));
+    let (status, _, line) = of("--method adjust");
+    assert!(
+        status == Some(0) && line.contains("terrain not checked: the method adjust"),
+        "{line}"
+    );
+    let (_, _, line) = of("--allow-blocked");
+    assert!(
+        line.contains("relay 1 is -13.0 m, ") && !line.contains("is blocked"),
+        "{line}"
+    );
+    let arguments = format!(
+        "--scenario {EXAMPLE} --uavs 3 --altitude terrain --out {}",
+        path("three.toml")
+    );
+    let (status, _, line) = run(&arguments);
+    assert!(
+        status == Some(1)
+            && line.contains("hop 4 (relay 3 to Rx) is blocked")
+            && line.contains("give another --uavs"),
+        "{line}"
+    );
+    assert!(!Path::new(&path("three.toml")).exists());
+}
+
 #[test]
 fn wrong_elevation_files_and_options_are_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -422,10 +808,6 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         (
             "--altitude terrain".to_owned(),
             "--altitude terrain: needs elevation files",
-        ),
-        (
-            format!("{scenario} --altitude terrain --out {}", path("o.toml")),
-            "--altitude terrain: cannot be used with --out",
         ),
         (
             format!("{scenario} --altitude terrain --bandwidth-hz 1e7"),

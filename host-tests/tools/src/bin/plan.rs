@@ -14,14 +14,16 @@ use uav_relay_terrain::report::TerrainReport;
 use uav_relay_tools::figures::draw::draw;
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::area::{self, AreaReport, Criterion};
-use uav_relay_tools::plan::area_map;
+use uav_relay_tools::plan::area_map::{self, Shown};
 use uav_relay_tools::plan::carried::Carried;
-use uav_relay_tools::plan::flown::{flown, planned, with_plan};
+use uav_relay_tools::plan::flown::{flown, planned, with_altitudes, with_files, with_plan};
+use uav_relay_tools::plan::locating::Locating;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
 use uav_relay_tools::plan::rate::{Rate, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
-use uav_relay_tools::plan::terrain::{Elevation, chart};
+use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M, chart};
+use uav_relay_tools::plan::terrain_flight::{self, Flight};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
 
@@ -77,16 +79,16 @@ fn run(options: &Options) -> Result<(), Failure> {
             let (terrain, error) =
                 terrain(options, &scenario, elevation.as_ref(), (&plan, number))?;
             let error = joined([error, no_fly(options, &scenario, &plan)]);
-            write_area_map(options, &scenario, &plan)?;
+            let locating = over_area(options, &scenario, &plan)?;
             write_map(options, &scenario, &plan, terrain.as_ref())?;
-            let next = match error {
-                Some(_) => String::new(),
+            let (next, flight) = match error {
+                Some(_) => Default::default(),
                 None => write_out(
                     options,
                     &scenario,
                     (&plan, number),
                     radio.as_ref(),
-                    elevation.as_ref(),
+                    elevation.as_ref().zip(terrain.as_ref()),
                 )?,
             };
             let rates = rates.map(listed);
@@ -102,6 +104,8 @@ fn run(options: &Options) -> Result<(), Failure> {
                 options,
                 &PlanReport {
                     over_terrain,
+                    flight,
+                    locating,
                     area: AreaReport::new(&scenario, &ask, &plan, options.area.quantile),
                     ..report
                 },
@@ -312,9 +316,6 @@ fn elevation(options: &Options, scenario: &Scenario) -> Result<Option<Elevation>
     }
     Ok(elevation)
 }
-
-/// Position error of a relay, m, unless `companion.position_error_m` says another one. It is the companion's default.
-const POSITION_ERROR_M: f64 = 1.0;
 
 /// Returns the settings of the drones' companion computers in the scenario file.
 fn companion(options: &Options) -> Result<Companion, Failure> {
@@ -529,9 +530,14 @@ struct AreaOptions {
     /// Draw the SIR of the worst hop for each position of the interferer (SVG). Needs an interferer with an area
     #[arg(long, value_name = "FILE")]
     area_svg: Option<PathBuf>,
-    /// Write the same as squares with geographic coordinates (GeoJSON). Needs a scenario with a site as well
+    /// Write the same as squares with geographic coordinates (GeoJSON), with the errors of --listen-svg. Needs a scenario with a site as well
     #[arg(long, value_name = "FILE")]
     area_geojson: Option<PathBuf>,
+    /// Draw the error of the location of the interferer for each of its positions (SVG)
+    ///
+    /// Relays locate it by measurements. Needs [listen] and a single interferer, with an area
+    #[arg(long, value_name = "FILE")]
+    listen_svg: Option<PathBuf>,
     /// Accept a plan in which the way between two neighbours crosses a no-fly area
     #[arg(long)]
     allow_crossing: bool,
@@ -607,6 +613,7 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         quantile,
         area_svg,
         area_geojson,
+        listen_svg,
         ..
     } = &options.area;
     let refuse = |line: String| Err(Failure::input(line));
@@ -615,6 +622,7 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         ("--quantile", quantile.map(|quantile| quantile.to_string())),
         ("--area-svg", area_svg.as_ref().map(file)),
         ("--area-geojson", area_geojson.as_ref().map(file)),
+        ("--listen-svg", listen_svg.as_ref().map(file)),
     ];
     let Some(first) = scenario.areas.keys().next() else {
         return match asked
@@ -645,6 +653,13 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
             "cannot be used with --out, because relays compute with one position of an interferer",
         );
     }
+    let is_located = scenario.listen.is_some() && scenario.sources().len() == 1;
+    if let Some(path) = listen_svg.as_ref().filter(|_| !is_located) {
+        return refuse(format!(
+            "--listen-svg {}: needs [listen] and a single [[interferer]]",
+            file(path)
+        ));
+    }
     if quantile.is_some() && options.altitude == Altitude::Terrain {
         return refuse("--quantile: cannot be used with --altitude terrain".to_owned());
     }
@@ -662,26 +677,40 @@ fn joined(lines: [Option<String>; 2]) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("; "))
 }
 
-/// Writes the files of `--area-svg` and `--area-geojson`.
-fn write_area_map(options: &Options, scenario: &Scenario, plan: &Plan) -> Result<(), Failure> {
+/// Computes the location of the interferer by relays with `[listen]`, and writes the maps.
+///
+/// They are the files of `--area-svg`, `--area-geojson` and `--listen-svg`.
+fn over_area(
+    options: &Options,
+    scenario: &Scenario,
+    plan: &Plan,
+) -> Result<Option<Locating>, Failure> {
     let AreaOptions {
         area_svg,
         area_geojson,
+        listen_svg,
         ..
     } = &options.area;
-    if area_svg.is_none() && area_geojson.is_none() {
-        return Ok(());
+    let is_drawn = area_svg.is_some() || area_geojson.is_some();
+    if scenario.areas.is_empty() || !is_drawn && scenario.listen.is_none() {
+        return Ok(None);
     }
-    let cells = area::cells(scenario, plan);
-    if let Some(file) = area_svg {
-        save(file, "--area-svg", &area_map::svg(scenario, plan, &cells))?;
+    let mut cells = area::cells(scenario, plan);
+    let locating = Locating::new(scenario, plan, &mut cells).map_err(Failure::input)?;
+    for (file, option, shown) in [
+        (area_svg, "--area-svg", Shown::Sir),
+        (listen_svg, "--listen-svg", Shown::Error),
+    ] {
+        if let Some(file) = file {
+            save(file, option, &area_map::svg(scenario, plan, &cells, shown))?;
+        }
     }
     if let (Some(file), Some(line)) = (area_geojson, &scenario.line) {
         let text = area_map::geojson(line, &cells)
             .map_err(|line| Failure::input(format!("--area-geojson: {line}")))?;
         save(file, "--area-geojson", &text)?;
     }
-    Ok(())
+    Ok(locating)
 }
 
 /// Rejects a target SIR for relays that choose the positions of the largest data rate.
@@ -716,11 +745,6 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
             "--x-m {x_m:?}: cannot be used with --out, because relays compute their positions along the line themselves: leave --x-m out"
         ));
     }
-    if options.altitude == Altitude::Terrain {
-        return refuse(
-            "--altitude terrain: cannot be used with --out, because relays compute their positions without the terrain".to_owned(),
-        );
-    }
     let is_field = matches!(scenario.interference, Interference::Field(_));
     if is_field && options.altitude == Altitude::Free {
         return refuse(
@@ -744,26 +768,33 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
 
 /// Writes the file of `--out`: the scenario with the positions that its relays will choose.
 ///
-/// Returns the text that tells the user the next command; empty without `--out`.
+/// Returns the text that tells the user the next command, empty without `--out`, and the flight over the terrain, if it is known.
 fn write_out(
     options: &Options,
     scenario: &Scenario,
     (plan, number): (&Plan, Number),
     radio: Option<&Radio>,
-    elevation: Option<&Elevation>,
-) -> Result<String, Failure> {
+    terrain: Option<(&Elevation, &TerrainReport)>,
+) -> Result<(String, Option<Flight>), Failure> {
     let Some(file) = &options.out else {
-        return Ok(String::new());
+        return Ok(Default::default());
     };
     let method = match options.altitude {
-        Altitude::Given => PlannedMethod::Align,
-        Altitude::Free | Altitude::Terrain => PlannedMethod::Joint,
+        Altitude::Given | Altitude::Terrain => PlannedMethod::Align,
+        Altitude::Free => PlannedMethod::Joint,
     };
-    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
-    let flown = flown(scenario, relays, method, options.tolerance).map_err(|none| match none {
+    let failed = |none| match none {
         NoPlan::Wrong(why) => Failure::input(why),
         NoPlan::Unmet(why, _) => Failure::unmet(why.say(options.unit())),
-    })?;
+    };
+    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    let own = terrain.filter(|_| options.altitude == Altitude::Terrain);
+    let own = own.map(|(elevation, _)| {
+        terrain_flight::with_altitudes(scenario, elevation, plan, options.tolerance)
+    });
+    let own = own.transpose().map_err(failed)?;
+    let scenario = own.as_ref().unwrap_or(scenario);
+    let flown = flown(scenario, relays, method, options.tolerance).map_err(failed)?;
     let sections = sections(options, relays)?;
     let sir = db(flown.plan.sir());
     if flown.is_poor() {
@@ -791,10 +822,21 @@ fn write_out(
             )));
         }
     }
-    let blocked = match elevation {
-        Some(elevation) => over(options, elevation, scenario, &flown.plan)?.1,
-        None => None,
-    };
+    let flight = terrain.map(|(elevation, report)| {
+        let how = (method, options.tolerance);
+        let allow_blocked = options.terrain.allow_blocked;
+        let flight = Flight::new(scenario, elevation, &flown.plan, how, allow_blocked)?;
+        Ok(match &own {
+            Some(_) => flight.compared(plan, report.terrain_sir_db),
+            None => flight,
+        })
+    });
+    let flight = flight.transpose().map_err(failed)?;
+    let blocked = flight.as_ref().and_then(|flight| flight.problem.clone());
+    let blocked = blocked.map(|line| match own {
+        Some(_) => format!("{line}; relays choose x without the terrain: give another --uavs, or a larger terrain.above_ground_max_m"),
+        None => line,
+    });
     if let Some(line) = joined([blocked, no_fly(options, scenario, &flown.plan)]) {
         return Err(Failure::unmet(format!(
             "--out {}: not written: at the positions on which {relays} relays would agree, {line}",
@@ -806,14 +848,28 @@ fn write_out(
             .map_err(|error| Failure::input(format!("{}: {error}", scenario.display())))?,
         None => DEFAULT.to_owned(),
     };
-    let text = with_plan(&text, &planned(&flown, method, options.tolerance))
-        .map_err(|why| Failure::input(format!("--out {}: {why}", file.display())))?;
+    let wrong = |why| Failure::input(format!("--out {}: {why}", file.display()));
+    let text = match &own {
+        Some(_) => with_altitudes(&text, &flown.plan).map_err(wrong)?,
+        None => text,
+    };
+    // Elevation files are relative to the folder of the file.
+    let folder = |file: &Path| file.parent().map(Path::to_path_buf);
+    let is_moved = options.scenario.as_deref().and_then(folder) != folder(file);
+    let text = match terrain {
+        Some((elevation, _)) if is_moved || !options.terrain.dem.is_empty() => {
+            with_files(&text, &elevation.spec.files).map_err(wrong)?
+        }
+        _ => text,
+    };
+    let text = with_plan(&text, &planned(&flown, method, options.tolerance)).map_err(wrong)?;
     save(file, "--out", &text)?;
     let file = file.display().to_string();
-    Ok(format!(
+    let text = format!(
         "{file}: the scenario and its plan were written: {relays} relays that agree on positions with {sir:.3} dB; {}",
         next(&file, &sections)
-    ))
+    );
+    Ok((text, flight))
 }
 
 /// Loads the scenario file's sections about the network and the companion computers.

@@ -14,6 +14,9 @@ use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
 use uav_relay_tools::plan;
 use uav_relay_tools::plan::area;
 use uav_relay_tools::plan::flown::{Flown, flown, is_current, with_plan};
+use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M};
+use uav_relay_tools::plan::terrain_flight::Flight as Simulated;
+use uav_relay_tools::plan::{NoPlan, Unit};
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::bundle::{Bundle, FILL_IN};
 use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secret};
@@ -67,6 +70,7 @@ fn run(options: &Options) -> Result<String, String> {
     let secret = asked.secret()?;
     let flight = asked.flight(secret)?;
     let flown = asked.flown()?;
+    let simulated = asked.over_terrain(flown.as_ref())?;
     let said = match (&options.out, options.index, &options.folder.out_dir) {
         (Some(file), Some(index), _) => {
             let block = flight
@@ -80,7 +84,7 @@ fn run(options: &Options) -> Result<String, String> {
                 asked.network
             )
         }
-        (_, _, Some(dir)) => asked.folder(&flight, flown.as_ref(), dir)?,
+        (_, _, Some(dir)) => asked.folder(&flight, (flown.as_ref(), simulated.as_ref()), dir)?,
         _ => {
             return Err(
                 "either --index with --out, or --all with --out-dir, or --bundle must be given"
@@ -243,6 +247,7 @@ impl<'a> Asked<'a> {
                 && !self.is_whole()
                 && self.scenario.plan.is_none()
                 && self.scenario.no_fly.is_empty()
+                && self.scenario.terrain.is_none()
         {
             return Ok(None);
         }
@@ -279,6 +284,63 @@ impl<'a> Asked<'a> {
             command::print_line(&line);
         }
         Ok(Some(flown))
+    }
+
+    /// Simulates the flight over the terrain of the scenario; `None` without terrain or known positions.
+    ///
+    /// # Errors
+    /// A hop that is blocked, a relay too low or too high, or elevation files that cannot be used.
+    fn over_terrain(&self, flown: Option<&Flown>) -> Result<Option<Simulated>, String> {
+        let named = |line: String| format!("{}: {line}", self.name);
+        let error_m = self.deployment.companion.position_error_m;
+        let error_m = error_m.map_or(POSITION_ERROR_M, f64::from);
+        if self.scenario.terrain.is_none() {
+            let line = "--allow-blocked: is only for a scenario with a [terrain]";
+            return if self.options.allow_blocked {
+                Err(line.to_owned())
+            } else {
+                Ok(None)
+            };
+        }
+        let method = match self.method {
+            Method::Align => PlannedMethod::Align,
+            Method::Joint => PlannedMethod::Joint,
+            Method::Adjust => {
+                return Ok(self.without_terrain("the method adjust changes altitudes in flight"));
+            }
+        };
+        let Some(flown) = flown else {
+            return Ok(
+                self.without_terrain("the relays' positions are not known before the flight")
+            );
+        };
+        let Some(elevation) = Elevation::load(&self.scenario, &[], error_m).map_err(named)? else {
+            return Ok(None);
+        };
+        let how = (method, self.tolerance);
+        let flight = Simulated::new(
+            &self.scenario,
+            &elevation,
+            &flown.plan,
+            how,
+            self.options.allow_blocked,
+        );
+        let flight = flight.map_err(|none| match none {
+            NoPlan::Wrong(line) => named(line),
+            NoPlan::Unmet(why, _) => named(why.say(Unit::Decibels)),
+        })?;
+        if let Some(line) = &flight.problem {
+            return Err(named(line.clone()));
+        }
+        for line in flight.warnings() {
+            command::print_line(&format!("{}: warning: {line}", self.name));
+        }
+        Ok(Some(flight))
+    }
+
+    fn without_terrain(&self, why: &str) -> Option<Simulated> {
+        command::print_line(&format!("{}: terrain not checked: {why}", self.name));
+        None
     }
 
     /// Returns true if files for the whole flight are asked for.
@@ -333,6 +395,7 @@ impl<'a> Asked<'a> {
             .with_access(&self.scenario)
             .map_err(|error| format!("{name}: {error}"))?;
         let flown = self.flown()?.filter(|_| self.method != Method::Adjust);
+        let simulated = self.over_terrain(flown.as_ref())?;
         let text = match &options.scenario {
             Some(file) => std::fs::read_to_string(file)
                 .map_err(|error| format!("{}: {error}", file.display()))?,
@@ -370,6 +433,7 @@ impl<'a> Asked<'a> {
             mission: flight.mission(),
             profiles: flight.profiles(),
             places: flown.as_ref().map_or(&[], |flown| &flown.plan.places),
+            simulated: simulated.as_ref(),
             line,
             key,
             autopilot_key,
@@ -389,7 +453,12 @@ impl<'a> Asked<'a> {
         ))
     }
 
-    fn folder(&self, flight: &Flight, flown: Option<&Flown>, dir: &Path) -> Result<String, String> {
+    fn folder(
+        &self,
+        flight: &Flight,
+        (flown, simulated): (Option<&Flown>, Option<&Simulated>),
+        dir: &Path,
+    ) -> Result<String, String> {
         let heading = Heading {
             scenario: self.name.clone(),
             uavs: self.uavs,
@@ -408,7 +477,10 @@ impl<'a> Asked<'a> {
                 .map_err(|error| format!("{}: relay {index}: {error}", self.name))?;
             files.push((folder::name(index), block.to_vec()));
         }
-        let text = summary(&heading, places, self.scenario.line.as_ref());
+        let mut text = summary(&heading, places, self.scenario.line.as_ref());
+        if let Some(simulated) = simulated {
+            text = format!("{text}\n{simulated}\n");
+        }
         files.push(("summary.txt".to_owned(), text.clone().into_bytes()));
         folder::write(dir, &files, self.options.folder.force)?;
         Ok(format!(
@@ -530,6 +602,9 @@ struct Options {
     /// Accept that relays plan with one hypothetical interferer instead of several real ones. Without this option a loss of more than 1 % of the best SIR is refused
     #[arg(long)]
     stand_in: bool,
+    /// Accept a flight with a blocked hop over the terrain of the scenario
+    #[arg(long)]
+    allow_blocked: bool,
     /// File to write the block to
     #[arg(long, value_name = "FILE", required_unless_present_any = ["all", "bundle"])]
     out: Option<PathBuf>,

@@ -780,6 +780,10 @@ pub struct Cell {
     pub side_m: f64,
     /// SIR of the worst hop, dB, with the interferer in the middle of the cell at its greatest power.
     pub sir_db: f64,
+    /// Standard deviation of the location of an interferer there by relays with `[listen]`, m.
+    ///
+    /// Infinite if they cannot locate it. `None` if it is not computed.
+    pub error_m: Option<f64>,
 }
 
 /// Number of cells of the map along the longer side of an area.
@@ -821,6 +825,7 @@ pub fn cells(scenario: &Scenario, plan: &Plan) -> Vec<Cell> {
                     at: [x_m, y_m],
                     side_m,
                     sir_db,
+                    error_m: None,
                 });
             }
         }

@@ -28,14 +28,48 @@ const COLOURS: [[f64; 3]; 5] = [
 /// Number of steps of the legend.
 const STEPS: u32 = 5;
 
+/// Quantity of a map.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Shown {
+    /// SIR of the worst hop.
+    Sir,
+    /// Error of the location of the interferer by relays that measure it.
+    Error,
+}
+
+impl Shown {
+    /// Returns the number of a cell on the scale of colours: dB, or the logarithm of metres.
+    fn number(self, cell: &Cell) -> f64 {
+        match self {
+            Self::Sir => cell.sir_db,
+            Self::Error => cell.error_m.unwrap_or(MOST_M).clamp(0.01, MOST_M).log10(),
+        }
+    }
+
+    fn say(self, number: f64) -> String {
+        match self {
+            Self::Sir => format!("{number:.2} dB"),
+            Self::Error => format!("{:.1} m", 10_f64.powf(number)),
+        }
+    }
+}
+
+/// Largest error of a map, m.
+const MOST_M: f64 = 1e5;
+
 /// Returns the picture of `cells` from above: x points to the right, y (right of the line) down.
-pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
-    let sirs = || cells.iter().map(|cell| cell.sir_db);
+pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> String {
+    let numbers = || cells.iter().map(|cell| shown.number(cell));
     let (least, most) = (
-        sirs().fold(f64::INFINITY, f64::min),
-        sirs().fold(f64::NEG_INFINITY, f64::max),
+        numbers().fold(f64::INFINITY, f64::min),
+        numbers().fold(f64::NEG_INFINITY, f64::max),
     );
-    let colour = |sir_db: f64| colour((sir_db - least) / (most - least));
+    let colour = |number: f64| colour((number - least) / (most - least));
+    let what = match shown {
+        Shown::Sir => "SIR of the worst hop",
+        Shown::Error => "Error of the location by [listen]",
+    };
+    let range = format!("{} to {}", shown.say(least), shown.say(most));
     let relays = plan
         .places
         .iter()
@@ -48,7 +82,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
     let tall = (high[1] - low[1]) * scale;
     let at = |[x, y]: [f64; 2]| [MARGIN + (x - low[0]) * scale, MARGIN + (y - low[1]) * scale];
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {0:.1}\" shape-rendering=\"crispEdges\" width=\"{WIDTH}\" height=\"{0:.1}\" role=\"img\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"11\">\n<title>SIR of the worst hop for each position of the interferer</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN}\" y=\"20\" font-size=\"13\">SIR of the worst hop with the interferer at each position, {least:.2} to {most:.2} dB</text>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {0:.1}\" shape-rendering=\"crispEdges\" width=\"{WIDTH}\" height=\"{0:.1}\" role=\"img\" font-family=\"Helvetica,Arial,sans-serif\" font-size=\"11\">\n<title>{what} for each position of the interferer</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n<text x=\"{MARGIN}\" y=\"20\" font-size=\"13\">{what} with the interferer at each position, {range}</text>\n",
         tall + 3.0 * MARGIN
     );
     for cell in cells {
@@ -56,11 +90,11 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
         let side = cell.side_m * scale;
         _ = writeln!(
             out,
-            "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{side:.2}\" height=\"{side:.2}\" fill=\"{}\"><title>x = {:.1} m, y = {:.1} m: {:.2} dB</title></rect>",
-            colour(cell.sir_db),
+            "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{side:.2}\" height=\"{side:.2}\" fill=\"{}\"><title>x = {:.1} m, y = {:.1} m: {}</title></rect>",
+            colour(shown.number(cell)),
             cell.at[0],
             cell.at[1],
-            cell.sir_db
+            shown.say(shown.number(cell))
         );
     }
     for area in &scenario.no_fly {
@@ -100,14 +134,15 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell]) -> String {
         );
     }
     for step in 0..STEPS {
-        let sir_db = least + (most - least) * f64::from(step) / f64::from(STEPS - 1);
+        let number = least + (most - least) * f64::from(step) / f64::from(STEPS - 1);
         let (x, y) = (MARGIN + 110.0 * f64::from(step), tall + 2.4 * MARGIN);
         _ = writeln!(
             out,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{:.1}\" y=\"{:.1}\">{sir_db:.2} dB</text>",
-            colour(sir_db),
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            colour(number),
             x + 19.0,
-            y + 11.0
+            y + 11.0,
+            shown.say(number)
         );
     }
     out.push_str("</svg>\n");
@@ -153,7 +188,7 @@ fn frame(scenario: &Scenario, relays: &[[f64; 2]], cells: &[Cell]) -> [[f64; 2];
     )
 }
 
-/// Returns `cells` as the text of a GeoJSON file: one square for each, with the property `sir_db`.
+/// Returns `cells` as the text of a GeoJSON file: a square for each, with `sir_db` and `error_m`.
 ///
 /// # Errors
 /// A line that names a cell that is too far from the line.
@@ -191,6 +226,12 @@ pub fn geojson(line: &Line, cells: &[Cell]) -> Result<String, String> {
         properties.insert("y_m".to_owned(), y.into());
         let sir_db = (cell.sir_db * 1e3).round() / 1e3;
         properties.insert("sir_db".to_owned(), sir_db.into());
+        if let Some(error_m) = cell.error_m.filter(|error| error.is_finite()) {
+            properties.insert(
+                "error_m".to_owned(),
+                ((error_m * 10.0).round() / 10.0).into(),
+            );
+        }
         Ok(Feature {
             geometry: Some(Geometry::new(GeometryValue::new_polygon(vec![ring]))),
             properties: Some(properties),

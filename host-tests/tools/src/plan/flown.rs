@@ -3,7 +3,9 @@
 //! On board there is a single interferer or a field. A hypothetical interferer in place of several is an approximation, and
 //! Algorithm 4 falls short in an uneven field, so the positions are judged against the full interference.
 
-use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
+use std::path::PathBuf;
+
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Planned, PlannedMethod, PlannedPlace, Scenario, mission};
 
@@ -102,7 +104,7 @@ pub fn flown(
 /// Returns the plan with the positions that the relays would find on board by `method`.
 ///
 /// Relays use one hypothetical interferer in place of several, but the SIRs in the plan are against all of them.
-fn alone(
+pub(super) fn alone(
     scenario: &Scenario,
     relays: u16,
     method: PlannedMethod,
@@ -156,7 +158,7 @@ pub fn planned(flown: &Flown, method: PlannedMethod, tolerance: f64) -> Planned 
 /// Returns `value` as an f64 with few decimals, so that the file has short numbers.
 ///
 /// The result is the f64 with the shortest decimal form that rounds to `value` in f32.
-fn shortest(value: f32) -> f64 {
+pub(super) fn shortest(value: f32) -> f64 {
     format!("{value}").parse().unwrap_or_else(|_| value.into())
 }
 
@@ -165,9 +167,7 @@ fn shortest(value: f32) -> f64 {
 /// # Errors
 /// The reason if `text` is not valid TOML.
 pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
-    let mut file: DocumentMut = text
-        .parse()
-        .map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
+    let mut file = document(text)?;
     _ = file.remove("plan");
     let mut table = Table::new();
     table
@@ -193,6 +193,59 @@ pub fn with_plan(text: &str, planned: &Planned) -> Result<String, String> {
     // Puts the section last: tables are ordered by position.
     table.set_position(Some(isize::MAX));
     file.insert("plan", Item::Table(table));
+    Ok(file.to_string())
+}
+
+fn document(text: &str) -> Result<DocumentMut, String> {
+    text.parse()
+        .map_err(|error: toml_edit::TomlError| error.message().to_owned())
+}
+
+/// Returns the scenario file `text` with a `[[relay]]` for each relay of `plan`, with its altitude.
+///
+/// # Errors
+/// The reason if `text` is not valid TOML.
+pub fn with_altitudes(text: &str, plan: &Plan) -> Result<String, String> {
+    let mut file = document(text)?;
+    let of_file = file.remove("relay").map(Item::into_array_of_tables);
+    let mut relays = match of_file {
+        Some(Ok(relays)) => relays,
+        _ => ArrayOfTables::new(),
+    };
+    for (index, (place, _)) in (1_i64..).zip(&plan.places) {
+        let is_own =
+            |table: &&mut Table| table.get("index").and_then(Item::as_integer) == Some(index);
+        let altitude = value(shortest(place.altitude_m));
+        if let Some(table) = relays.iter_mut().find(is_own) {
+            table.insert("altitude_m", altitude);
+            continue;
+        }
+        let mut table = Table::new();
+        table.insert("index", value(index));
+        table.insert("altitude_m", altitude);
+        relays.push(table);
+    }
+    file.insert("relay", Item::ArrayOfTables(relays));
+    Ok(file.to_string())
+}
+
+/// Returns the scenario file `text` with the elevation files `files`, as paths from the root folder.
+///
+/// # Errors
+/// The reason if `text` is not valid TOML, or a file is missing.
+pub fn with_files(text: &str, files: &[PathBuf]) -> Result<String, String> {
+    let mut file = document(text)?;
+    let mut paths = Array::new();
+    for path in files {
+        let path =
+            std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        paths.push(path.display().to_string());
+    }
+    let terrain = file.entry("terrain").or_insert(Item::Table(Table::new()));
+    let terrain = terrain
+        .as_table_like_mut()
+        .ok_or("terrain: must be a section")?;
+    terrain.insert("files", value(paths));
     Ok(file.to_string())
 }
 

@@ -8,8 +8,8 @@
 //! | a field | `source`: Algorithm 3 for one relay; Algorithm 4 and Problem 1, exact for equal relays, for more |
 //! | a field, both directions | `source`: Algorithm 4 |
 //! | several interferers | `multi_interferer`: the hypothetical interferer, or the true sum where that is not good enough |
-//! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer |
-//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective |
+//! | an interferer anywhere in an area, no-fly areas | `area`; `area_map`: the SIR for each position of the interferer; `locating`: its location by relays that measure it |
+//! | terrain | `terrain`: its files and the picture of the profile; `over_terrain`: positions with the diffraction losses in the objective; `terrain_flight`: altitudes with which relays fly over it by themselves |
 //! | several interferers, both directions | the same; a shortest `path` for the true sum, with a `bound` that proves it |
 //!
 //! Positions are found by the crate's on-board code where it has a method. [`Plan::proven`] is true if the result is proven
@@ -21,6 +21,7 @@ pub mod area_map;
 pub mod bound;
 pub mod carried;
 pub mod flown;
+pub mod locating;
 pub mod map;
 mod multi_interferer;
 pub mod one_both_ways;
@@ -31,6 +32,7 @@ pub mod report;
 mod source;
 mod steps;
 pub mod terrain;
+pub mod terrain_flight;
 
 use uav_relay::{Mission, Placement, Profile};
 use uav_relay_scenario::hypothetical::Hypothetical;

@@ -33,6 +33,12 @@ const LEVELS: u32 = 12;
 /// Largest number of points of a hop's profile during the search, relative to the whole line.
 const POINTS: f64 = 800.0;
 
+/// Largest number of points of a profile at the end of the search, as in reports.
+pub(super) const FINE_POINTS: f64 = 20_000.0;
+
+/// Width of a column of the grid above which the highest ground in the column is a column, too, m.
+const WIDE_M: f64 = 100.0;
+
 /// Number of finer grids, each with cells half as large.
 const REFINEMENTS: i32 = 5;
 
@@ -102,7 +108,9 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Creates a search above the line of the scenario.
+    /// Creates a search above the line of the scenario, with at most 800 points of a profile.
+    ///
+    /// On a longer line each point has the height of the highest ground near it.
     ///
     /// # Errors
     /// A line that names the place: it is not covered by the elevation files, or a hole.
@@ -111,22 +119,47 @@ impl<'a> Search<'a> {
         scene: &'a Scene,
         elevation: &'a Elevation,
     ) -> Result<Self, String> {
+        Self::with_points(scenario, scene, elevation, POINTS)
+    }
+
+    /// Creates a search with at most `points` points of a profile.
+    pub(super) fn with_points(
+        scenario: &Scenario,
+        scene: &'a Scene,
+        elevation: &'a Elevation,
+        points: f64,
+    ) -> Result<Self, String> {
         let ground = elevation.ground(scenario)?;
+        let needed = (scene.distance_m / ground.step_m()).ceil().max(16.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "16 to 800"
+            reason = "at most 20 000, and the cells of a line"
         )]
-        let steps = (scene.distance_m / ground.step_m())
-            .ceil()
-            .clamp(16.0, POINTS) as u32;
+        let [steps, aside] =
+            [needed.min(points), (0.5 * needed / points).floor()].map(|n| n as u32);
         let step_m = scene.distance_m / f64::from(steps);
-        let line = (0..=steps).map(|step| ground.height_m(f64::from(step) * step_m, 0.0));
+        let line = (0..=steps).map(|step| {
+            let x_m = f64::from(step) * step_m;
+            let mut highest = ground.height_m(x_m, 0.0)?;
+            for near in 1..=aside {
+                let off_m = 0.5 * step_m * f64::from(near) / f64::from(aside);
+                for x_m in [x_m - off_m, x_m + off_m] {
+                    let x_m = x_m.clamp(0.0, scene.distance_m);
+                    highest = highest.max(ground.height_m(x_m, 0.0)?);
+                }
+            }
+            // The ground at a site is that below its antenna.
+            if step == 0 || step == steps {
+                highest = ground.height_m(x_m, 0.0)?;
+            }
+            Ok(highest + ground.raise_m(x_m))
+        });
         let most = elevation.spec.above_ground_max_m;
         Ok(Self {
             scene,
             wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
-            line: line.collect::<Result<_, _>>()?,
+            line: line.collect::<Result<_, String>>()?,
             step_m,
             clearance_m: [elevation.spec.above_ground_m, most.unwrap_or(f64::INFINITY)],
             position_error_m: elevation.position_error_m(),
@@ -198,19 +231,86 @@ impl<'a> Search<'a> {
     /// # Errors
     /// A line that names the place: it is not covered by the elevation files, or a hole.
     pub fn grid(&self, columns: u32, levels: u32) -> Result<Vec<Vec<Candidate>>, String> {
-        let free = |[low, high]: [f64; 2]| {
-            let level =
-                |level: u32| low + (high - low) * f64::from(level) / f64::from((levels - 1).max(1));
-            (0..levels).map(level).collect()
-        };
         let relays = 0..self.scene.relays.len();
         let each = relays.map(|relay| {
             let x = (1..=columns)
                 .map(|column| self.scene.distance_m * f64::from(column) / f64::from(columns + 1));
-            let columns = x.map(|x_m| self.column(relay, x_m, free));
+            let columns = x.map(|x_m| self.above(relay, x_m, levels));
             Ok(columns.collect::<Result<Vec<_>, String>>()?.concat())
         });
         each.collect()
+    }
+
+    /// Returns the candidates for relay `relay` (from 0) at `x_m` and `levels` allowed altitudes.
+    pub(super) fn above(
+        &self,
+        relay: usize,
+        x_m: f64,
+        levels: u32,
+    ) -> Result<Vec<Candidate>, String> {
+        self.column(relay, x_m, |[low, high]| {
+            let share = |level: u32| f64::from(level) / f64::from((levels - 1).max(1));
+            let level = |level: u32| low + (high - low) * share(level);
+            (0..levels).map(level).collect()
+        })
+    }
+
+    /// Returns the position at `x_m` and the altitude `h_m`, allowed or not.
+    pub(super) fn candidate(&self, x_m: f64, h_m: f64) -> Result<Candidate, String> {
+        let amsl_m = self.datum_m(x_m)? + h_m;
+        Ok(Candidate { x_m, h_m, amsl_m })
+    }
+
+    /// Returns the SIR of the worst hop of a chain, linear, and much less for altitudes not allowed.
+    ///
+    /// Every chain with such an altitude ranks behind all chains without one.
+    pub(super) fn rank(&mut self, chain: &[Candidate]) -> Result<f64, String> {
+        let mut off_m: f64 = 0.0;
+        for at in chain {
+            let off = match self.band_m(at.x_m)? {
+                Some([low, high]) => (low - at.h_m).max(at.h_m - high),
+                None => 1e4,
+            };
+            let inside = self
+                .no_fly
+                .iter()
+                .filter_map(|area| area.depth_m([at.x_m, 0.0], at.h_m));
+            off_m += inside.fold(off.max(0.0), f64::max);
+        }
+        let is_allowed = off_m < 1e-3;
+        let factor = if is_allowed {
+            1.0
+        } else {
+            BLOCKED * BLOCKED / (1.0 + off_m)
+        };
+        Ok(factor * self.worst_sir(chain))
+    }
+
+    /// Returns the candidates on the highest ground of each of `columns` columns, if these are wide.
+    ///
+    /// A hilltop between two columns of the grid is then a position, too.
+    fn crests(&self, relay: usize, columns: u32, levels: u32) -> Result<Vec<Candidate>, String> {
+        let wide_m = self.scene.distance_m / f64::from(columns + 1);
+        if wide_m < WIDE_M {
+            return Ok(Vec::new());
+        }
+        let points = self.line.iter().enumerate();
+        let points: Vec<[f64; 2]> = points
+            .map(|(at, h)| [at as f64 * self.step_m, *h])
+            .collect();
+        let crests = points.chunk_by(|[one, _], [other, _]| {
+            (one / wide_m)
+                .floor()
+                .total_cmp(&(other / wide_m).floor())
+                .is_eq()
+        });
+        let crests = crests.filter_map(|points| {
+            let [x_m, _] = points
+                .iter()
+                .max_by(|one, other| one[1].total_cmp(&other[1]))?;
+            (*x_m > 0.0 && *x_m < self.scene.distance_m).then(|| self.above(relay, *x_m, levels))
+        });
+        Ok(crests.collect::<Result<Vec<_>, String>>()?.concat())
     }
 
     /// Returns the candidates around `chain`, at steps of `step_m` along x and `climb_m` in altitude.
@@ -458,7 +558,8 @@ pub fn best(
             "--altitude terrain: needs --uavs within 1 to {MOST_RELAYS}, not {relays}"
         )));
     }
-    let scene = Scene::new(scenario, relays).ok_or_else(|| {
+    let scene = elevation.scene(scenario, relays).map_err(NoPlan::Wrong)?;
+    let scene = scene.ok_or_else(|| {
         NoPlan::Wrong("--altitude terrain: needs an [[interferer]], not a [field]".to_owned())
     })?;
     let briefed = area::profiles(scenario, relays, tolerance)?;
@@ -488,6 +589,11 @@ pub fn best(
         let mut grid = search.grid(columns, levels).map_err(NoPlan::Wrong)?;
         for (relay, (own, seeds)) in grid.iter_mut().zip(&seeds).enumerate() {
             own.extend(seeds);
+            own.extend(
+                search
+                    .crests(relay, columns, LEVELS / 4)
+                    .map_err(NoPlan::Wrong)?,
+            );
             own.extend(found.as_ref().and_then(|(chain, _)| chain.get(relay)));
             highest = own.iter().fold(highest, |most, at| most.max(at.h_m));
         }
@@ -498,6 +604,11 @@ pub fn best(
         let why = "no positions over the terrain are high enough and far enough apart: check terrain.above_ground_m, terrain.above_ground_max_m and the band of altitudes";
         return Err(NoPlan::Unmet(Why::Plain(why.to_owned()), None));
     };
+    if scene.distance_m / search.ground.step_m() > POINTS {
+        search =
+            Search::with_points(scenario, &scene, elevation, FINE_POINTS).map_err(NoPlan::Wrong)?;
+        sir = search.worst_sir(&chain);
+    }
     let step_m = scene.distance_m / f64::from(columns + 1);
     let climb_m = highest / f64::from(LEVELS - 1);
     for halving in 1..=REFINEMENTS {

@@ -10,8 +10,10 @@ use uav_relay_sim::report::{HopSlots, RelayReport, WorstBack, db, hops_table, re
 use uav_relay_terrain::report::TerrainReport;
 
 use super::area::AreaReport;
+use super::locating::Locating;
 use super::over_terrain::OverTerrain;
 use super::rate::{BestRate, Rate, RateOf};
+use super::terrain_flight::Flight;
 use super::{Number, Plan, Unit, Why};
 
 /// Hypothetical interferer that replaces several, with its error and its effect on the plan.
@@ -369,9 +371,15 @@ pub struct PlanReport {
     /// Gain of positions that are chosen for the terrain; absent for other positions.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
+    /// Simulated flight over the terrain, with the loss of each relay; only with `--out`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flight: Option<Flight>,
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
+    /// Location of the interferer in its area by relays with `[listen]`; absent without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub locating: Option<Locating>,
     /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
@@ -432,7 +440,9 @@ impl PlanReport {
             hypothetical,
             terrain: None,
             over_terrain: None,
+            flight: None,
             area: None,
+            locating: None,
             room: !plan.mission.config().lateral.is_single(),
             unit,
         }
@@ -549,6 +559,9 @@ impl PlanReport {
         if let Some(area) = &self.area {
             text.push_str(&area.describe());
         }
+        if let Some(locating) = &self.locating {
+            text.push_str(&locating.to_string());
+        }
         let is_for_both = self.way_back.is_some_and(|back| back.reverse.is_some());
         let one_way = if is_for_both { "" } else { ONE_WAY };
         if let Some(terrain) = &self.terrain {
@@ -556,6 +569,9 @@ impl PlanReport {
         }
         if let Some(over) = &self.over_terrain {
             _ = writeln!(text, "{over}");
+        }
+        if let Some(flight) = &self.flight {
+            _ = writeln!(text, "{flight}");
         }
         let not_modelled = self
             .terrain

@@ -2,14 +2,20 @@
 
 use std::path::PathBuf;
 
+use uav_relay_scenario::Interference;
+use uav_relay_scenario::area::Area;
+use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Scenario, TerrainSpec};
 use uav_relay_terrain::diffraction::LIGHT_M_S;
 use uav_relay_terrain::grid::Terrain;
 use uav_relay_terrain::profile::{Ground, State, bulge_m};
-use uav_relay_terrain::report::{FreeSpace, TerrainReport};
+use uav_relay_terrain::report::{FreeSpace, InterfererHeight, TerrainReport};
 
 use super::Plan;
 use crate::figures::chart::{Axis, Chart, Line, Look, Stroke};
+
+/// Position error of a relay, m, unless `companion.position_error_m` says another one. It is the companion's default.
+pub const POSITION_ERROR_M: f64 = 1.0;
 
 /// Elevation model of a scenario.
 #[expect(missing_debug_implementations, reason = "millions of heights")]
@@ -54,7 +60,56 @@ impl Elevation {
     /// A line that names the site: the scenario has none, the files do not cover it, or its height contradicts them.
     pub fn ground(&self, scenario: &Scenario) -> Result<Ground<'_>, String> {
         let line = scenario.line.as_ref().ok_or("site: is missing")?;
-        Ground::new(&self.terrain, line.axis, line.sites, self.spec.mast_m)
+        let ground = Ground::new(&self.terrain, line.axis, line.sites, self.spec.mast_m)?;
+        Ok(ground.with_error_m(self.spec.error_m))
+    }
+
+    /// Returns the scene of `relays` relays, whose interferers stand on the ground.
+    ///
+    /// `None` in a random field. An interferer that the files do not cover is at altitude 0.
+    ///
+    /// # Errors
+    /// Those of [`ground`](Self::ground).
+    pub fn scene(&self, scenario: &Scenario, relays: u16) -> Result<Option<Scene>, String> {
+        let Some(scene) = Scene::new(scenario, relays) else {
+            return Ok(None);
+        };
+        let heights = self.interferers(scenario)?.into_iter();
+        let heights_m = heights.filter_map(|one| Some((one.index - 1, one.altitude_m?)));
+        Ok(Some(Scene {
+            heights_m: heights_m.collect(),
+            ..scene
+        }))
+    }
+
+    /// Returns the altitudes of the interferers.
+    fn interferers(&self, scenario: &Scenario) -> Result<Vec<InterfererHeight>, String> {
+        let Interference::Sources(sources) = &scenario.interference else {
+            return Ok(Vec::new());
+        };
+        let ground = self.ground(scenario)?;
+        let altitude = |[x_m, y_m]: [f64; 2]| {
+            let datum = ground.point(x_m, y_m).ok()?;
+            let height = ground.height_m(x_m, y_m).ok()?;
+            Some(height - f64::from(datum.amsl_mm) / 1e3)
+        };
+        let each = sources.iter().enumerate().map(|(at, source)| {
+            let places = match scenario.areas.get(&at) {
+                None => vec![[source.x_m, source.y_m]],
+                Some(source) => sampled(&source.area, ground.step_m()),
+            };
+            let mast_m = scenario.masts_m.get(&at).copied().unwrap_or_default();
+            let none = [f64::INFINITY, f64::NEG_INFINITY];
+            let altitude_m = places.into_iter().try_fold(none, |[low, high], place| {
+                let altitude = altitude(place)? + mast_m;
+                Some([low.min(altitude), high.max(altitude)])
+            });
+            InterfererHeight {
+                index: at + 1,
+                altitude_m,
+            }
+        });
+        Ok(each.collect())
     }
 
     /// Returns the report of the terrain below `plan`.
@@ -62,21 +117,24 @@ impl Elevation {
     /// # Errors
     /// A line that names the place: it is not covered by the elevation files, or a hole.
     pub fn report(&self, scenario: &Scenario, plan: &Plan) -> Result<TerrainReport, String> {
-        let sirs_back = plan.sirs_back(scenario);
+        let chain = plan.chain();
+        let relays = u16::try_from(chain.len()).unwrap_or(u16::MAX);
+        let [sirs, sirs_back] = match self.scene(scenario, relays)? {
+            Some(scene) => [scene.hop_sirs(&chain), scene.hop_sirs_back(&chain)],
+            None => [plan.sirs.clone(), plan.sirs_back(scenario)],
+        };
         let free = FreeSpace {
-            sirs: &plan.sirs,
+            sirs: &sirs,
             sirs_back: &sirs_back,
             reverse: scenario.reverse,
         };
         let carrier_hz = scenario.channel.carrier_hz;
         let ground = self.ground(scenario)?;
-        TerrainReport::new(
-            &ground,
-            &plan.chain(),
-            free,
-            carrier_hz,
-            self.position_error_m,
-        )
+        let report = TerrainReport::new(&ground, &chain, free, carrier_hz, self.position_error_m)?;
+        Ok(TerrainReport {
+            interferers: self.interferers(scenario)?,
+            ..report
+        })
     }
 
     /// Returns a line that says why the chain of `report` cannot be flown; `None` if it can.
@@ -97,6 +155,41 @@ impl Elevation {
     pub(super) const fn position_error_m(&self) -> f64 {
         self.position_error_m
     }
+
+    /// Returns the least and the greatest height of a relay above the ground, m.
+    pub(super) fn band_m(&self) -> [f64; 2] {
+        let most_m = self.spec.above_ground_max_m;
+        [self.spec.above_ground_m, most_m.unwrap_or(f64::INFINITY)]
+    }
+}
+
+/// Largest number of samples along one side of an area.
+const SAMPLES: f64 = 200.0;
+
+/// Returns points of an area and its boundary at most `step_m` apart, or at a 200th of its sides.
+fn sampled(area: &Area, step_m: f64) -> Vec<[f64; 2]> {
+    let [low, high] = area.bounds();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 200"
+    )]
+    let steps = [0, 1].map(|axis: usize| {
+        let side = high
+            .get(axis)
+            .zip(low.get(axis))
+            .map_or(0.0, |(a, b)| a - b);
+        (side / step_m).ceil().clamp(1.0, SAMPLES) as u32
+    });
+    let at = |axis: usize, step: u32| {
+        let [from, to] = [low, high].map(|corner| corner.get(axis).copied().unwrap_or_default());
+        let steps = steps.get(axis).copied().unwrap_or(1);
+        from + (to - from) * f64::from(step) / f64::from(steps)
+    };
+    let all = (0..=steps[0]).flat_map(|x| (0..=steps[1]).map(move |y| (x, y)));
+    // A point outside gives the nearest one of the boundary.
+    all.map(|(x, y)| area.nearest([at(0, x), at(1, y)]))
+        .collect()
 }
 
 /// Returns the picture of the profile: ground, hops with the first Fresnel zone, and nodes.

@@ -11,6 +11,8 @@ use uav_relay::{GuardConfig, Mission, Placement, Profile, Side};
 use uav_relay_scenario::Line;
 use uav_relay_scenario::deployment::Deployment;
 
+use crate::plan::terrain_flight::{Flight, ROOM};
+
 /// Text in a udev rule that the operator replaces by the serial number of an adapter.
 pub const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
 
@@ -54,6 +56,8 @@ pub struct Bundle<'a> {
     pub profiles: &'a [(u16, Profile)],
     /// Positions on which the relays will settle; empty if unknown.
     pub places: &'a [(Placement, Profile)],
+    /// Simulated flight over the terrain, if there is any.
+    pub simulated: Option<&'a Flight>,
     /// Line from Tx to Rx.
     pub line: &'a Line,
     /// Key of the network.
@@ -408,6 +412,16 @@ impl Bundle<'_> {
             fence.least_altitude_m,
             fence.most_altitude_m
         );
+        if let Some(flight) = self.simulated {
+            _ = writeln!(
+                page,
+                "room over the terrain: {}\n{ROOM}",
+                flight.room(index)
+            );
+            for line in flight.warnings() {
+                _ = writeln!(page, "warning: {line}");
+            }
+        }
         let neighbour = |side| match (side, index) {
             (Side::Upstream, 1) => "the transmitter".to_owned(),
             (Side::Upstream, index) => format!("relay {}", index - 1),

@@ -1,0 +1,204 @@
+//! Room of each relay along the line: an interval of x in which its hops stay as clear as they are.
+//!
+//! A hop between two intervals is checked at once, for all positions in them. The line of sight above a point of the ground is lowest
+//! at the ends of the intervals, because it is monotone in either position. The earth's curvature and the Fresnel zone are
+//! largest for the longest hop.
+
+use uav_relay::Placement;
+
+use crate::diffraction::EARTH_M;
+use crate::profile::{FREE, Ground, State};
+use crate::report::TerrainReport;
+
+/// Limits on the positions of relays, m.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Error of a relay's position in every direction.
+    pub position_error_m: f64,
+    /// Least and greatest height above the ground.
+    pub above_ground_m: [f64; 2],
+    /// Least distance between the intervals of two relays.
+    pub apart_m: f64,
+    /// Wavelength of the carrier.
+    pub wavelength_m: f64,
+}
+
+/// Node of the chain: the interval of its x, and its altitude above the datum, m.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    x_m: [f64; 2],
+    h_m: f64,
+}
+
+/// Highest ground within the position error along the line, at equal steps, m above the datum.
+struct Ridge {
+    step_m: f64,
+    heights_m: Vec<f64>,
+}
+
+impl Ridge {
+    fn new(ground: &Ground<'_>, error_m: f64) -> Result<(Self, [f64; 2]), String> {
+        let [tx, rx] = ground.ends;
+        let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
+        let length = rx.x_m;
+        let (step_m, steps) = steps(length, ground.step_m());
+        let (aside_m, asides) = steps_of(2.0 * error_m, ground.step_m());
+        let heights_m = (0..=steps).map(|step| {
+            let x_m = f64::from(step) * step_m;
+            let mut highest = f64::NEG_INFINITY;
+            for aside in 0..=asides {
+                let y_m = f64::from(aside) * aside_m - error_m;
+                highest = highest.max(ground.height_m(x_m, y_m)?);
+            }
+            Ok(highest + ground.raise_m(x_m) - datum(x_m)?)
+        });
+        let heights_m = heights_m.collect::<Result<_, String>>()?;
+        Ok((
+            Self { step_m, heights_m },
+            [tx.amsl_m - datum(0.0)?, rx.amsl_m - datum(length)?],
+        ))
+    }
+
+    /// Returns x and height of the points from `from_m` to `to_m`.
+    fn between(&self, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an index"
+        )]
+        let first = (from_m / self.step_m).ceil().max(0.0) as usize;
+        let points = self.heights_m.iter().enumerate().skip(first);
+        points
+            .map(|(at, height)| [at as f64 * self.step_m, *height])
+            .take_while(move |[x_m, _]| *x_m <= to_m)
+    }
+
+    /// Returns true if `share` of the first Fresnel zone of every hop between the two intervals is free.
+    fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
+        let ([a, b], [c, d]) = (from.x_m, to.x_m);
+        self.between([a, d]).all(|[x, height]| {
+            let (before, after) = (x - a, d - x);
+            let bulge = before * after / (2.0 * EARTH_M);
+            let zone = (wavelength_m * before * after / (d - a)).max(0.0).sqrt();
+            let corners = [a, b.min(x)].map(|x1| {
+                [c.max(x), d].map(|x2| {
+                    let part = if x2 > x1 { (x - x1) / (x2 - x1) } else { 0.0 };
+                    from.h_m + part * (to.h_m - from.h_m)
+                })
+            });
+            let sight = corners.concat().into_iter().fold(f64::INFINITY, f64::min);
+            sight - bulge - share * zone > height
+        })
+    }
+}
+
+fn steps(length_m: f64, step_m: f64) -> (f64, u32) {
+    let (step, steps) = steps_of(length_m, step_m);
+    (step, steps.max(1))
+}
+
+/// Returns the equal steps of at most `step_m` that make up a length, and their number.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 1e6"
+)]
+fn steps_of(length_m: f64, step_m: f64) -> (f64, u32) {
+    let steps = (length_m / step_m).ceil().clamp(0.0, 1e6);
+    (length_m / steps.max(1.0), steps as u32)
+}
+
+/// Returns the interval of x, m, in which each relay's hops stay as clear as they are in `report`.
+///
+/// While all relays are in their intervals, within the position error, no hop gets worse than that, and each relay keeps its height above
+/// the ground. `None` for a relay for which that does not hold within the position error of its position.
+///
+/// # Errors
+/// A line that names the place: it is not covered by the elevation files, or a hole.
+pub fn rooms(
+    ground: &Ground<'_>,
+    places: &[Placement],
+    report: &TerrainReport,
+    limits: Limits,
+) -> Result<Vec<Option<[f64; 2]>>, String> {
+    let error = limits.position_error_m;
+    let aside = places.iter().map(|place| f64::from(place.y_m).abs());
+    let (ridge, ends) = Ridge::new(ground, error + aside.fold(0.0, f64::max))?;
+    let end_m = ground.ends[1].x_m;
+    let relay = |place: &Placement| {
+        let x_m = f64::from(place.x_m);
+        Stretch {
+            x_m: [(x_m - error).max(0.0), (x_m + error).min(end_m)],
+            h_m: f64::from(place.altitude_m) - error,
+        }
+    };
+    let at = |x_m: f64, h_m: f64| Stretch { x_m: [x_m; 2], h_m };
+    let relays: Vec<Stretch> = places.iter().map(relay).collect();
+    let mut nodes = [
+        &[at(0.0, ends[0])],
+        relays.as_slice(),
+        &[at(end_m, ends[1])],
+    ]
+    .concat();
+    let share = |hop: usize| match report.hops.get(hop).map(|hop| hop.state) {
+        Some(State::Clear) => FREE,
+        _ => 0.0,
+    };
+    let holds = |nodes: &[Stretch], hop: usize| {
+        let ends = nodes.get(hop).zip(nodes.get(hop + 1));
+        ends.is_some_and(|(from, to)| ridge.is_free([*from, *to], share(hop), limits.wavelength_m))
+    };
+    let [least, most] = limits.above_ground_m;
+    let is_in_band = |node: &Stretch, strip: [f64; 2]| {
+        let h = node.h_m;
+        ridge
+            .between(strip)
+            .all(|[_, ground]| (least - 0.01..=most + 0.01).contains(&(h + error - ground)))
+    };
+    let is_in: Vec<bool> = (0..places.len())
+        .map(|relay| holds(&nodes, relay) && holds(&nodes, relay + 1))
+        .collect();
+    let mut grows: Vec<[bool; 2]> = is_in.iter().map(|is_in| [*is_in; 2]).collect();
+    while grows.concat().contains(&true) {
+        for (relay, sides) in grows.iter_mut().enumerate() {
+            for (side, grows) in sides.iter_mut().enumerate().filter(|(_, grows)| **grows) {
+                let now = nodes.get(relay + 1).copied();
+                let edges = nodes.get(relay).zip(nodes.get(relay + 2));
+                let (Some(now), Some((before, after))) = (now, edges) else {
+                    continue;
+                };
+                let mut next = now;
+                let strip = if side == 0 {
+                    next.x_m[0] -= ridge.step_m;
+                    [next.x_m[0], now.x_m[0]]
+                } else {
+                    next.x_m[1] += ridge.step_m;
+                    [now.x_m[1], next.x_m[1]]
+                };
+                let is_apart = next.x_m[0] >= before.x_m[1] + limits.apart_m
+                    && next.x_m[1] <= after.x_m[0] - limits.apart_m;
+                let set = |nodes: &mut Vec<Stretch>, to: Stretch| {
+                    if let Some(node) = nodes.get_mut(relay + 1) {
+                        *node = to;
+                    }
+                };
+                set(&mut nodes, next);
+                *grows = is_apart
+                    && is_in_band(&next, strip)
+                    && holds(&nodes, relay)
+                    && holds(&nodes, relay + 1);
+                if !*grows {
+                    set(&mut nodes, now);
+                }
+            }
+        }
+    }
+    let rooms = nodes.iter().skip(1).zip(is_in);
+    // The position itself may be anywhere in the interval without its error.
+    Ok(rooms
+        .map(|(node, is_in)| {
+            let [from, to] = node.x_m;
+            is_in.then_some([from + error, to - error])
+        })
+        .collect())
+}

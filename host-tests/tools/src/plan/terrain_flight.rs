@@ -1,0 +1,460 @@
+//! Flight over terrain of relays that choose x by themselves: their altitudes, and checks.
+//!
+//! Relays in flight know no terrain. They keep the altitude that their configuration gives them, and choose x by Algorithm 1. The search
+//! therefore changes only altitudes. It finds the best altitudes at the x that the relays choose, by dynamic programming, and
+//! repeats this with the x that the relays choose at these altitudes. Then it changes the altitude of one relay after the other, and
+//! raises each relay as far as that costs almost no SIR.
+
+use std::fmt;
+
+use rayon::prelude::*;
+use serde::Serialize;
+use uav_relay::{Duration, Method, Placement};
+use uav_relay_scenario::{PlannedMethod, Scenario, mission};
+use uav_relay_sim::simulator::chain::run;
+use uav_relay_sim::simulator::outcome::{Ending, Outcome};
+use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_terrain::diffraction::LIGHT_M_S;
+use uav_relay_terrain::profile::Ground;
+use uav_relay_terrain::room::{Limits, rooms};
+
+use super::flown::{alone, shortest};
+use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
+use super::terrain::Elevation;
+use super::{NoPlan, Plan, ProfiledMission, source};
+
+/// Number of altitudes of a relay that are tried between the lowest and the highest one.
+const LEVELS: u32 = 40;
+
+/// Largest number of searches, each at the x of the search before.
+const ROUNDS: u32 = 6;
+
+/// First and last step of the altitude of a single relay, m.
+const STEPS_M: [f64; 2] = [16.0, 0.5];
+
+/// Largest relative loss of SIR for higher altitudes: 0.01 dB.
+const SLACK: f64 = 0.0023;
+
+/// Least relative gain of a step.
+const GAIN: f64 = 1e-4;
+
+/// Explanation of the rooms for the user.
+pub const ROOM: &str = "room: while every relay is in its room, no hop becomes blocked, and no clear hop becomes grazing; none: a hop gets worse within the position error";
+
+/// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
+struct Trial {
+    scenario: Scenario,
+    chain: Vec<Candidate>,
+    rank: f64,
+}
+
+impl Trial {
+    fn new(
+        scenario: &Scenario,
+        search: &mut Search<'_>,
+        tolerance: f64,
+        altitudes_m: &[f64],
+    ) -> Result<Self, NoPlan> {
+        let mut scenario = scenario.clone();
+        for (index, altitude_m) in (1..).zip(altitudes_m) {
+            scenario.relays.entry(index).or_default().altitude_m = Some(*altitude_m);
+        }
+        let relays = u16::try_from(altitudes_m.len()).unwrap_or(u16::MAX);
+        let flown = alone(&scenario, relays, PlannedMethod::Align, tolerance)?;
+        let chain = flown.places.iter().map(|(place, _)| {
+            let [x_m, h_m] = [place.x_m, place.altitude_m].map(f64::from);
+            search.candidate(x_m, h_m)
+        });
+        let chain: Vec<Candidate> = chain.collect::<Result<_, _>>().map_err(NoPlan::Wrong)?;
+        let rank = search.rank(&chain).map_err(NoPlan::Wrong)?;
+        Ok(Self {
+            scenario,
+            chain,
+            rank,
+        })
+    }
+}
+
+/// Returns the scenario with an altitude for each relay.
+///
+/// The relays then choose good positions over the terrain. The search begins with the altitudes of `plan`, a plan over the terrain.
+///
+/// # Errors
+/// [`NoPlan`]: the relays find no positions, or the terrain is not covered.
+pub fn with_altitudes(
+    scenario: &Scenario,
+    elevation: &Elevation,
+    plan: &Plan,
+    tolerance: f64,
+) -> Result<Scenario, NoPlan> {
+    let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    let scene = elevation.scene(scenario, relays).map_err(NoPlan::Wrong)?;
+    let scene = scene.ok_or_else(source::nothing)?;
+    let search = Search::with_points(scenario, &scene, elevation, FINE_POINTS);
+    let mut search = search.map_err(NoPlan::Wrong)?;
+    let rounded = |chain: &[Candidate]| -> Vec<f64> {
+        let places = chain.iter().map(Candidate::placement);
+        places.map(|place| shortest(place.altitude_m)).collect()
+    };
+    let start = plan.places.iter();
+    let start: Vec<f64> = start.map(|(at, _)| shortest(at.altitude_m)).collect();
+    let mut best = Trial::new(scenario, &mut search, tolerance, &start)?;
+    for _ in 0..ROUNDS {
+        let places = best.chain.iter().enumerate();
+        let columns = places.map(|(relay, at)| search.above(relay, at.x_m, LEVELS));
+        let columns: Vec<_> = columns.collect::<Result<_, _>>().map_err(NoPlan::Wrong)?;
+        let Some((chain, _)) = search.best(&columns, 0.0) else {
+            break;
+        };
+        let next = Trial::new(scenario, &mut search, tolerance, &rounded(&chain))?;
+        if next.rank <= best.rank * (1.0 + GAIN) {
+            break;
+        }
+        best = next;
+    }
+    let mut step_m = STEPS_M[0];
+    while step_m >= STEPS_M[1] {
+        let mut has_gained = false;
+        for relay in 0..plan.places.len() {
+            if scene.relays.get(relay).is_some_and(|relay| relay.holds) {
+                continue;
+            }
+            for step_m in [-step_m, step_m] {
+                let mut chain = best.chain.clone();
+                if let Some(at) = chain.get_mut(relay) {
+                    *at = search
+                        .candidate(at.x_m, (at.h_m + step_m).clamp(0.1, 1e4))
+                        .map_err(NoPlan::Wrong)?;
+                }
+                let next = Trial::new(scenario, &mut search, tolerance, &rounded(&chain))?;
+                if next.rank > best.rank * (1.0 + GAIN) {
+                    (best, has_gained) = (next, true);
+                }
+            }
+        }
+        if !has_gained {
+            step_m *= 0.5;
+        }
+    }
+    // Relays that close a gap fly along the line at their altitudes: of altitudes with nearly the same SIR the highest are safest.
+    let least = best.rank * (1.0 - SLACK);
+    for relay in 0..plan.places.len() {
+        for share in [1.0, 0.75, 0.5, 0.25] {
+            let mut chain = best.chain.clone();
+            let Some(at) = chain.get_mut(relay) else {
+                continue;
+            };
+            let allowed = search.above(relay, at.x_m, 2).map_err(NoPlan::Wrong)?;
+            let highest_m = allowed.last().map_or(at.h_m, |highest| highest.h_m);
+            *at = search
+                .candidate(at.x_m, at.h_m + share * (highest_m - at.h_m))
+                .map_err(NoPlan::Wrong)?;
+            let next = Trial::new(scenario, &mut search, tolerance, &rounded(&chain))?;
+            if next.rank >= least {
+                best = next;
+                break;
+            }
+        }
+    }
+    Ok(best.scenario)
+}
+
+/// Position of a relay in flight, and its room.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct FlownRelay {
+    /// Number of the relay; 1 is next to Tx.
+    pub index: u16,
+    /// Distance of its position from Tx along the line to Rx, m.
+    pub x_m: f32,
+    /// Altitude of its position above the line between the sites, m.
+    pub altitude_m: f32,
+    /// Interval of x, m, in which no hop gets worse while its neighbours are in theirs.
+    ///
+    /// Absent if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub room_m: Option<[f64; 2]>,
+}
+
+/// Terrain below the chain after the loss of one relay, when the others have closed the gap.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Without {
+    /// Number of the lost relay.
+    pub lost: u16,
+    /// SIR of the worst hop with terrain, dB; absent if the others find no positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub terrain_sir_db: Option<f64>,
+    /// Blocked hops, relays too low, and ways too low; absent if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+}
+
+/// Terrain below the positions that relays take by themselves, in a simulation of the flight.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Flight {
+    /// SIR of the worst hop with terrain at these positions, dB.
+    pub terrain_sir_db: f64,
+    /// By how much a plan with other positions is better, dB; absent if the plan has these positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss_db: Option<f64>,
+    /// Largest distance of a relay from its position in that plan, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub off_m: Option<f64>,
+    /// Positions of the relays.
+    pub relays: Vec<FlownRelay>,
+    /// Chains after the loss of one relay; empty for one relay and for more than 50.
+    pub without: Vec<Without>,
+    /// Reason why the relays cannot fly there: a blocked hop, a relay too low or too high.
+    #[serde(skip)]
+    pub problem: Option<String>,
+}
+
+impl Flight {
+    /// Simulates the flight over the terrain.
+    ///
+    /// `flown` has the positions on which the relays of `scenario` agree by `method`.
+    ///
+    /// # Errors
+    /// [`NoPlan`]: the simulated relays find other positions or none, or the terrain is not covered.
+    pub fn new(
+        scenario: &Scenario,
+        elevation: &Elevation,
+        flown: &Plan,
+        (method, tolerance): (PlannedMethod, f64),
+        allow_blocked: bool,
+    ) -> Result<Self, NoPlan> {
+        let relays = u16::try_from(flown.places.len()).unwrap_or(u16::MAX);
+        let simulates = relays <= MOST_RELAYS;
+        let setup = setup(scenario, relays, method, tolerance)?;
+        let mut places: Vec<Placement> = flown.places.iter().map(|(place, _)| *place).collect();
+        let mut agreed = None;
+        if simulates {
+            let outcome = simulated(setup.clone())?;
+            let taken = outcome.relays.iter().map(|relay| relay.setpoint);
+            places = taken.collect::<Option<_>>().ok_or_else(source::nothing)?;
+            agreed = Some(outcome.ended);
+        }
+        let flown = settled(scenario, relays, tolerance, &places)?;
+        let report = elevation.report(scenario, &flown).map_err(NoPlan::Wrong)?;
+        let ground = elevation.ground(scenario).map_err(NoPlan::Wrong)?;
+        let limits = Limits {
+            position_error_m: elevation.position_error_m(),
+            above_ground_m: elevation.band_m(),
+            apart_m: scenario.min_separation_m,
+            wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
+        };
+        let rooms = rooms(&ground, &places, &report, limits).map_err(NoPlan::Wrong)?;
+        let is_lost = |lost: u16| {
+            let mut setup = setup.clone();
+            let at = agreed? + Duration::from_millis(1_000);
+            setup.kills = vec![(lost, at)];
+            Some(without(
+                scenario,
+                elevation,
+                &ground,
+                (setup, tolerance),
+                (lost, &places),
+            ))
+        };
+        let lost = if relays > 1 { 1..relays + 1 } else { 0..0 };
+        let without: Vec<Option<Result<Without, NoPlan>>> =
+            lost.into_par_iter().map(is_lost).collect();
+        Ok(Self {
+            terrain_sir_db: report.terrain_sir_db,
+            loss_db: None,
+            off_m: None,
+            relays: (1..)
+                .zip(&places)
+                .zip(rooms)
+                .map(|((index, place), room_m)| FlownRelay {
+                    index,
+                    x_m: place.x_m,
+                    altitude_m: place.altitude_m,
+                    room_m,
+                })
+                .collect(),
+            without: without.into_iter().flatten().collect::<Result<_, _>>()?,
+            problem: elevation.problem(&report, allow_blocked),
+        })
+    }
+
+    /// Adds the difference from a `plan` with other positions, and `terrain_sir_db` with terrain.
+    #[must_use]
+    pub fn compared(self, plan: &Plan, terrain_sir_db: f64) -> Self {
+        let apart = plan.places.iter().zip(&self.relays).map(|((from, _), to)| {
+            let [x, h] = [from.x_m - to.x_m, from.altitude_m - to.altitude_m].map(f64::from);
+            x.hypot(from.y_m.into()).hypot(h)
+        });
+        Self {
+            off_m: Some(apart.fold(0.0, f64::max)),
+            loss_db: Some(terrain_sir_db - self.terrain_sir_db),
+            ..self
+        }
+    }
+
+    /// Returns the lines about the loss of one relay that name a problem.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        self.without.iter().filter_map(|without| {
+            let problem = without.problem.as_ref()?;
+            Some(format!("without relay {}: {problem}", without.lost))
+        })
+    }
+
+    /// Returns the text about the room of relay `index`; empty if it is unknown.
+    pub fn room(&self, index: u16) -> String {
+        let relay = self.relays.iter().find(|relay| relay.index == index);
+        match relay.map(|relay| relay.room_m) {
+            Some(Some([from, to])) => format!("x {from:.1} to {to:.1} m"),
+            Some(None) => "none".to_owned(),
+            None => String::new(),
+        }
+    }
+}
+
+impl fmt::Display for Flight {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sir_db = self.terrain_sir_db;
+        write!(f, "simulated flight: worst hop {sir_db:.3} dB with terrain")?;
+        if let (Some(loss_db), Some(off_m)) = (self.loss_db, self.off_m) {
+            let than = if loss_db < 0.0 { "more" } else { "less" };
+            write!(
+                f,
+                ", {:.3} dB {than} than the plan; relays up to {off_m:.1} m from the plan's positions, because they choose x without the terrain",
+                loss_db.abs()
+            )?;
+        }
+        for relay in &self.relays {
+            let (index, room) = (relay.index, self.room(relay.index));
+            write!(
+                f,
+                "\nrelay {index}: x {:.1} m, altitude {:.1} m; room: {room}",
+                relay.x_m, relay.altitude_m
+            )?;
+        }
+        write!(f, "\n{ROOM}")?;
+        for line in self.warnings() {
+            write!(f, "\nwarning: {line}")?;
+        }
+        let worst = self.without.iter().filter(|one| one.problem.is_none());
+        let worst = worst.filter_map(|one| Some((one.lost, one.terrain_sir_db?)));
+        if let Some((lost, sir_db)) = worst.min_by(|one, other| one.1.total_cmp(&other.1)) {
+            write!(
+                f,
+                "\nafter the loss of any other relay no hop is blocked; worst hop {sir_db:.3} dB, without relay {lost}"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the setup of a simulated flight on a shared channel without losses.
+fn setup(
+    scenario: &Scenario,
+    relays: u16,
+    method: PlannedMethod,
+    tolerance: f64,
+) -> Result<Setup, NoPlan> {
+    let (mut mission, profiles) = mission::mission(scenario, relays, tolerance)?;
+    let mut settings = Method::Align;
+    if method == PlannedMethod::Joint {
+        mission = mission::with_access(scenario, &mission)?;
+        settings = Method::Joint;
+    }
+    let mut setup = Setup::on_shared_channel(mission);
+    setup.settings.method = settings;
+    setup.profiles = profiles;
+    setup.held = mission::fixed_altitude_relays(scenario, relays);
+    Ok(setup)
+}
+
+fn simulated(setup: Setup) -> Result<Outcome, NoPlan> {
+    run(setup).map_err(|error| NoPlan::Wrong(error.to_string()))
+}
+
+/// Returns the plan with relays at `places`.
+fn settled(
+    scenario: &Scenario,
+    relays: u16,
+    tolerance: f64,
+    places: &[Placement],
+) -> Result<Plan, NoPlan> {
+    Ok(ProfiledMission::new(scenario, relays, tolerance)?.plan(places, "", false))
+}
+
+/// Simulates the loss of relay `lost` of a chain at `places`. Returns the terrain below the others.
+fn without(
+    scenario: &Scenario,
+    elevation: &Elevation,
+    ground: &Ground<'_>,
+    (setup, tolerance): (Setup, f64),
+    (lost, places): (u16, &[Placement]),
+) -> Result<Without, NoPlan> {
+    let outcome = simulated(setup)?;
+    let left = |index: &u16| *index != lost;
+    let relays = (1..).zip(&outcome.relays).filter(|(index, _)| left(index));
+    let after: Option<Vec<(u16, Placement)>> = relays
+        .map(|(index, relay)| Some((index, relay.setpoint?)))
+        .collect();
+    let after = after.filter(|_| matches!(outcome.ending, Ending::Settled | Ending::NoQuorum));
+    let Some(after) = after else {
+        return Ok(Without {
+            lost,
+            terrain_sir_db: None,
+            problem: Some("the other relays find no positions".to_owned()),
+        });
+    };
+    let mut others = scenario.clone();
+    others.relays = scenario
+        .relays
+        .iter()
+        .filter(|(index, _)| left(index))
+        .map(|(index, own)| (index - u16::from(*index > lost), own.clone()))
+        .collect();
+    let relays = u16::try_from(after.len()).unwrap_or(u16::MAX);
+    let to: Vec<Placement> = after.iter().map(|(_, place)| *place).collect();
+    let plan = settled(&others, relays, tolerance, &to)?;
+    let mut report = elevation.report(&others, &plan).map_err(NoPlan::Wrong)?;
+    for (height, (index, _)) in report.heights.iter_mut().zip(&after) {
+        height.index = usize::from(*index);
+    }
+    let lines = [report.blocked(), elevation.problem(&report, true)];
+    let mut problems: Vec<String> = lines.into_iter().flatten().collect();
+    let from = (1..).zip(places).filter(|(index, _)| left(index));
+    for ((index, from), to) in from.zip(&to) {
+        let least_m = elevation.spec.above_ground_m;
+        if let Some([x_m, height_m]) = lowest(ground, *from, *to)
+            .map_err(NoPlan::Wrong)?
+            .filter(|[_, height_m]| *height_m < least_m - 0.01)
+        {
+            problems.push(format!(
+                "relay {index} on its way from x = {:.0} m to {:.0} m is {height_m:.1} m above the ground at x = {x_m:.0} m; allowed: at least {least_m} m (terrain.above_ground_m)",
+                from.x_m, to.x_m
+            ));
+        }
+    }
+    Ok(Without {
+        lost,
+        terrain_sir_db: Some(report.terrain_sir_db),
+        problem: (!problems.is_empty()).then(|| problems.join("; ")),
+    })
+}
+
+/// Returns x and height above the ground, m, at the lowest point of a straight way.
+///
+/// `None` if the ends are the same.
+fn lowest(ground: &Ground<'_>, from: Placement, to: Placement) -> Result<Option<[f64; 2]>, String> {
+    let [start, end] = [ground.relay(from)?, ground.relay(to)?];
+    if start == end {
+        return Ok(None);
+    }
+    let profile = ground.profile([start, end])?;
+    let length = profile.length_m().max(f64::MIN_POSITIVE);
+    let heights = profile.points.iter().map(|[along, height]| {
+        let share = along / length;
+        let at = |from: f64, to: f64| from + share * (to - from);
+        [
+            at(start.x_m, end.x_m),
+            at(start.amsl_m, end.amsl_m) - height,
+        ]
+    });
+    Ok(heights.min_by(|one, other| one[1].total_cmp(&other[1])))
+}
