@@ -288,6 +288,7 @@ fn every_missing_required_key_is_reported() {
         "lateral_max_m",
         "min_separation_m",
         "channel.",
+        "mast_m",
         "rx_w",
         "relay[1].a",
         "relay[1].p",

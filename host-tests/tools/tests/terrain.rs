@@ -6,6 +6,7 @@
     clippy::indexing_slicing,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
+    clippy::too_many_lines,
     missing_docs
 )]
 
@@ -20,8 +21,7 @@ use files::Raster;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::Value;
 use uav_relay::Placement;
-use uav_relay_scenario::PlannedMethod;
-use uav_relay_scenario::Scenario;
+use uav_relay_scenario::{PlannedMethod, Scenario, TerrainSpec};
 use uav_relay_terrain::profile::State;
 use uav_relay_tools::plan::flown::flown;
 use uav_relay_tools::plan::over_terrain::{self, Candidate, Search};
@@ -216,7 +216,7 @@ fn positions_over_terrain_are_no_worse_than_those_that_ignore_it() {
 #[test]
 fn relays_fly_over_the_terrain_by_themselves() {
     let folder = tempfile::tempdir().unwrap();
-    let count = std::env::var("COUNT").map_or(4, |text| text.parse().unwrap());
+    let count = std::env::var("COUNT").map_or(8, |text| text.parse().unwrap());
     let (mut losses, mut clear, mut rooms_m, mut warned) = (Vec::new(), 0_u64, Vec::new(), 0);
     for seed in 1..=count {
         let rng = &mut rng(seed);
@@ -265,12 +265,18 @@ fn relays_fly_over_the_terrain_by_themselves() {
         for _ in 0..50 {
             let somewhere = flight.relays.iter().map(|relay| {
                 let [from, to] = relay.room_m.unwrap_or([f64::from(relay.x_m); 2]);
+                // Often at the ends of the room, and as low as the error allows.
+                let x_m = match rng.random_range(0..4) {
+                    0 => from,
+                    1 => to,
+                    _ => rng.random_range(from..=to),
+                };
                 let mut error = || rng.random_range(-0.57..0.57);
-                let [dx, dy, dh]: [f64; 3] = [error(), error(), error()];
+                let [dx, dy]: [f64; 2] = [error(), error()];
                 let place = Placement {
-                    x_m: (rng.random_range(from..=to) + dx) as f32,
+                    x_m: (x_m + dx) as f32,
                     y_m: dy as f32,
-                    altitude_m: relay.altitude_m + dh as f32,
+                    altitude_m: relay.altitude_m - 0.57,
                 };
                 (relay.room_m, ground.relay(place).unwrap())
             });
@@ -490,7 +496,7 @@ fn interferers_stand_on_the_ground() {
         Scenario::load(&file).unwrap()
     };
     let scenario = read(
-        "[[interferer]]\npower_w = 3\nx_m = 1900\ny_m = -350\nmast_m = 25\n[[interferer]]\npower_w = 0.5\nx_m = 3000\ny_m = 300\n\
+        "[[interferer]]\npower_w = 3\nx_m = 1900\ny_m = -150\nmast_m = 25\n[[interferer]]\npower_w = 0.5\nx_m = 3000\ny_m = 300\n\
          [[interferer]]\npower_w = 2\nx_m = 2500\ny_m = 4000\n",
     );
     let elevation = elevation(&scenario);
@@ -507,7 +513,7 @@ fn interferers_stand_on_the_ground() {
         height(0.0, 0.0) + (height(5000.0, 0.0) - height(0.0, 0.0)) * x / scenario.distance_m
     };
     let sources = [
-        (3.0, 1900.0, -350.0, height(1900.0, -350.0) + 25.0),
+        (3.0, 1900.0, -150.0, height(1900.0, -150.0) + 25.0),
         (0.5, 3000.0, 300.0, height(3000.0, 300.0)),
         (2.0, 2500.0, 4000.0, line(2500.0)),
     ];
@@ -521,22 +527,38 @@ fn interferers_stand_on_the_ground() {
         each.map(|(w, sx, sy, sz)| w / free((x - sx).hypot(*sy).hypot(amsl - sz)))
             .sum()
     };
-    let relays: Vec<(f64, f64)> = known
-        .places
-        .iter()
-        .map(|(place, _)| {
+    // Eight relays at 150 m pass close to the first one.
+    let ask = PlanRequest {
+        number: Number::Of(8),
+        free_altitude: false,
+        x_m: None,
+        tolerance: 1e-4,
+    };
+    let level = plan(&scenario, &ask).unwrap();
+    let level_report = elevation.report(&scenario, &level).unwrap();
+    let mut effect_db: f64 = 0.0;
+    for (plan, report) in [(&known, &report), (&level, &level_report)] {
+        let relays = plan.places.iter().map(|(place, _)| {
             let [x, h] = [place.x_m, place.altitude_m].map(f64::from);
             (x, line(x) + h)
-        })
-        .collect();
-    let mut from = (0.0, line(0.0), 5.0);
-    for (hop, (x, amsl)) in report.hops.iter().zip(&relays) {
-        let signal = from.2 / free((x - from.0).hypot(amsl - from.1));
-        let sir_db = 10.0 * (signal / heard(*x, *amsl)).log10() - hop.diffraction_db;
-        assert!((hop.sir_db - sir_db).abs() < 0.1, "{} {sir_db}", hop.sir_db);
-        from = (*x, *amsl, 1.0);
+        });
+        let mut from = (0.0, line(0.0), 5.0);
+        for (hop, (x, amsl)) in report.hops.iter().zip(relays) {
+            let signal = from.2 / free((x - from.0).hypot(amsl - from.1));
+            let sir_db = 10.0 * (signal / heard(x, amsl)).log10() - hop.diffraction_db;
+            // The heights of the raster are within some metres of the hill's.
+            let (own_db, hop_db) = (hop.sir_db, hop.diffraction_db);
+            assert!((own_db - sir_db).abs() < 0.3, "{own_db} {sir_db}");
+            let flat: f64 = sources
+                .iter()
+                .map(|(w, sx, sy, _)| w / free((x - sx).hypot(*sy).hypot(amsl - line(*sx))))
+                .sum();
+            let flat_db = 10.0 * (signal / flat).log10() - hop_db;
+            effect_db = effect_db.max((flat_db - sir_db).abs());
+            from = (x, amsl, 1.0);
+        }
     }
-    // A hilltop with the interferer below a relay costs more than the interferer at the line between the sites.
+    assert!(effect_db > 1.0, "{effect_db}");
     let scene = elevation.scene(&scenario, 3).unwrap().unwrap();
     let mut search = Search::new(&scenario, &scene, &elevation).unwrap();
     let grid = search.grid(7, 3).unwrap();
@@ -570,70 +592,100 @@ fn interferers_stand_on_the_ground() {
     assert!((near / (3.0 / free(50.0)) - 1.0).abs() < 1e-3, "{near}");
 }
 
-/// Checks plans over a long line with narrow hills, and the error of the heights.
+/// Checks the plan over a long line with narrow hills, which the columns of the first grid miss.
 #[test]
-fn long_lines_and_errors_of_the_heights() {
+fn long_lines_have_relays_on_narrow_hilltops() {
     let folder = tempfile::tempdir().unwrap();
-    // Ridges 150 m wide, each 3.1 km, and 60 m high: narrower than a column of the first grid.
+    let rng = &mut rng(2);
+    let mut wave = || {
+        let [length, phase] =
+            [(250.0, 1500.0), (0.0, 6.3)].map(|(low, high)| rng.random_range(low..high));
+        [length, phase, rng.random_range(4.0..25.0)]
+    };
+    let waves: Vec<[f64; 3]> = (0..8).map(|_| wave()).collect();
     let height = |x: f64| {
+        let each = waves.iter();
         300.0
-            + 60.0 * (-((x - 1700.0).rem_euclid(3100.0) - 1550.0).powi(2) / 75.0_f64.powi(2)).exp()
+            + each
+                .map(|[l, p, a]| a * (std::f64::consts::TAU * x / l + p).sin())
+                .sum::<f64>()
     };
     let raster = Raster::geographic(8.495, 47.202, 1.0 / 3600.0, [1925, 15]);
     raster.write(&folder.path().join("hills.tif"), |lon, _| {
         height((lon - 8.5) * 75_744.0)
     });
-    let read = |error: &str| {
-        let text = format!(
-            "[geometry]\naltitude_m = 100\n[site]\ntx = {{ lat_deg = 47.2, lon_deg = 8.5, amsl_m = 300 }}\n\
-             rx = {{ lat_deg = 47.2, lon_deg = 9.02, amsl_m = 300 }}\n[power]\ntx_w = 5\nuav_w = 5\n[noise]\nbandwidth_hz = 1e6\n\
-             [terrain]\nfiles = [\"hills.tif\"]\nmast_m = 10\nabove_ground_m = 20\nabove_ground_max_m = 40\n{error}\
-             [[interferer]]\npower_w = 0.01\nx_m = 20000\ny_m = 4000\n"
-        );
-        let file = folder.path().join("scene.toml");
-        std::fs::write(&file, text).unwrap();
-        Scenario::load(&file)
-    };
-    let scenario = read("").unwrap();
-    let of = elevation(&scenario);
-    let start = std::time::Instant::now();
-    let plan = over_terrain::best(&scenario, &of, 13, 1e-4).unwrap();
-    println!("{:.1} s", start.elapsed().as_secs_f64());
-    let report = of.report(&scenario, &plan).unwrap();
-    // Only hops from ridge to ridge are clear.
-    assert!(of.problem(&report, false).is_none(), "{}", report.table());
+    let file = folder.path().join("scene.toml");
+    let text = format!(
+        "[geometry]\naltitude_m = 100\n[site]\ntx = {{ lat_deg = 47.2, lon_deg = 8.5, amsl_m = {:.1} }}\n\
+         rx = {{ lat_deg = 47.2, lon_deg = 9.02, amsl_m = {:.1} }}\n[power]\ntx_w = 5\nuav_w = 5\n[noise]\nbandwidth_hz = 1e6\n\
+         [terrain]\nfiles = [\"hills.tif\"]\nmast_m = 20\nabove_ground_m = 20\nabove_ground_max_m = 80\n\
+         [[interferer]]\npower_w = 0.01\nx_m = 20000\ny_m = 4000\n",
+        height(0.0),
+        height(0.52 * 75_744.0)
+    );
+    std::fs::write(&file, text).unwrap();
+    let scenario = Scenario::load(&file).unwrap();
+    let elevation = elevation(&scenario);
+    let plan = over_terrain::best(&scenario, &elevation, 12, 1e-4).unwrap();
+    let report = elevation.report(&scenario, &plan).unwrap();
+    // The interferer is not covered. Without the highest ground of each column a hop is blocked.
     assert!(report.interferers[0].altitude_m.is_none());
-    println!("{}", report.table());
-    let with_error = read("error_m = 8\n").unwrap();
-    let raised = elevation(&with_error);
-    let same = raised.report(&with_error, &plan).unwrap();
-    let is_inside = |x_m: f64| (200.0..scenario.distance_m - 200.0).contains(&x_m);
+    assert!(
+        elevation.problem(&report, false).is_none(),
+        "{}",
+        report.table()
+    );
+}
+
+/// Checks that the ground counts as higher by the error of the heights.
+#[test]
+fn the_error_of_the_heights_is_a_margin() {
+    let folder = tempfile::tempdir().unwrap();
+    let known = scene(folder.path(), &mut rng(1), "");
+    let of = elevation(&known);
+    let unsure = Scenario {
+        terrain: known.terrain.clone().map(|spec| TerrainSpec {
+            error_m: 8.0,
+            ..spec
+        }),
+        ..known.clone()
+    };
+    let raised = elevation(&unsure);
+    let best = over_terrain::best(&known, &of, 4, 1e-4).unwrap();
+    let [report, same] =
+        [of.report(&known, &best), raised.report(&unsure, &best)].map(Result::unwrap);
+    let is_inside = |x_m: f64| (200.0..known.distance_m - 200.0).contains(&x_m);
+    let mut compared = 0;
     for (hop, other) in report.hops.iter().zip(&same.hops) {
-        if is_inside(hop.obstacle_x_m) && is_inside(other.obstacle_x_m) {
-            let lost_m = hop.clearance_m - other.clearance_m;
-            assert!((lost_m - 8.0).abs() < 0.5, "{hop:?} {other:?}");
+        if is_inside(hop.obstacle_x_m) && (hop.obstacle_x_m - other.obstacle_x_m).abs() < 1e-6 {
+            assert!(
+                (hop.clearance_m - other.clearance_m - 8.0).abs() < 1e-6,
+                "{hop:?} {other:?}"
+            );
+            compared += 1;
         }
-        assert!(other.clearance_m < hop.clearance_m + 1e-9 && !(hop.state == State::Blocked));
-        assert!(other.diffraction_db >= hop.diffraction_db);
+        assert!(other.diffraction_db >= hop.diffraction_db - 1e-9);
     }
+    assert!(compared > 0);
     for (relay, other) in report.heights.iter().zip(&same.heights) {
         assert!((relay.above_obstacle_m - other.above_obstacle_m - 8.0).abs() < 1e-6);
         assert!((relay.above_ground_m - other.above_ground_m).abs() < 1e-9);
     }
-    let plan = over_terrain::best(&with_error, &raised, 13, 1e-4).unwrap();
-    let report = raised.report(&with_error, &plan).unwrap();
+    let careful = over_terrain::best(&unsure, &raised, 4, 1e-4).unwrap();
+    let report = raised.report(&unsure, &careful).unwrap();
     assert!(
-        raised.problem(&report, false).is_none(),
-        "{}",
-        report.table()
+        report.too_low(30.0).is_none()
+            && report
+                .heights
+                .iter()
+                .all(|relay| relay.above_ground_m >= 37.99)
     );
-    assert!(
-        report
-            .heights
-            .iter()
-            .all(|relay| relay.above_ground_m >= 27.99)
-    );
-    let wrong = read("error_m = 101\n").unwrap_err().to_string();
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    let text = text.replace("mast_m = 5\n", "mast_m = 5\nerror_m = 101\n");
+    std::fs::write(folder.path().join("wrong.toml"), text).unwrap();
+    let wrong = Scenario::load(&folder.path().join("wrong.toml"))
+        .unwrap_err()
+        .to_string();
     assert!(
         wrong.contains("terrain.error_m = 101") && wrong.contains("0 to 100 m"),
         "{wrong}"
