@@ -1,15 +1,16 @@
 //! Identity and settings of a relay, checked once at start-up.
 
 use crate::channel_load::ChannelLoad;
+use crate::features::{ADJUST, ALTITUDE, FIELD, GUARD, SENSING};
 use crate::guard::config::GuardConfig;
 use crate::mission::{Interference, Mission, MissionConfig, Profile};
 use crate::optimiser::joint::MOST_SOLVED;
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
+use crate::place::Placement;
 use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
-use crate::without_quorum::WithoutQuorum;
 
 /// Time that the preset settings include in `hop_time` for computation and the link's buffers.
 const LATENCY: Duration = Duration::from_millis(10);
@@ -92,6 +93,47 @@ pub struct Measure {
     pub i_max_w: f32,
     /// Number of samples to take at one position before an estimate is made from them, 100 to 1 000 000.
     pub samples: u32,
+}
+
+/// Behaviour of a relay while the relays that it can reach are too few for a quorum of the chain.
+///
+/// [`Leave`](Self::Leave) clears the line for the relays that have a quorum. Set the same value on all relays: relays
+/// that leave the line then keep their order and distances.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum WithoutQuorum {
+    /// The drone holds its last agreed position while there is no quorum.
+    #[default]
+    Hold,
+    /// Leave the line from Tx to Rx: fly from the last agreed position sideways (along y) and upward. With a guard,
+    /// only within its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
+    Leave {
+        /// Lateral offset that is added to the agreed position, m: -1e4 to 1e4.
+        y_m: f32,
+        /// Height that is added to the agreed position, m: 0 to 1e4.
+        up_m: f32,
+    },
+}
+
+impl WithoutQuorum {
+    pub(crate) fn is_valid(self) -> bool {
+        match self {
+            Self::Hold => true,
+            Self::Leave { y_m, up_m } => (-1e4..=1e4).contains(&y_m) && (0.0..=1e4).contains(&up_m),
+        }
+    }
+
+    /// Returns the position at which a relay without a quorum waits; `place` is the last agreed position.
+    pub(crate) fn place(self, place: Placement) -> Placement {
+        match self {
+            Self::Hold => place,
+            Self::Leave { y_m, up_m } => Placement {
+                y_m: place.y_m + y_m,
+                altitude_m: place.altitude_m + up_m,
+                ..place
+            },
+        }
+    }
 }
 
 /// Settings that a firmware may choose.
@@ -186,7 +228,7 @@ impl Settings {
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
-        !(cfg!(feature = "altitude") && config.fitted_gap > 0.0) || may_fit
+        !(ALTITUDE && config.fitted_gap > 0.0) || may_fit
     }
 
     /// Default settings, as a constant for `const` functions.
@@ -368,7 +410,7 @@ pub(crate) fn check(
             MOST_SOLVED.checked_sub(mission.relays().into()).is_some()
                 && mission.interferer().is_some()
         }
-        Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
+        Method::Adjust(_) => ADJUST && mission.interferer().is_some(),
     };
     if !able {
         return Err(SetupError::Method);
@@ -393,14 +435,12 @@ pub(crate) fn check(
         }
     }
     if let Some(Measure { i_max_w, samples }) = settings.measure
-        && !(cfg!(feature = "field")
-            && (1e-30..=1e6).contains(&i_max_w)
-            && (100..=1_000_000).contains(&samples))
+        && !(FIELD && (1e-30..=1e6).contains(&i_max_w) && (100..=1_000_000).contains(&samples))
     {
         return Err(SetupError::Measure);
     }
     if let Some(listen) = settings.listen
-        && !(cfg!(feature = "sensing") && listen.is_valid() && mission.field().is_none())
+        && !(SENSING && listen.is_valid() && mission.field().is_none())
     {
         return Err(SetupError::Listen);
     }
@@ -418,7 +458,7 @@ pub(crate) fn check(
     }
     if settings
         .guard
-        .is_some_and(|confines| !cfg!(feature = "guard") || !confines.is_valid())
+        .is_some_and(|confines| !GUARD || !confines.is_valid())
     {
         return Err(SetupError::Guard);
     }
@@ -433,6 +473,7 @@ pub(crate) fn check(
 mod tests {
     use super::{LATENCY, Settings, Wiring};
     use crate::channel_load::ChannelLoad;
+    use crate::features::AUTH;
     use crate::time::Duration;
 
     const RATES: [u32; 7] = [0, 300, 9_600, 57_600, 115_200, 250_000, 921_600];
@@ -477,7 +518,7 @@ mod tests {
                 (usual.wiring, usual.probe_after)
             );
         }
-        let sweep = if cfg!(feature = "auth") { 108 } else { 100 };
+        let sweep = if AUTH { 108 } else { 100 };
         let slow = Duration::from_micros((sweep * 1_000_000_u64).div_ceil(960) + 10_000);
         assert_eq!(Settings::wires(9_600).hop_time, slow);
     }

@@ -3,8 +3,8 @@
 use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
+use crate::settings::WithoutQuorum;
 use crate::time::Duration;
-use crate::without_quorum::WithoutQuorum;
 
 /// Default of [`GuardConfig::lag`]: time to stop from the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);

@@ -3,16 +3,13 @@
 //! The estimate is replaced once the number of samples of `Settings::measure` has been taken at a position. Before that the
 //! estimate of the last position is used, so a relay reports the same value during one agreement.
 
+use crate::features::FIELD;
 use crate::field::estimate::{Estimate, Estimator};
 use crate::field::is_upsilon;
 use crate::mission::Mission;
 use crate::place::Placement;
 use crate::settings::Measure;
 use crate::sir::square;
-
-/// True with the feature `field` (interference as a known distribution along x). If false, `Settings::measure` is
-/// rejected.
-const FIELD: bool = cfg!(feature = "field");
 
 /// Measurement of a relay or of a ground station, which the firmware gives to the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -5,15 +5,9 @@
 //! interferer, because a field does not fit into a frame.
 
 use super::digest::MissionId;
-#[cfg(feature = "upload")]
 use super::digest::{between, digest, of};
 use crate::geodetic::{LineError, Sites};
-#[cfg(feature = "upload")]
-use crate::mission::{Interference, Mission};
-use crate::mission::{MissionConfig, MissionError};
-
-/// True if the crate is built with the feature `upload`: new missions can be uploaded in flight.
-pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
+use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 
 /// Mission that the operator uploads in flight, with a version. It replaces the mission loaded before flight.
 #[cfg(feature = "upload")]
@@ -177,6 +171,19 @@ pub enum Upload {}
 #[cfg(not(feature = "upload"))]
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as with the feature")]
 impl Upload {
+    /// Length of an offer's body without an upload, bytes: its tag.
+    pub(super) const OFFER: usize = 1;
+
+    pub(super) const fn encode_offer(&self, _: u16, _: &mut [u8]) -> Option<usize> {
+        match *self {}
+    }
+
+    pub(super) const fn decode_offer(
+        _: &[u8],
+    ) -> Result<(Self, u16), super::message::MessageError> {
+        Err(super::message::MessageError::Encoding)
+    }
+
     pub(crate) const fn base(&self) -> u16 {
         match *self {}
     }

@@ -2,6 +2,7 @@
 
 use super::Node;
 use crate::event::Event;
+use crate::features::UPLOAD;
 use crate::mission::Mission;
 use crate::node::context::ProposalOutcome;
 use crate::settings::Method;
@@ -9,7 +10,6 @@ use crate::side::Heading;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
-use crate::wire::upload::UPLOAD;
 
 impl Node {
     /// Handles the decision on a view proposal. If it is accepted, starts the new view (membership) with its mission.

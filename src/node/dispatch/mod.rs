@@ -21,6 +21,7 @@
 //! forever. A part without a quorum loses nothing by it.
 
 use crate::event::{Event, NodeEvent, Pending};
+use crate::features::SENSING;
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 use crate::node::context::{Context, Effects, Ignored, LayerEvent, Member, Peer, first_pass};
@@ -208,7 +209,7 @@ impl Node {
             None => {}
         }
         let sensed = effects.sensed;
-        if cfg!(feature = "sensing") && sensed.new_estimate {
+        if SENSING && sensed.new_estimate {
             self.apply_estimate();
         }
         if sensed.unclear {

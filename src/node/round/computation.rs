@@ -4,10 +4,11 @@
 //! try).
 
 use super::gathering::Seats;
-use super::sense::{SENSING, Sense, Sensing};
+use super::sense::{Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
 use super::sweep::SweepPass;
 use super::turn::TurnPass;
+use crate::features::{ADJUST, ALTITUDE, SENSING};
 use crate::mission::Profile;
 use crate::node::context::Context;
 use crate::node::sample::Meter;
@@ -28,13 +29,6 @@ use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdi
 ///
 /// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
 pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
-
-/// True with the feature `altitude` (joint method: all positions are optimised together). If false, the compiler
-/// drops that code.
-pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
-
-/// True with the feature `adjust` (Algorithm 2: relays move one by one). If false, the compiler drops that code.
-pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
 
 /// Kind and data of the current pass (message along the chain) at this relay.
 #[derive(Clone, Debug)]

@@ -27,6 +27,7 @@ use super::circulation::{Circulation, Path, Reply};
 use super::context::{Context, Effects, LayerEvent, Member, Peer};
 use super::context::{PAUSE, earliest};
 use super::sample::{Meter, Sample};
+use crate::features::{ADJUST, ALTITUDE, SENSING};
 use crate::mission::Profile;
 use crate::optimiser::joint::fitted::SlotShares;
 use crate::place::Placement;
@@ -34,8 +35,8 @@ use crate::settings::Settings;
 use crate::time::Instant;
 use crate::wire::message::Message;
 
-use computation::{ADJUST, ALTITUDE, Computation};
-use sense::{Findings, SENSING, Sensing};
+use computation::Computation;
+use sense::{Findings, Sensing};
 use state::{Action, Phase};
 
 #[derive(Clone, Debug)]

@@ -14,6 +14,7 @@
 
 use super::computation::{Computation, PassKind};
 use super::state::{Action, Phase};
+use crate::features::SENSING;
 use crate::node::context::PAUSE;
 use crate::node::context::{Context, Member, Sensed};
 use crate::node::sample::Sample;
@@ -317,9 +318,6 @@ impl Computation {
         sense.hearing.sums.merge(&sense.own);
     }
 }
-
-/// True with the feature `sensing` (estimate of an unknown interferer). If false, the compiler drops that code.
-pub(crate) const SENSING: bool = cfg!(feature = "sensing");
 
 /// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
 const FARTHEST: f32 = 100.0;

@@ -1,7 +1,8 @@
 //! Relay's part in a sweep of targets (Algorithms 1 and 4) and in its verdict.
 
-use super::computation::{ADJUST, ALTITUDE, Computation, LeaderTask, PassKind};
+use super::computation::{Computation, LeaderTask, PassKind};
 use super::state::Action;
+use crate::features::{ADJUST, ALTITUDE};
 use crate::node::context::Context;
 use crate::optimiser::PerTarget;
 use crate::optimiser::ladder::Ladder;
