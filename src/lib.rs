@@ -138,12 +138,10 @@ pub use node::view::record::{RecordError, ViewRecord};
 pub use optimiser::joint::fitted::SlotShares;
 pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
-pub use place::Placement;
+pub use place::{Placement, WithoutQuorum};
 pub use relay::{Port, Relay, Transmit};
 pub use sensing::Listen;
-pub use settings::{
-    Adjust, Identity, Measure, Method, Settings, SetupError, Wiring, WithoutQuorum,
-};
+pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub use side::Heading;

@@ -1,9 +1,8 @@
 //! Configuration of the guard: geofence, separation and delays.
 
 use crate::mission::{MAX_RELAYS, Mission, Profile};
-use crate::place::{CrossSection, Placement};
+use crate::place::{CrossSection, Placement, WithoutQuorum};
 use crate::root::sqrt;
-use crate::settings::WithoutQuorum;
 use crate::time::Duration;
 
 /// Default of [`GuardConfig::lag`]: time to stop from the autopilot link's default speed limit.

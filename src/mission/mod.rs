@@ -7,9 +7,9 @@ use crate::channel::Channel;
 use crate::features::{ALTITUDE, FIELD, NOISE, REVERSE};
 use crate::field::{Field, InNoise};
 use crate::place::{CrossSection, Station};
+use crate::root::PowerRatio;
 use crate::root::sqrt;
 use crate::side::Heading;
-use crate::sir::PowerRatio;
 
 #[cfg(test)]
 pub(crate) mod tests;

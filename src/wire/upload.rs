@@ -171,19 +171,6 @@ pub enum Upload {}
 #[cfg(not(feature = "upload"))]
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as with the feature")]
 impl Upload {
-    /// Length of an offer's body without an upload, bytes: its tag.
-    pub(super) const OFFER: usize = 1;
-
-    pub(super) const fn encode_offer(&self, _: u16, _: &mut [u8]) -> Option<usize> {
-        match *self {}
-    }
-
-    pub(super) const fn decode_offer(
-        _: &[u8],
-    ) -> Result<(Self, u16), super::message::MessageError> {
-        Err(super::message::MessageError::Encoding)
-    }
-
     pub(crate) const fn base(&self) -> u16 {
         match *self {}
     }

@@ -10,7 +10,7 @@ use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};
-use crate::sir::PowerRatio;
+use crate::root::PowerRatio;
 use crate::sir::{Sender, square};
 
 /// Chain to be solved: its mission, and the profiles of its relays.

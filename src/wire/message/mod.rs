@@ -40,6 +40,20 @@ pub const MAX_BODY: usize = if Upload::OFFER > LONG {
     LONG
 };
 
+#[cfg(not(feature = "upload"))]
+impl Upload {
+    /// Length of an offer's body without an upload, bytes: its tag.
+    const OFFER: usize = 1;
+
+    const fn encode_offer(&self, _: u16, _: &mut [u8]) -> Option<usize> {
+        match *self {}
+    }
+
+    const fn decode_offer(_: &[u8]) -> Result<(Self, u16), MessageError> {
+        Err(MessageError::Encoding)
+    }
+}
+
 /// Message between neighbours. A *pass* is a message that goes along the chain once, and whose result comes back.
 /// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
