@@ -106,7 +106,7 @@ pub mod wire;
 
 /// Features of this build: a constant is true if the crate is built with its feature.
 ///
-/// All code is compiled in all builds. The compiler drops what a constant that is false makes unreachable.
+/// Code that a false constant makes unreachable is compiled, and takes no flash.
 mod features {
     pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
     pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
