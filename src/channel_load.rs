@@ -208,6 +208,7 @@ impl core::error::Error for ChannelFull {}
 #[cfg(test)]
 mod tests {
     use super::ChannelLoad;
+    use crate::features::AUTH;
     use crate::time::Duration;
 
     const USUAL: Duration = Duration::from_millis(5_000);
@@ -249,11 +250,7 @@ mod tests {
             load.hop_time(108_000, latency).as_micros()
         });
         // 120 bytes of ten bits each; without `auth` a sweep has no tag and is shorter.
-        let frame = if cfg!(feature = "auth") {
-            10_000
-        } else {
-            9_260
-        };
+        let frame = if AUTH { 10_000 } else { 9_260 };
         let expected = [1, 1, 2, 3, 4].map(|times| 3_000 + times * frame);
         assert_eq!(times, expected);
     }

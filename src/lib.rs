@@ -13,8 +13,40 @@
     )
 )]
 
-#[macro_use]
-mod error_text;
+/// Implements `Display`, `Error` and `defmt::Format` for an error enum, from one text for each variant.
+///
+/// The texts are string literals, because `defmt` takes nothing else: an image stores only their numbers, so that they take no flash. A
+/// `const fn text` returns them, also to a `const fn` that panics.
+macro_rules! error_texts {
+    ($type:ty { $($variant:ident => $text:literal),* $(,)? }) => {
+        impl $type {
+            /// Returns the error's text: what is wrong, and the allowed range.
+            pub(crate) const fn text(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)*
+                }
+            }
+        }
+
+        impl core::fmt::Display for $type {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.write_str(self.text())
+            }
+        }
+
+        impl core::error::Error for $type {}
+
+        #[cfg(feature = "defmt")]
+        impl defmt::Format for $type {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                let text = match *self {
+                    $(Self::$variant => defmt::intern!($text),)*
+                };
+                defmt::write!(f, "{=istr}", text);
+            }
+        }
+    };
+}
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -50,11 +82,6 @@ mod place;
 pub mod place;
 pub mod planning;
 pub mod pointing;
-#[cfg(not(feature = "internals"))]
-mod power_ratio;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod power_ratio;
 mod relay;
 mod root;
 pub mod sensing;
@@ -77,16 +104,29 @@ mod wire;
 #[doc(hidden)]
 pub mod wire;
 
-pub use without_quorum::WithoutQuorum;
-mod without_quorum;
+/// Features of this build: a constant is true if the crate is built with its feature.
+///
+/// Code that a false constant makes unreachable is compiled, and takes no flash.
+mod features {
+    pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
+    pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
+    pub(crate) const AUTH: bool = cfg!(feature = "auth");
+    pub(crate) const DEPARTURES: bool = cfg!(feature = "departures");
+    pub(crate) const FIELD: bool = cfg!(feature = "field");
+    pub(crate) const GUARD: bool = cfg!(feature = "guard");
+    pub(crate) const MAVLINK_SIGNING: bool = cfg!(feature = "mavlink-signing");
+    pub(crate) const NOISE: bool = cfg!(feature = "noise");
+    pub(crate) const REVERSE: bool = cfg!(feature = "reverse");
+    pub(crate) const SENSING: bool = cfg!(feature = "sensing");
+    pub(crate) const TELEMETRY: bool = cfg!(feature = "telemetry");
+    pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
+}
 
 pub use channel::Channel;
 pub use channel_load::{ChannelFull, ChannelLoad};
 pub use event::Event;
 pub use field::{Field, FieldPoint};
 pub use geodetic::{Geodetic, LineError, Sites};
-#[cfg(feature = "upload")]
-pub use ground::{FlownMission, Ground, Progress};
 pub use guard::HoldReason;
 pub use guard::config::{Geofence, GuardConfig};
 pub use mission::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
@@ -98,7 +138,7 @@ pub use node::view::record::{RecordError, ViewRecord};
 pub use optimiser::joint::fitted::SlotShares;
 pub use optimiser::local::Local;
 pub use optimiser::search::Schedule;
-pub use place::Placement;
+pub use place::{Placement, WithoutQuorum};
 pub use relay::{Port, Relay, Transmit};
 pub use sensing::Listen;
 pub use settings::{Adjust, Identity, Measure, Method, Settings, SetupError, Wiring};
@@ -118,7 +158,10 @@ pub use wire::auth::Key;
 pub use wire::digest::MissionId;
 pub use wire::frame::MAX_FRAME;
 #[cfg(feature = "upload")]
-pub use wire::upload::{Upload, UploadError};
+pub use {
+    ground::{FlownMission, Ground, Progress},
+    wire::upload::{Upload, UploadError},
+};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -1,4 +1,4 @@
-//! Fast square root in safe Rust, and bisection.
+//! Fast square root in safe Rust, bisection, and a power ratio with twice the precision of an f32.
 //!
 //! `libm::sqrtf` works bit by bit on integers, since stable Rust has no safe access to the VSQRT of a Cortex-M4F: 81
 //! instructions, more than the rest of a reach. This one derives a first estimate from the exponent and improves it by Heron's
@@ -68,9 +68,54 @@ pub(crate) fn bisected<T: Real>(
     (low, high)
 }
 
+/// Power or path-loss ratio as the sum of two f32, so that its difference to a nearby target is exact.
+///
+/// A target gamma is compared with a gain A through gamma - A. With A rounded to one f32 this difference has an error of up to
+/// 6e-8 A, which is why the closed forms as printed lose digits near gamma = A.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PowerRatio {
+    hi: f32,
+    lo: f32,
+}
+
+impl PowerRatio {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "the remainder goes into `lo`"
+    )]
+    pub(crate) const fn new(value: f64) -> Self {
+        let hi = value as f32;
+        Self {
+            hi,
+            lo: (value - hi as f64) as f32,
+        }
+    }
+
+    /// Returns this power ratio as a single f32, rounded.
+    pub const fn value(self) -> f32 {
+        self.hi
+    }
+
+    pub(crate) fn wide(self) -> f64 {
+        f64::from(self.hi) + f64::from(self.lo)
+    }
+
+    /// Returns `target` / A, rounded to f32, for a target SIR and this ratio as the gain A of a hop.
+    pub const fn ratio(self, target: f32) -> f32 {
+        target / self.hi
+    }
+
+    /// Returns `target` / A - 1 for a target SIR and this ratio as the gain A of a hop. The relative error is below
+    /// 2e-7, even if the target is nearly A.
+    pub const fn excess(self, target: f32) -> f32 {
+        ((target - self.hi) - self.lo) / self.hi
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::sqrt;
+    use super::{PowerRatio, sqrt};
 
     fn units_off(x: f32) -> u32 {
         sqrt(x).to_bits().abs_diff(libm::sqrtf(x).to_bits())
@@ -115,5 +160,18 @@ mod tests {
         }
         assert_eq!(units_off(f32::MIN_POSITIVE), 0);
         assert!(units_off(f32::MAX) <= 1);
+    }
+
+    #[test]
+    fn excess_keeps_its_digits_next_to_the_gain() {
+        // 1/3 is not an f32: a gain of one f32 would make half the digits of the excess wrong.
+        let gain = PowerRatio::new(1.0 / 3.0);
+        let mut target = 1.0_f32 / 3.0;
+        for _ in 0..40 {
+            let exact = f64::from(target) * 3.0 - 1.0;
+            let error = (f64::from(gain.excess(target)) - exact).abs();
+            assert!(error <= 2e-7 * exact.abs(), "{target}: {error}");
+            target = target.next_up();
+        }
     }
 }

@@ -1,15 +1,16 @@
 //! Identity and settings of a relay, checked once at start-up.
 
 use crate::channel_load::ChannelLoad;
+use crate::features::{ADJUST, ALTITUDE, FIELD, GUARD, SENSING};
 use crate::guard::config::GuardConfig;
 use crate::mission::{Interference, Mission, MissionConfig, Profile};
 use crate::optimiser::joint::MOST_SOLVED;
 use crate::optimiser::local::Local;
 use crate::optimiser::search::Schedule;
+use crate::place::WithoutQuorum;
 use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
-use crate::without_quorum::WithoutQuorum;
 
 /// Time that the preset settings include in `hop_time` for computation and the link's buffers.
 const LATENCY: Duration = Duration::from_millis(10);
@@ -186,7 +187,7 @@ impl Settings {
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
-        !(cfg!(feature = "altitude") && config.fitted_gap > 0.0) || may_fit
+        !(ALTITUDE && config.fitted_gap > 0.0) || may_fit
     }
 
     /// Default settings, as a constant for `const` functions.
@@ -368,7 +369,7 @@ pub(crate) fn check(
             MOST_SOLVED.checked_sub(mission.relays().into()).is_some()
                 && mission.interferer().is_some()
         }
-        Method::Adjust(_) => cfg!(feature = "adjust") && mission.interferer().is_some(),
+        Method::Adjust(_) => ADJUST && mission.interferer().is_some(),
     };
     if !able {
         return Err(SetupError::Method);
@@ -393,14 +394,12 @@ pub(crate) fn check(
         }
     }
     if let Some(Measure { i_max_w, samples }) = settings.measure
-        && !(cfg!(feature = "field")
-            && (1e-30..=1e6).contains(&i_max_w)
-            && (100..=1_000_000).contains(&samples))
+        && !(FIELD && (1e-30..=1e6).contains(&i_max_w) && (100..=1_000_000).contains(&samples))
     {
         return Err(SetupError::Measure);
     }
     if let Some(listen) = settings.listen
-        && !(cfg!(feature = "sensing") && listen.is_valid() && mission.field().is_none())
+        && !(SENSING && listen.is_valid() && mission.field().is_none())
     {
         return Err(SetupError::Listen);
     }
@@ -418,7 +417,7 @@ pub(crate) fn check(
     }
     if settings
         .guard
-        .is_some_and(|confines| !cfg!(feature = "guard") || !confines.is_valid())
+        .is_some_and(|confines| !GUARD || !confines.is_valid())
     {
         return Err(SetupError::Guard);
     }
@@ -433,6 +432,7 @@ pub(crate) fn check(
 mod tests {
     use super::{LATENCY, Settings, Wiring};
     use crate::channel_load::ChannelLoad;
+    use crate::features::AUTH;
     use crate::time::Duration;
 
     const RATES: [u32; 7] = [0, 300, 9_600, 57_600, 115_200, 250_000, 921_600];
@@ -477,7 +477,7 @@ mod tests {
                 (usual.wiring, usual.probe_after)
             );
         }
-        let sweep = if cfg!(feature = "auth") { 108 } else { 100 };
+        let sweep = if AUTH { 108 } else { 100 };
         let slow = Duration::from_micros((sweep * 1_000_000_u64).div_ceil(960) + 10_000);
         assert_eq!(Settings::wires(9_600).hop_time, slow);
     }

@@ -31,8 +31,7 @@
 
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
-use crate::power_ratio::PowerRatio;
-use crate::root::{Real, bisected, sqrt};
+use crate::root::{PowerRatio, Real, bisected, sqrt};
 
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
@@ -309,6 +308,7 @@ pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::{Placement, Sender, first_hop_ceiling};
+    use crate::features::NOISE;
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig};
 
@@ -331,11 +331,7 @@ mod tests {
                 x_m,
                 y_m,
             };
-            let noise_w = if cfg!(feature = "noise") {
-                noise_w
-            } else {
-                0.0
-            };
+            let noise_w = if NOISE { noise_w } else { 0.0 };
             let mission = Mission::try_new(MissionConfig {
                 interference: Interference::Source(interferer),
                 noise_w,

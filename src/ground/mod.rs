@@ -9,14 +9,13 @@
 //! | `Refused` | refuses the mission, or knows of a relay that does | done: another upload with a larger version is needed |
 //! | `Outdated` | holds a newer mission, or before any relay holds the upload another mission with its version | done: the upload needs a larger version |
 
+use crate::features::TELEMETRY;
 use crate::mission::Mission;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::sensing::sums::is_level;
 use crate::settings::Wiring;
 use crate::side::Side;
 use crate::stats::{Stats, bump};
-#[cfg(feature = "telemetry")]
-use crate::telemetry::Report;
 use crate::time::{Duration, Instant, MonotonicClock};
 use crate::view::ViewId;
 use crate::wire::auth::Auth;
@@ -24,9 +23,7 @@ use crate::wire::deframe::Deframer;
 use crate::wire::digest::{MissionId, digest};
 use crate::wire::endpoint::{Endpoint, Sent};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
-#[cfg(feature = "telemetry")]
-use crate::wire::message::{Detail, Entry, Reports};
-use crate::wire::message::{Hello, Message};
+use crate::wire::message::{Detail, Entry, Hello, Message, Reports};
 use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
@@ -37,12 +34,10 @@ const GONE_AFTER: Duration = Duration::from_millis(15_000);
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Maximum number of relays whose reports are stored, 11 KB in all.
-#[cfg(feature = "telemetry")]
-const REPORTED: usize = 128;
+/// Maximum number of relays whose reports are stored, 11 KB in all; 0 without the feature `telemetry`.
+const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
 /// Interval between two requests for the reports of all relays; each goes to another relay in reach.
-#[cfg(feature = "telemetry")]
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
 /// Number of unanswered hellos to one relay. After it the station sends its hellos to the next relay.
@@ -108,7 +103,6 @@ pub struct Ground {
     /// Clock of the station's timers, which never runs backwards.
     clock: MonotonicClock,
     reports: PendingReports,
-    #[cfg(feature = "telemetry")]
     watching: Watching,
     deframer: Deframer,
     endpoint: Endpoint,
@@ -150,7 +144,6 @@ impl Ground {
             repeat_at: None,
             clock: MonotonicClock::new(Instant::ZERO),
             reports: PendingReports::NONE,
-            #[cfg(feature = "telemetry")]
             watching: Watching::new(auth.parts().1, all),
             deframer: Deframer::new(),
             endpoint,
@@ -238,27 +231,6 @@ impl Ground {
         self.progress
     }
 
-    /// Requests the reports of all relays from now on, or no longer.
-    ///
-    /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
-    #[cfg(feature = "telemetry")]
-    pub fn watch(&mut self, now: Instant, is_on: bool) {
-        let now = self.clock.advance(now);
-        self.watching.repeat_at = is_on.then_some(now);
-        _ = self.watching.request(now, self.reach, self.node.into());
-    }
-
-    /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
-    ///
-    /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
-    /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
-    /// them: a relay sends them with every eighth.
-    #[cfg(feature = "telemetry")]
-    pub fn reports(&self) -> impl Iterator<Item = Report> {
-        let known = self.watching.known.iter();
-        known.map(|known| Report::of(&known.entry, known.detail, self.clock.external(known.at)))
-    }
-
     /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
     /// replayed or malformed, or from a relay with another loaded mission.
     pub fn refused(&self) -> u32 {
@@ -300,7 +272,6 @@ impl Ground {
                     let now = self.clock.now();
                     match self.endpoint.check(now, &frame, &mut self.stats) {
                         Some(Checked::Fresh { .. }) => {
-                            #[cfg(feature = "telemetry")]
                             self.watching.hear(distance);
                             let message = Message::decode(frame.body);
                             self.handle_message(header.sender, distance, message.as_ref().ok());
@@ -308,7 +279,6 @@ impl Ground {
                         Some(Checked::Handshake { first: true }) => {
                             self.due |= self.is_under_way() || self.is_querying();
                             self.reports.schedule(distance);
-                            #[cfg(feature = "telemetry")]
                             self.watching.answer(distance);
                         }
                         _ => {}
@@ -336,13 +306,14 @@ impl Ground {
                 self.on_upload(sender, *upload);
                 &mut self.stats.received
             }
-            #[cfg(feature = "telemetry")]
-            Some(Message::Report(report)) if report.mission() != self.base => {
-                &mut self.stats.mission
-            }
-            #[cfg(feature = "telemetry")]
-            Some(Message::Report(report)) if self.watching.record(report, self.clock.now()) => {
-                &mut self.stats.received
+            Some(Message::Report(report)) if TELEMETRY => {
+                if report.mission() != self.base {
+                    &mut self.stats.mission
+                } else if self.watching.record(report, self.clock.now()) {
+                    &mut self.stats.received
+                } else {
+                    &mut self.stats.malformed
+                }
             }
             _ => &mut self.stats.malformed,
         };
@@ -466,8 +437,7 @@ impl Ground {
     /// Schedules the next hello if it is due: to the same relay again, or to the next relay. Takes constant time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
-        #[cfg(feature = "telemetry")]
-        {
+        if TELEMETRY {
             self.watching.apply(now);
             let is_silent = self.watching.request(now, self.reach, self.node.into());
             let to = self.at(self.watching.distance);
@@ -510,13 +480,10 @@ impl Ground {
 
     /// Returns the latest time for the next call of [`Ground::handle_timeout`]; `None` if no timer runs.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        #[cfg(feature = "telemetry")]
         let next = [self.repeat_at, self.watching.repeat_at]
             .into_iter()
             .flatten()
             .min();
-        #[cfg(not(feature = "telemetry"))]
-        let next = self.repeat_at;
         Some(self.clock.external(next?))
     }
 
@@ -534,10 +501,7 @@ impl Ground {
             return handshake;
         }
         if !core::mem::take(&mut self.due) {
-            let sent = self.next_report(frame);
-            #[cfg(feature = "telemetry")]
-            let sent = sent.or_else(|| self.next_watch(frame));
-            return sent;
+            return self.next_report(frame).or_else(|| self.next_watch(frame));
         }
         let to = self.to();
         let loaded = MissionId {
@@ -592,7 +556,6 @@ impl Ground {
     }
 
     /// Writes the request for reports to the next relay in reach; `None` if none is pending.
-    #[cfg(feature = "telemetry")]
     fn next_watch(&mut self, frame: &mut FrameBuf) -> Option<Sent> {
         if !core::mem::take(&mut self.watching.is_due) {
             return None;
@@ -604,8 +567,31 @@ impl Ground {
     }
 }
 
-/// Requests for the reports of all relays, and the reports.
 #[cfg(feature = "telemetry")]
+impl Ground {
+    /// Requests the reports of all relays from now on, or no longer.
+    ///
+    /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
+    pub fn watch(&mut self, now: Instant, is_on: bool) {
+        let now = self.clock.advance(now);
+        self.watching.repeat_at = is_on.then_some(now);
+        _ = self.watching.request(now, self.reach, self.node.into());
+    }
+
+    /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
+    ///
+    /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
+    /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
+    /// them: a relay sends them with every eighth.
+    pub fn reports(&self) -> impl Iterator<Item = crate::Report> {
+        let known = self.watching.known.iter();
+        known.map(|known| {
+            crate::Report::of(&known.entry, known.detail, self.clock.external(known.at))
+        })
+    }
+}
+
+/// Requests for the reports of all relays, and the reports.
 #[derive(Clone, Debug)]
 struct Watching {
     /// Number of relays in the mission that the relays fly.
@@ -627,7 +613,6 @@ struct Watching {
 
 /// Newest known state of a relay, and the last details received. `at` is the time of that state, by the station's
 /// clock.
-#[cfg(feature = "telemetry")]
 #[derive(Clone, Debug)]
 struct KnownState {
     at: Instant,
@@ -635,7 +620,6 @@ struct KnownState {
     detail: Option<Detail>,
 }
 
-#[cfg(feature = "telemetry")]
 impl Watching {
     /// Creates the state of a station that requests no reports. With a larger `epoch` its later request numbers are
     /// larger, too.
@@ -697,11 +681,11 @@ impl Watching {
     /// Records the entries of a report. Returns false, and records none, if one has a number outside the
     /// mission.
     fn record(&mut self, report: &Reports, now: Instant) -> bool {
-        if report.entries.iter().any(|entry| entry.relay() > self.all) {
+        let (mut detail, entries) = report.states();
+        if entries.iter().any(|entry| entry.relay() > self.all) {
             return false;
         }
-        let mut detail = report.detail;
-        for entry in &report.entries {
+        for entry in entries {
             if self.arrived.is_full() {
                 self.apply(now);
             }

@@ -1,10 +1,9 @@
 //! Configuration of the guard: geofence, separation and delays.
 
 use crate::mission::{MAX_RELAYS, Mission, Profile};
-use crate::place::{CrossSection, Placement};
+use crate::place::{CrossSection, Placement, WithoutQuorum};
 use crate::root::sqrt;
 use crate::time::Duration;
-use crate::without_quorum::WithoutQuorum;
 
 /// Default of [`GuardConfig::lag`]: time to stop from the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);

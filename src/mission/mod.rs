@@ -4,9 +4,10 @@
 //! quantities derived from them.
 
 use crate::channel::Channel;
+use crate::features::{ALTITUDE, FIELD, NOISE, REVERSE};
 use crate::field::{Field, InNoise};
 use crate::place::{CrossSection, Station};
-use crate::power_ratio::PowerRatio;
+use crate::root::PowerRatio;
 use crate::root::sqrt;
 use crate::side::Heading;
 
@@ -87,11 +88,11 @@ impl MissionConfig {
         if !within(self.rx_power_w, 1e-6, 1e6) {
             return Err(MissionError::RxPower);
         }
-        if self.reverse > 0.0 && !cfg!(feature = "reverse") {
+        if self.reverse > 0.0 && !REVERSE {
             return Err(MissionError::ReverseFeature);
         }
         if self.fitted_gap.to_bits() != 0 {
-            if !cfg!(feature = "altitude") {
+            if !ALTITUDE {
                 return Err(MissionError::FittedFeature);
             }
             if !within(self.fitted_gap, 1.0, 1e3) {
@@ -399,10 +400,10 @@ impl Mission {
         if !within(noise_w, 0.0, 1.0) {
             return Err(MissionError::Noise);
         }
-        if noise_w > 0.0 && !cfg!(feature = "noise") {
+        if noise_w > 0.0 && !NOISE {
             return Err(MissionError::NoiseFeature);
         }
-        if matches!(interference, Interference::Field(_)) && !cfg!(feature = "field") {
+        if matches!(interference, Interference::Field(_)) && !FIELD {
             return Err(MissionError::Field);
         }
         let eta = channel.eta();
@@ -550,7 +551,7 @@ impl Mission {
     /// Returns the interference field (distribution along x), or `None` for a single transmitter.
     pub const fn field(&self) -> Option<&Field> {
         match &self.config.interference {
-            Interference::Field(field) if cfg!(feature = "field") => Some(field),
+            Interference::Field(field) if FIELD => Some(field),
             _ => None,
         }
     }
@@ -567,11 +568,7 @@ impl Mission {
     ///
     /// 0 without noise and in an interference field, whose Upsilon includes the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
-        if cfg!(feature = "noise") {
-            self.noise_at_a_metre
-        } else {
-            0.0
-        }
+        if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
     /// Ratio r: SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx. 0 for one direction.
@@ -579,7 +576,7 @@ impl Mission {
     /// A constant without the feature `reverse`, so that the compiler drops the code for two directions. 0 while the interferer is
     /// unknown: relays then spread evenly.
     pub const fn reverse(&self) -> f32 {
-        if cfg!(feature = "reverse") && !matches!(self.config.interference, Interference::Unknown) {
+        if REVERSE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
         } else {
             0.0
@@ -589,8 +586,7 @@ impl Mission {
     /// SNR gap of fitted slots, linear; 0 for equal slots. A constant without the feature `altitude`. 0 while the interferer is
     /// unknown, as [`Mission::reverse`] is.
     pub const fn fitted_gap(&self) -> f32 {
-        if cfg!(feature = "altitude") && !matches!(self.config.interference, Interference::Unknown)
-        {
+        if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap
         } else {
             0.0

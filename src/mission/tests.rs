@@ -2,6 +2,7 @@
 
 use super::{Band, Interference, Interferer, Mission, MissionConfig, MissionError, Profile};
 use crate::channel::{AirGround, Channel};
+use crate::features::{ALTITUDE, NOISE, REVERSE};
 
 /// Interferer of the paper's multi-hop scenario, which the tests use.
 pub(crate) const fn interferer() -> Interferer {
@@ -104,10 +105,8 @@ fn every_parameter_is_checked_at_both_ends_and_for_nan() {
         };
         assert_eq!(with(least), Ok(()), "{error}");
         let at_most = match error {
-            MissionError::Noise if !cfg!(feature = "noise") => Err(MissionError::NoiseFeature),
-            MissionError::Reverse if !cfg!(feature = "reverse") => {
-                Err(MissionError::ReverseFeature)
-            }
+            MissionError::Noise if !NOISE => Err(MissionError::NoiseFeature),
+            MissionError::Reverse if !REVERSE => Err(MissionError::ReverseFeature),
             _ => Ok(()),
         };
         assert_eq!(with(most), at_most, "{error}");
@@ -139,7 +138,7 @@ fn a_gap_of_fitted_slots_is_0_or_within_1_to_1000() {
         };
         Mission::try_new(config).map(|_| ())
     };
-    let (met, refused) = if cfg!(feature = "altitude") {
+    let (met, refused) = if ALTITUDE {
         (Ok(()), Err(MissionError::FittedGap))
     } else {
         [Err(MissionError::FittedFeature); 2].into()

@@ -1,5 +1,6 @@
 //! State that every layer receives, effects of a layer on the others, and shared durations.
 
+use crate::features::ALTITUDE;
 use crate::mission::{Band, Interference, Mission};
 use crate::node::circulation::Path;
 use crate::place::Placement;
@@ -100,7 +101,7 @@ impl<'a> Context<'a> {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
         let free = !is_line || self.mission().fitted_gap() > 0.0;
-        cfg!(feature = "altitude") && self.settings().method == Method::Joint && free
+        ALTITUDE && self.settings().method == Method::Joint && free
     }
 
     /// Returns the maximum duration of a lease, in tenths of a second. A lease permits the use of the agreed

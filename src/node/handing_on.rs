@@ -11,6 +11,7 @@
 
 use super::context::Member;
 use super::neighbour::Neighbours;
+use crate::features::AUTH;
 use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
@@ -23,7 +24,7 @@ pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 /// Telemetry message to be forwarded to the other neighbour, with that neighbour's side. `None` if there is none.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Reporting([Option<(Side, Message)>; cfg!(feature = "auth") as usize]);
+pub(crate) struct Reporting([Option<(Side, Message)>; AUTH as usize]);
 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, _: Instant, _: Placement) {}

@@ -45,6 +45,7 @@ use super::circulation::{Circulation, Reply};
 use super::context::OtherLeases;
 use super::context::{Context, Effects, LayerEvent, Peer};
 use super::context::{PAUSE, earliest, longest_lease, tenths};
+use crate::features::DEPARTURES;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 use crate::view::ViewId;
@@ -91,7 +92,7 @@ pub(crate) struct Lease {
     /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
     requests: Option<Requests>,
     /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
-    departures: [Departures; cfg!(feature = "departures") as usize],
+    departures: [Departures; DEPARTURES as usize],
 }
 
 /// Requests of this relay, and its knowledge of departures as the leader.
@@ -132,7 +133,7 @@ impl Lease {
                 complement: 0,
                 leaver: (0, now),
                 settled_at: now,
-            }; cfg!(feature = "departures") as usize],
+            }; DEPARTURES as usize],
         }
     }
 

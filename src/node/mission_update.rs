@@ -29,13 +29,14 @@
 
 use super::context::Member;
 use super::context::earliest;
+use crate::features::UPLOAD;
 use crate::geodetic::{LineError, Sites};
 use crate::guard::config::Geofence;
 use crate::mission::{Band, Mission, MissionConfig};
 use crate::side::Side;
 use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
-use crate::wire::upload::{UPLOAD, Upload, UploadError, check_line};
+use crate::wire::upload::{Upload, UploadError, check_line};
 
 /// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0 stands for none.
 ///

@@ -43,5 +43,4 @@ mod steering;
 pub(crate) mod view;
 
 pub(crate) use dispatch::Node;
-#[cfg(feature = "departures")]
 pub(crate) use dispatch::departure;

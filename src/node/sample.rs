@@ -1,18 +1,26 @@
-//! Measurements of a relay, and the interference that it derives from them at its setpoint.
+//! Measurements of a relay: the interference that it derives from them at its setpoint, and its state in the estimation of an unknown
+//! interferer.
 //!
-//! The estimate is replaced once the number of samples of `Settings::measure` has been taken at a position. Before that the
+//! The interference at the setpoint is estimated as often as the relay moves. That estimate is replaced once the number of samples of `Settings::measure` has been taken at a position. Before that the
 //! estimate of the last position is used, so a relay reports the same value during one agreement.
 
+use crate::features::{FIELD, SENSING};
 use crate::field::estimate::{Estimate, Estimator};
 use crate::field::is_upsilon;
 use crate::mission::Mission;
+use crate::node::context::{Member, Sensed};
 use crate::place::Placement;
+use crate::sensing::Listen;
+use crate::sensing::doubt::Trial;
+use crate::sensing::estimate::{InterferenceEstimate, Knowledge, NumberedEstimate};
+use crate::sensing::fit::{Unfit, expected_at};
+use crate::sensing::sums::{Average, Listener, left};
+use crate::sensing::sums::{EndsOff, Level, Sums, UNIT_W, is_level};
 use crate::settings::Measure;
+use crate::side::Side;
 use crate::sir::square;
-
-/// True with the feature `field` (interference as a known distribution along x). If false, `Settings::measure` is
-/// rejected.
-const FIELD: bool = cfg!(feature = "field");
+use crate::time::{Duration, Instant};
+use crate::wire::message::Heard;
 
 /// Measurement of a relay or of a ground station, which the firmware gives to the relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -129,4 +137,292 @@ impl Meter {
     pub(crate) const fn published(&self) -> Option<f32> {
         if FIELD { self.published } else { None }
     }
+}
+
+/// Maximum distance of a measurement from Tx in each coordinate, in units of the distance Tx to Rx.
+const FARTHEST: f32 = 100.0;
+
+/// Sensing state of a relay; the array is empty without the feature `sensing`.
+#[derive(Clone, Debug)]
+pub(crate) struct Sensing([SensorState; SENSING as usize]);
+
+/// Measurements of a relay, its interference estimate, and its knowledge of faulty sensors.
+#[expect(clippy::struct_excessive_bools, reason = "each for itself")]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SensorState {
+    pub(super) listener: Listener,
+    pub(super) estimate: NumberedEstimate,
+    /// Average of the interference power that Tx, on the ground, has reported to this relay.
+    pub(super) transmitter: Average,
+    /// Average of the interference power that Rx, on the ground, has reported to this relay.
+    pub(super) receiver: Average,
+    /// True while this relay withholds its measurements, because they contradict those of the other nodes.
+    pub(super) off: bool,
+    /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
+    /// measurements.
+    pub(super) left_out: u16,
+    /// Node whose sensor was found faulty, by the leader or by the node itself; 0 for none.
+    pub(super) named: u16,
+    /// State of the leader's search for a faulty sensor. It leaves out one relay's measurements after the other.
+    pub(super) trial: Trial,
+    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
+    pub(super) ends: EndsOff,
+    /// True if the last collected measurements contradict each other, and the faulty sensor was not found.
+    pub(super) contradicted: bool,
+    /// True if this relay measures nothing where the other relays' measurements predict interference.
+    pub(super) deaf: bool,
+    /// Number of consecutive measurements of this relay that were at or below the receiver's noise.
+    pub(super) silent: u8,
+    /// Position of the last measurement at or below the receiver's noise.
+    pub(super) silent_at: Placement,
+    /// True once the relays of the view have received the current estimate; at the leader only.
+    pub(super) is_distributed: bool,
+    /// Amount and expected error of the measurements from which the current estimate was made.
+    pub(super) known: Knowledge,
+    /// Reason why the last collected measurements gave no estimate; `None` if they gave one.
+    pub(super) unfit: Option<Unfit>,
+    /// Interval between two collections of measurements along the chain, as a multiple of `Listen::every`.
+    pub(super) wait: u32,
+    /// Number of consecutive sensing passes that did not change the estimate, modulo [`PATIENCE`]. A sensing pass
+    /// collects measurements.
+    pub(super) kept: u8,
+    /// Time of the next sensing pass, which collects measurements; `None` if none is scheduled.
+    pub(super) at: Option<Instant>,
+}
+
+/// Estimate before any measurement: the interference that the mission configures.
+const AS_LOADED: NumberedEstimate = NumberedEstimate {
+    number: 0,
+    estimate: InterferenceEstimate::Mission,
+};
+
+impl Sensing {
+    pub(super) const fn new(listen: Option<Listen>, now: Instant) -> Self {
+        let half_life = match listen {
+            Some(listen) => listen.half_life,
+            None => Duration::from_micros(0),
+        };
+        let sensor = SensorState {
+            listener: Listener::new(half_life, now),
+            estimate: AS_LOADED,
+            transmitter: Average::NONE,
+            receiver: Average::NONE,
+            off: false,
+            left_out: 0,
+            named: 0,
+            trial: Trial::NONE,
+            ends: EndsOff::NONE,
+            contradicted: false,
+            deaf: false,
+            silent: 0,
+            silent_at: Placement::on_line(0.0, 0.0),
+            is_distributed: false,
+            known: Knowledge::NOTHING,
+            unfit: None,
+            wait: 1,
+            kept: 0,
+            at: None,
+        };
+        Self([sensor; SENSING as usize])
+    }
+
+    pub(super) const fn sensor(&self) -> Option<&SensorState> {
+        let sensors: &[SensorState] = &self.0;
+        sensors.first()
+    }
+
+    pub(super) const fn sensor_mut(&mut self) -> Option<&mut SensorState> {
+        let sensors: &mut [SensorState] = &mut self.0;
+        sensors.first_mut()
+    }
+
+    /// Resets the sensing for a new view, in which the leader first distributes its estimate to all relays.
+    pub(super) const fn renew(&mut self) {
+        if let Some(sensor) = self.sensor_mut() {
+            sensor.is_distributed = false;
+            sensor.at = None;
+            sensor.trial = Trial::NONE;
+        }
+    }
+
+    /// Handles a new mission: the interference that it configures becomes the estimate.
+    pub(super) const fn load(&mut self) {
+        if let Some(sensor) = self.sensor_mut() {
+            sensor.estimate.estimate = InterferenceEstimate::Mission;
+            sensor.estimate.number = sensor.estimate.number.wrapping_add(1);
+            // Its ground ends may be at other places.
+            sensor.transmitter = Average::NONE;
+            sensor.receiver = Average::NONE;
+            sensor.known = Knowledge::NOTHING;
+            sensor.ends = EndsOff::NONE;
+            sensor.wait = 1;
+        }
+    }
+
+    pub(super) fn next_timeout(&self) -> Option<Instant> {
+        self.sensor()?.at
+    }
+
+    /// Returns true if the next sensing pass, which collects measurements, is due. Stops its timer.
+    pub(super) fn poll_due(&mut self, now: Instant) -> bool {
+        self.sensor_mut()
+            .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
+    }
+
+    pub(crate) const fn estimate(&self) -> NumberedEstimate {
+        match self.sensor() {
+            Some(sensor) => sensor.estimate,
+            None => AS_LOADED,
+        }
+    }
+
+    /// Returns the reason why the last measurements gave no estimate. `None` if they gave one, and at other relays
+    /// than the leader.
+    pub(crate) const fn unfit(&self) -> Option<Unfit> {
+        match self.sensor() {
+            Some(sensor) => sensor.unfit,
+            None => None,
+        }
+    }
+
+    /// Returns the mean interference power that the ground station at `side` has reported, W. `None` without a
+    /// report.
+    pub(crate) fn level_w(&self, side: Side) -> Option<f32> {
+        let sensor = self.sensor()?;
+        let level_w = match side {
+            Side::Upstream => sensor.transmitter.mean,
+            Side::Downstream => sensor.receiver.mean,
+        };
+        (level_w > 0.0).then_some(level_w)
+    }
+
+    pub(super) fn findings(&self) -> Findings {
+        Findings {
+            estimate: self.estimate(),
+            unfit: self.unfit(),
+            off: self.sensor().map_or(0, |sensor| sensor.named),
+            ends: self.sensor().map_or(EndsOff::NONE, |sensor| sensor.ends),
+            deaf: self.sensor().is_some_and(|sensor| sensor.deaf),
+        }
+    }
+
+    pub(super) fn add_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+        self.sensor_mut()
+            .is_some_and(|sensor| sensor.add_sample(now, member, sample))
+    }
+}
+
+impl SensorState {
+    /// Returns the interference level at a ground station at `now`, from the `average` of its reports. Older reports
+    /// have less weight in an estimate.
+    pub(super) fn level(&self, average: &Average, now: Instant) -> Level {
+        let age = now.since(average.last);
+        Level {
+            power_w: average.mean,
+            count: average.weight * left(age, self.listener.half_life()),
+        }
+    }
+
+    fn add_sample(&mut self, now: Instant, member: &Member, sample: Sample) -> bool {
+        let noise_w = member.mission.config().noise_w;
+        // Subtracts the receiver's noise; `None` if the rest is out of range.
+        let heard = |power_w: f32| {
+            let heard_w = power_w - noise_w;
+            is_level(heard_w).then_some(heard_w)
+        };
+        let half_life = self.listener.half_life();
+        match sample {
+            Sample::Heard { at, power_w } if is_near(at, member.mission.config().distance_m) => {
+                let Some(heard_w) = heard(power_w) else {
+                    if power_w >= 0.0 && power_w <= noise_w {
+                        self.silent = self.silent.saturating_add(1);
+                        self.silent_at = at;
+                    }
+                    return false;
+                };
+                (self.silent, self.deaf) = (0, false);
+                let distance_m = member.mission.config().distance_m;
+                let expected = expected_at(&member.mission);
+                self.listener
+                    .add(now, distance_m, at, heard_w / UNIT_W, expected);
+                true
+            }
+            Sample::Transmitter { power_w } => {
+                take_level(&mut self.transmitter, now, half_life, heard(power_w))
+            }
+            Sample::Receiver { power_w } => {
+                take_level(&mut self.receiver, now, half_life, heard(power_w))
+            }
+            _ => false,
+        }
+    }
+}
+
+/// State of one relay in a sensing pass, a message along the chain that collects measurements.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sense {
+    pub(super) hearing: Heard,
+    /// Sums of measurements over all earlier relays of the pass, as received from the previous relay.
+    pub(super) from: Sums,
+    pub(super) own: Sums,
+    /// True if the positions were agreed on with the current estimate. No new agreement is needed then.
+    pub(super) holds: bool,
+}
+
+/// Sensing results whose changes are reported to the firmware.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Findings {
+    pub(super) estimate: NumberedEstimate,
+    pub(super) unfit: Option<Unfit>,
+    /// Node with a faulty sensor, according to the last sensing pass; 0 for none.
+    pub(super) off: u16,
+    pub(super) ends: EndsOff,
+    pub(super) deaf: bool,
+}
+
+impl Findings {
+    /// Returns the changes from `before` to these findings. A faulty ground station is node 0 (Tx) or node `all` + 1
+    /// (Rx), where `all` is the number of relays.
+    #[inline(never)] // called from several places
+    pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
+        let off = if self.off != before.off && self.off != 0 {
+            Some(self.off)
+        } else if self.deaf && !before.deaf {
+            Some(member.node)
+        } else if self.ends.receiver && !before.ends.receiver {
+            Some(member.all.saturating_add(1))
+        } else {
+            (self.ends.transmitter && !before.ends.transmitter).then_some(0)
+        };
+        Sensed {
+            new_estimate: self.estimate != before.estimate,
+            unclear: self.unfit.is_some() && self.unfit != before.unfit,
+            faulty_sensor: off,
+        }
+    }
+}
+
+/// Adds the power that a ground station (Tx or Rx) has measured to that station's `average`. Returns false if the
+/// power is not above the noise.
+///
+/// `heard_w` is the measured power less the receiver noise, W; `None` if it is not above the noise.
+fn take_level(
+    average: &mut Average,
+    now: Instant,
+    half_life: Duration,
+    heard_w: Option<f32>,
+) -> bool {
+    if let Some(heard_w) = heard_w {
+        average.add(now, half_life, heard_w);
+    }
+    heard_w.is_some()
+}
+
+/// Returns true if a measurement at `at` is near enough to Tx to be used. Each coordinate is at most [`FARTHEST`]
+/// times `distance_m`, the distance from Tx to Rx.
+fn is_near(at: Placement, distance_m: f32) -> bool {
+    let far_m = FARTHEST * distance_m;
+    [at.x_m, at.y_m, at.altitude_m]
+        .iter()
+        .all(|metres| (-far_m..=far_m).contains(metres))
 }

@@ -1,6 +1,7 @@
 //! Setpoint on the way to the agreed position. Limited by the [guard](crate::guard), or without a guard the agreed position.
 
 use super::context::{earliest, tenths};
+use crate::features::{DEPARTURES, GUARD};
 use crate::guard::config::Geofence;
 use crate::guard::{Fence, Guard, HoldReason};
 use crate::place::Placement;
@@ -12,9 +13,6 @@ use crate::time::{Duration, Instant};
 /// plane across x that keeps two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
-/// True with the feature `guard` (collision avoidance); without it no setpoint is limited.
-const GUARD: bool = cfg!(feature = "guard");
-
 /// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
 #[derive(Clone, Debug)]
 pub(crate) struct Steering {
@@ -23,14 +21,11 @@ pub(crate) struct Steering {
     /// Setpoint last reported to the firmware; `None` if there was no setpoint.
     reported_setpoint: Option<Placement>,
     /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
-    way: [Way; RESPACING as usize],
+    way: [Way; DEPARTURES as usize],
 }
 
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
-
-/// True with the feature `departures`; without it setpoints do not move in steps.
-const RESPACING: bool = cfg!(feature = "departures");
 
 /// Motion to a new agreed position: first place, start, duration, and time of the next step.
 #[derive(Clone, Copy, Debug)]
@@ -129,7 +124,7 @@ impl Steering {
         guard: None,
         remind_at: None,
         reported_setpoint: None,
-        way: [Way::NONE; RESPACING as usize],
+        way: [Way::NONE; DEPARTURES as usize],
     };
 
     /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.

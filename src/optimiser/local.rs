@@ -14,6 +14,7 @@
 use core::task::Poll;
 
 use super::reverse::Back;
+use crate::features::REVERSE;
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement};
 use crate::root::{bisected, sqrt};
@@ -181,7 +182,7 @@ impl Hops {
     }
 
     fn is_both_ways(&self) -> bool {
-        cfg!(feature = "reverse") && self.back.gain < f32::INFINITY
+        REVERSE && self.back.gain < f32::INFINITY
     }
 
     /// Returns the SIR of the worse of both hops with the relay at `at`: the paper's local SIR.

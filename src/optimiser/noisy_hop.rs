@@ -35,6 +35,7 @@
 //! `closest` finds the shortest length instead, by the same search of the mirrored hop. Without noise it is the closed form in
 //! [`from_rx`](super::from_rx).
 
+use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
@@ -236,7 +237,7 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     if !(hop.ratio <= MOST_RATIO) {
         return None;
     }
-    let d = if cfg!(feature = "noise") && hop.noise > 0.0 {
+    let d = if NOISE && hop.noise > 0.0 {
         let mirrored = NoisyHop {
             ahead: -hop.ahead,
             ..*hop
@@ -270,6 +271,7 @@ fn rising_root(hop: &NoisyHop) -> Option<f32> {
 #[cfg(all(test, feature = "reverse"))]
 mod tests {
     use super::{NoisyHop, closest};
+    use crate::features::NOISE;
 
     /// Returns the smallest hop length at which `hop` meets its target, m, by trial in fine steps. The test compares
     /// [`closest`] with it.
@@ -282,7 +284,7 @@ mod tests {
 
     #[test]
     fn the_closest_distance_agrees_with_a_scan() {
-        let noises: &[f32] = if cfg!(feature = "noise") {
+        let noises: &[f32] = if NOISE {
             &[0.0, 1e-7, 1e-5, 1e-3]
         } else {
             &[0.0]

@@ -20,6 +20,7 @@ use super::from_rx::FromRx;
 use super::ladder::{Ladder, TARGETS};
 use super::retreat::{HopInterference, Retreat, Step, least};
 use super::spacing::{Hop, RequiredPosition, receiver_reach};
+use crate::features::ALTITUDE;
 use crate::mission::{Mission, Profile, ROUNDING};
 use crate::place::Station;
 use crate::root::sqrt_in_place;
@@ -103,7 +104,7 @@ impl<'a> Link<'a> {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
         if let Some(x_m) = self.fixed_m
-            && cfg!(feature = "altitude")
+            && ALTITUDE
         {
             let reach = |(&target, &from_m): (&f32, &f32)| {
                 self.is_met_at(x_m, target, from_m).then_some(x_m)

@@ -50,6 +50,7 @@
 
 use core::cell::Cell;
 
+use crate::features::REVERSE;
 use crate::field::{FieldPoint, InNoise};
 use crate::mission::Mission;
 use crate::place::Station;
@@ -130,11 +131,7 @@ impl<'a> Retreat<'a> {
     }
 
     fn back(&self) -> Option<(f32, HopInterference<'a>)> {
-        if cfg!(feature = "reverse") {
-            self.back
-        } else {
-            None
-        }
+        if REVERSE { self.back } else { None }
     }
 
     /// Returns this hop with a sender that may be at any x down to Tx. No separation is reserved for the relays

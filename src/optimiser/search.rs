@@ -16,6 +16,7 @@ use core::ops::Range;
 
 use super::ladder::Ladder;
 use super::pass::{Verdict, met};
+use crate::features::REVERSE;
 use crate::mission::{Mission, MissionConfig, Profile};
 use crate::place::Placement;
 use crate::root::sqrt;
@@ -167,7 +168,7 @@ impl Search {
     /// pass. Plain passes prove nothing, because they do not try all chains. `None` if no such target is known, and for traffic in both
     /// directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
-        if cfg!(feature = "reverse") && self.both_ways {
+        if REVERSE && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
             return None;
         }

@@ -41,6 +41,7 @@
 
 use super::noisy_hop::{HALVINGS, MOST_RATIO, NoisyHop, before, closest};
 use super::reverse::{Back, zone};
+use crate::features::{NOISE, REVERSE};
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
 use crate::root::{sqrt, sqrt_in_place};
@@ -160,11 +161,7 @@ impl Hop {
     }
 
     fn back(&self) -> Option<&Back> {
-        if cfg!(feature = "reverse") {
-            self.back.as_ref()
-        } else {
-            None
-        }
+        if REVERSE { self.back.as_ref() } else { None }
     }
 
     /// Returns this hop with its counterpart from Rx to Tx, if the mission has traffic in both directions. `power_w`
@@ -522,11 +519,7 @@ impl Hop {
     /// Returns the receiver noise over the interferer's power received at 1 m: nu, 1/m^2. Without the feature `noise`
     /// it is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
-        if cfg!(feature = "noise") {
-            self.noise
-        } else {
-            0.0
-        }
+        if NOISE { self.noise } else { 0.0 }
     }
 
     /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise. `None` if

@@ -7,8 +7,6 @@ use crate::geodetic::Sites;
 use crate::guard::HoldReason;
 use crate::mission::{Interference, Mission, Profile};
 use crate::node::Node;
-#[cfg(feature = "departures")]
-use crate::node::departure::Departure;
 use crate::node::round::state::Phase;
 use crate::node::sample::Sample;
 use crate::node::view::record::{RecordError, ViewRecord};
@@ -27,7 +25,6 @@ use crate::wire::deframe::Deframer;
 use crate::wire::endpoint::Endpoint;
 use crate::wire::frame::MAX_FRAME;
 
-#[cfg(feature = "upload")]
 use crate::wire::upload::{Upload, UploadError};
 
 /// A relay of the chain: the whole protocol, without input or output of its own (sans-IO).
@@ -718,53 +715,6 @@ impl Relay {
         self.node.reporting.handle_control(state as u16 + 1);
     }
 
-    /// Requests to leave the chain, because the drone has to land soon. `endurance_s` is the remaining endurance of the
-    /// drone, s; `None` if it is unknown. Call it again when that changes.
-    ///
-    /// The relay holds its place until [`Event::MayLeave`]. It needs a guard, or
-    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). Right after a start the relay does not
-    /// join the chain, unless the chain turns out to need it. See [`docs::batteries`](crate::docs::batteries). Takes
-    /// constant time.
-    ///
-    /// ```
-    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-    /// # use paper::*;
-    /// use uav_relay::{Departure, Instant, Settings};
-    ///
-    /// let mut relay = relay(Settings::default());
-    /// relay.leave(Instant::from_millis(1_000), Some(240));
-    /// assert_eq!(relay.departure(Instant::from_millis(1_000)), Departure::NeedsChannel, "two wires per relay");
-    /// ```
-    #[cfg(feature = "departures")]
-    pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
-        let now = self.clock.advance(now);
-        self.node.leave(now, endurance_s);
-    }
-
-    /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
-    ///
-    /// Call it right after the start: it has no effect once the relay has taken part in anything. The first leader
-    /// cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it has to wait at
-    /// least the separation away from all positions of the chain. Takes constant time.
-    #[cfg(feature = "departures")]
-    pub fn wait_as_spare(&mut self, now: Instant) {
-        let now = self.clock.advance(now);
-        self.node.wait_as_spare(now);
-    }
-
-    /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
-    #[cfg(feature = "departures")]
-    pub fn stay(&mut self, now: Instant) {
-        let now = self.clock.advance(now);
-        self.node.stay(now);
-    }
-
-    /// Returns the state of this relay's departure from the chain at `now`. Takes constant time.
-    #[cfg(feature = "departures")]
-    pub fn departure(&self, now: Instant) -> Departure {
-        self.node.departure(now)
-    }
-
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See
     /// [`handle_control`](Self::handle_control).
     ///
@@ -782,5 +732,51 @@ impl Relay {
     /// other node. Takes constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
+    }
+}
+
+#[cfg(feature = "departures")]
+impl Relay {
+    /// Requests to leave the chain, because the drone has to land soon. `endurance_s` is the remaining endurance of the
+    /// drone, s; `None` if it is unknown. Call it again when that changes.
+    ///
+    /// The relay holds its place until [`Event::MayLeave`]. It needs a guard, or
+    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). Right after a start the relay does not
+    /// join the chain, unless the chain turns out to need it. See [`docs::batteries`](crate::docs::batteries). Takes
+    /// constant time.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Departure, Instant, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// relay.leave(Instant::from_millis(1_000), Some(240));
+    /// assert_eq!(relay.departure(Instant::from_millis(1_000)), Departure::NeedsChannel, "two wires per relay");
+    /// ```
+    pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
+        let now = self.clock.advance(now);
+        self.node.leave(now, endurance_s);
+    }
+
+    /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
+    ///
+    /// Call it right after the start: it has no effect once the relay has taken part in anything. The first leader
+    /// cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it has to wait at
+    /// least the separation away from all positions of the chain. Takes constant time.
+    pub fn wait_as_spare(&mut self, now: Instant) {
+        let now = self.clock.advance(now);
+        self.node.wait_as_spare(now);
+    }
+
+    /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
+    pub fn stay(&mut self, now: Instant) {
+        let now = self.clock.advance(now);
+        self.node.stay(now);
+    }
+
+    /// Returns the state of this relay's departure from the chain at `now`. Takes constant time.
+    pub fn departure(&self, now: Instant) -> crate::Departure {
+        self.node.departure(now)
     }
 }

@@ -154,27 +154,8 @@ impl Fit {
     /// # Errors
     /// [`Unfit::Places`] if the measured positions cannot separate the first three unknowns.
     pub fn of(sums: &Sums, relative_error: f32) -> Result<Self, Unfit> {
-        let [
-            aa,
-            ab,
-            ac,
-            ad,
-            bb,
-            bc,
-            bd,
-            cc,
-            cd,
-            dd,
-            av,
-            bv,
-            cv,
-            dv,
-            vv,
-            count,
-            measured,
-            _,
-        ] = sums.numbers.map(f64::from);
-        let products = [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd];
+        let [products @ .., av, bv, cv, dv, vv, count, measured, _] = sums.numbers.map(f64::from);
+        let [aa, ..] = products;
         let factor = Factor::new(products, SIDES * aa).ok_or(Unfit::Places)?;
         let right = [av, bv, cv, dv];
         let coefficients = factor.solve(right);
@@ -342,28 +323,8 @@ impl Fit {
 /// Returns the mean square relative error of measurements if a source had these `coefficients`. `sums` are the sums
 /// of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
-    let [
-        aa,
-        ab,
-        ac,
-        ad,
-        bb,
-        bc,
-        bd,
-        cc,
-        cd,
-        dd,
-        av,
-        bv,
-        cv,
-        dv,
-        vv,
-        count,
-        _,
-        _,
-    ] = sums.numbers.map(f64::from);
+    let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
-    let products = [aa, ab, ac, ad, bb, bc, bd, cc, cd, dd];
     let left = vv - 2.0 * (a * av + b * bv + c * cv + d * dv) + quadratic(&products, *coefficients);
     if count > 0.0 { left / count } else { 0.0 }
 }

@@ -5,12 +5,10 @@
 //! a counter is used twice, which a stream cipher does not.
 
 use super::blake2s::mac;
+use crate::features::AUTH;
 
 /// Length of the authentication tag at the end of a signed frame, bytes.
 pub const TAG: usize = 8;
-
-/// True if the crate is built with the feature `auth`. Without it no frame carries an authentication tag.
-pub(crate) const AUTH: bool = cfg!(feature = "auth");
 
 /// Number of bytes reserved in a frame for an authentication tag; 0 without the feature `auth`.
 pub(crate) const TAG_ROOM: usize = if AUTH { TAG } else { 0 };

@@ -3,6 +3,7 @@
 use crc::{Digest, Table};
 
 use super::CRC_32C;
+use crate::features::{ALTITUDE, REVERSE};
 use crate::geodetic::Sites;
 use crate::mission::{Interference, Mission, MissionConfig};
 
@@ -57,13 +58,13 @@ pub(super) fn of(c: &MissionConfig) -> u16 {
         add(&mut crc, &band.least_m.to_le_bytes());
         add(&mut crc, &band.most_m.to_le_bytes());
     }
-    let fits = cfg!(feature = "altitude") && c.fitted_gap > 0.0;
+    let fits = ALTITUDE && c.fitted_gap > 0.0;
     // Noise of 0 is omitted, so that missions without noise keep their earlier digest.
     if c.noise_w > 0.0 || fits {
         add(&mut crc, &c.noise_w.to_le_bytes());
     }
     // Likewise for the way back. With noise or without it, the two numbers make the input longer by eight bytes.
-    if cfg!(feature = "reverse") && c.reverse > 0.0 || fits {
+    if REVERSE && c.reverse > 0.0 || fits {
         add(&mut crc, &c.reverse.to_le_bytes());
         add(&mut crc, &c.rx_power_w.to_le_bytes());
     }
@@ -109,6 +110,7 @@ pub struct MissionId {
 #[cfg(test)]
 mod tests {
     use super::digest;
+    use crate::features::{ALTITUDE, NOISE, REVERSE};
     use crate::mission::tests::{interferer, paper};
     use crate::mission::{Band, Interference, Interferer, Mission, MissionConfig};
 
@@ -150,15 +152,15 @@ mod tests {
             })
         );
         assert_ne!(same, of(|c| c.tolerance = 2e-4));
-        if cfg!(feature = "noise") {
+        if NOISE {
             assert_ne!(same, of(|c| c.noise_w = 1e-13));
         }
         assert_eq!(same, of(|c| c.rx_power_w = 5.0));
-        if cfg!(feature = "altitude") {
+        if ALTITUDE {
             assert_ne!(same, of(|c| c.fitted_gap = 2.0));
             assert_ne!(of(|c| c.fitted_gap = 1.0), of(|c| c.fitted_gap = 2.0));
         }
-        if cfg!(feature = "reverse") {
+        if REVERSE {
             let back = of(|c| c.reverse = 1.0);
             assert_ne!(same, back);
             assert_ne!(back, of(|c| c.reverse = 0.5));

@@ -2,11 +2,12 @@
 //!
 //! A relay and a ground station have one each, and interpret the accepted messages themselves.
 
-use super::auth::{AUTH, Auth};
+use super::auth::Auth;
 use super::deframe::DeframeError;
 use super::frame::{self, FrameBuf, FrameError, Header, Opened};
 use super::message::Message;
 use super::session::{Checked, Session};
+use crate::features::AUTH;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
 

@@ -1,9 +1,10 @@
 //! Frame: header, body, CRC, then COBS and a zero byte as delimiter.
 
 use super::CRC_32C;
-use super::auth::{AUTH, Signer, TAG, TAG_ROOM};
+use super::auth::{Signer, TAG, TAG_ROOM};
 use super::message::{MAX_BODY, Message, MessageError};
 pub use super::{MAX_NODE, MAX_SWEEP};
+use crate::features::AUTH;
 
 /// Version of the frame format, in the top four bits of a frame's first 16-bit word.
 pub const VERSION: u8 = 1;

@@ -5,15 +5,9 @@
 //! interferer, because a field does not fit into a frame.
 
 use super::digest::MissionId;
-#[cfg(feature = "upload")]
 use super::digest::{between, digest, of};
 use crate::geodetic::{LineError, Sites};
-#[cfg(feature = "upload")]
-use crate::mission::{Interference, Mission};
-use crate::mission::{MissionConfig, MissionError};
-
-/// True if the crate is built with the feature `upload`: new missions can be uploaded in flight.
-pub(crate) const UPLOAD: bool = cfg!(feature = "upload");
+use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 
 /// Mission that the operator uploads in flight, with a version. It replaces the mission loaded before flight.
 #[cfg(feature = "upload")]

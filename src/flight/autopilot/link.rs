@@ -6,6 +6,7 @@ use super::state::{FlightMode, Kind, Release, ReleaseCause, WaitReason};
 use super::vehicle::millis;
 use super::vehicle::{OffLine, OffLineDetector};
 use crate::event::Event;
+use crate::features::UPLOAD;
 use crate::flight::autopilot::carrot::{Carrot, Pace};
 use crate::flight::autopilot::clearance::{CLEAR_LOST, Clearance};
 use crate::flight::autopilot::report::{Line, Report, Topic};
@@ -25,9 +26,7 @@ use crate::pointing::Bearing;
 use crate::relay::Relay;
 use crate::side::Side;
 use crate::time::{Duration, Instant, MonotonicClock};
-use crate::wire::upload::UPLOAD;
 
-#[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::Signing;
 
 /// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.

@@ -8,7 +8,6 @@ use super::state::Kind;
 use super::vehicle::AUTOPILOT;
 use crate::flight::mavlink::incoming::{Incoming, Parser, Received};
 use crate::flight::mavlink::outgoing::FrameBytes;
-#[cfg(feature = "mavlink-signing")]
 use crate::flight::mavlink::signing::{Flaw, Signing};
 use crate::time::Instant;
 
@@ -41,7 +40,6 @@ impl Mistrust {
     }
 }
 
-#[cfg(feature = "mavlink-signing")]
 impl From<Flaw> for Mistrust {
     fn from(flaw: Flaw) -> Self {
         match flaw {
@@ -55,7 +53,6 @@ impl From<Flaw> for Mistrust {
 /// Signing key of the link, and the signature mismatches found.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trust {
-    #[cfg(feature = "mavlink-signing")]
     signing: Option<Signing>,
     refused: u32,
     /// Signature mismatch of the latest heartbeats, and the number of heartbeats in a row with it. `None` if the last
@@ -99,7 +96,6 @@ impl Trust {
         takes
     }
 
-    #[cfg(feature = "mavlink-signing")]
     fn judge(
         &mut self,
         now: Instant,
@@ -119,14 +115,7 @@ impl Trust {
         }
     }
 
-    #[cfg(not(feature = "mavlink-signing"))]
-    #[expect(clippy::unused_self, reason = "there is no key")]
-    fn judge(&self, _: Instant, received: &Received, _: &[u8]) -> (bool, Option<Mistrust>) {
-        (true, no_key(received))
-    }
-
     /// Signs all frames and checks received ones with the key of `signing` from now on.
-    #[cfg(feature = "mavlink-signing")]
     pub(super) const fn sign_with(&mut self, signing: Signing) {
         self.signing = Some(signing);
     }
@@ -138,13 +127,10 @@ impl Trust {
 
     /// Returns the frame with a signature, if the link has a key.
     pub(super) fn sign(&mut self, now: Instant, frame: FrameBytes) -> FrameBytes {
-        #[cfg(feature = "mavlink-signing")]
-        if let Some(signing) = &mut self.signing {
-            return signing.sign(now, frame);
+        match &mut self.signing {
+            Some(signing) => signing.sign(now, frame),
+            None => frame,
         }
-        #[cfg(not(feature = "mavlink-signing"))]
-        let _ = (self, now);
-        frame
     }
 
     /// Returns the next signature mismatch to report, once. `hears` is true if the autopilot answers requests, false

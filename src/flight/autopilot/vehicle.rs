@@ -2,6 +2,7 @@
 //! noise that a SiK radio measures.
 
 use super::state::{FlightMode, Kind, Observed};
+use crate::features::SENSING;
 use crate::flight::axis::Axis;
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::incoming::{Incoming, Received, noise_w};
@@ -355,9 +356,6 @@ impl Vehicle {
             .min()
     }
 }
-
-/// True if this crate was built with the feature `sensing`.
-const SENSING: bool = cfg!(feature = "sensing");
 
 /// Newest noise measurement of a SiK radio for the relay: drone's position, noise in W. `None` once the relay has
 /// taken it.

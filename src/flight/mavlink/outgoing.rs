@@ -3,17 +3,14 @@
 use heapless::Vec;
 
 use super::frame::{Address, CHECKSUM, HEADER, MAGIC, SIGNATURE, checksum, find_known, id};
+use crate::features::MAVLINK_SIGNING;
 use crate::geodetic::Geodetic;
 
 /// Maximum payload length of the messages that this crate sends, bytes.
 const LONGEST: usize = 54;
 
 /// Number of bytes reserved for a signature; 0 if the crate was built without signing.
-const SIGNING: usize = if cfg!(feature = "mavlink-signing") {
-    SIGNATURE
-} else {
-    0
-};
+const SIGNING: usize = if MAVLINK_SIGNING { SIGNATURE } else { 0 };
 
 /// Length of the longest frame to send, bytes, with a signature.
 pub(crate) const FRAME: usize = HEADER + LONGEST + CHECKSUM + SIGNING;

@@ -2,6 +2,7 @@
 
 use super::Node;
 use crate::event::NodeEvent;
+use crate::features::{DEPARTURES, UPLOAD};
 use crate::node::mission_update::accepts_uploads;
 use crate::node::neighbour::hearing::CANDIDATES;
 use crate::node::neighbour::state::Candidate;
@@ -9,7 +10,6 @@ use crate::side::Side;
 use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
-use crate::wire::upload::UPLOAD;
 
 /// Mission fields of a hello: the newest stored mission, and flags for active and refused.
 struct MissionState {
@@ -241,7 +241,7 @@ impl Node {
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
-        let leaver = if cfg!(feature = "departures") {
+        let leaver = if DEPARTURES {
             self.layers.lease.orders().leaver
         } else {
             0

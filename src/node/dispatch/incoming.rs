@@ -2,6 +2,7 @@
 
 use super::Node;
 use crate::event::NodeEvent;
+use crate::features::UPLOAD;
 use crate::node::context::Effects;
 use crate::node::duplicate::Duplicated;
 use crate::node::mission_update::accepts_uploads;
@@ -11,7 +12,6 @@ use crate::side::Side;
 use crate::stats::bump;
 use crate::time::Instant;
 use crate::wire::message::Message;
-use crate::wire::upload::UPLOAD;
 
 impl Node {
     /// Handles an intact message from node `from` at `side`. Returns false if node `from` may not send such a

@@ -1,15 +1,13 @@
 //! Dispatch of messages, timers and effects to the layers.
 //!
-//! [`Node`] is one struct; each file has its methods for one purpose, and this one the state, the layers, and how the effects of one layer
-//! reach the others.
+//! [`Node`] is one struct; each file has its methods for one purpose, and this one the state, the layers, how the effects of one layer
+//! reach the others, and the next message, in order of urgency.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `incoming` | received messages: checks, side of the sender, choice of the layer; results of handshakes |
-//! | `outgoing` | next message, in order of urgency |
 //! | `timers` | expired timers of all layers |
-//! | `setpoint` | setpoint, and reports of the drone |
-//! | `adoption` | adoption of a decided view and its mission |
+//! | `adoption` | adoption of a decided view and its mission; the setpoint, and the reports of the drone that it depends on |
 //! | `claims` | claims to this node's number |
 //! | `departure` | relays that leave the chain, or wait outside of it |
 //! | `hellos` | pending hellos, and selection of the neighbour by received ones |
@@ -21,6 +19,7 @@
 //! forever. A part without a quorum loses nothing by it.
 
 use crate::event::{Event, NodeEvent, Pending};
+use crate::features::SENSING;
 use crate::geodetic::Sites;
 use crate::mission::Mission;
 use crate::node::context::{Context, Effects, Ignored, LayerEvent, Member, Peer, first_pass};
@@ -40,7 +39,7 @@ use crate::settings::{Identity, Method, Settings};
 use crate::side::Side;
 use crate::stats::{Stats, bump};
 use crate::time::{Duration, Instant};
-use crate::wire::message::{Claim, Proposal};
+use crate::wire::message::{Claim, Message, Proposal};
 use departure::Leaving;
 
 mod adoption;
@@ -50,8 +49,6 @@ pub(crate) mod departure;
 mod hellos;
 mod incoming;
 mod offers;
-mod outgoing;
-mod setpoint;
 mod telemetry;
 mod timers;
 
@@ -208,7 +205,7 @@ impl Node {
             None => {}
         }
         let sensed = effects.sensed;
-        if cfg!(feature = "sensing") && sensed.new_estimate {
+        if SENSING && sensed.new_estimate {
             self.apply_estimate();
         }
         if sensed.unclear {
@@ -447,5 +444,102 @@ impl Node {
         for side in [Side::Upstream, Side::Downstream] {
             self.layers.neighbours.at_mut(side).drop_link(now);
         }
+    }
+}
+
+impl Node {
+    /// Returns the next message, with the side and the node to send it to. Call it until it returns `None`.
+    pub(crate) fn poll_message(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        if self.member.settings.auth.is_none()
+            && let Some(claim) = self.next_claim()
+        {
+            return Some(claim);
+        }
+        if self.is_passive() {
+            return None;
+        }
+        if let Some(message) = self.next_of_a_round(now) {
+            return Some(message);
+        }
+        let mission = self.member.digest;
+        if let Some((side, to, request, reply)) = self.layers.neighbours.poll_heartbeat(now) {
+            let beat = Message::Heartbeat {
+                mission,
+                request,
+                reply,
+            };
+            return Some((side, to, beat));
+        }
+        if let Some((side, to, hello)) = self.next_hello(now) {
+            return Some((side, to, Message::Hello(hello)));
+        }
+        for side in [Side::Upstream, Side::Downstream] {
+            if let Some(offer) = self.next_offer(now, side) {
+                return Some(offer);
+            }
+            if let Some((to, report)) = self.next_report(now, side) {
+                return Some((side, to, report));
+            }
+        }
+        let Some((side, to, fence)) = self.steering.poll_transmit() else {
+            return self.next_telemetry(now);
+        };
+        let line_digest = self.layers.update.line_digest(&self.member);
+        Some((side, to, Message::Fence { line_digest, fence }))
+    }
+
+    /// Returns the next pending message of a view change, a lease renewal or an agreement on positions. It comes with
+    /// its side and its destination node. `None` if no such message is pending.
+    fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
+        let (onward, back) = (self.onward(), self.back());
+        let peer = |side| {
+            let neighbour = self.layers.neighbours.at(side);
+            // A lost neighbour gets no retransmissions until it is received again.
+            (neighbour.is_mutual() && !neighbour.is_silent())
+                .then_some((neighbour.node(), neighbour.is_agreed()))
+        };
+        let (next, before) = (peer(onward), peer(back));
+        let context = self.layers.context(now, &self.member);
+        let layers = &mut self.layers;
+        // A proposal waits while there is no next relay.
+        if let Some((to, _)) = next
+            && let Some(message) = layers.view.poll_onward(&context, to)
+        {
+            let holds = layers.neighbours.at(onward).latest_mission;
+            if layers.update.offer_for(holds).is_some() {
+                layers.update.schedule_offer(onward);
+                layers.update.reset_offers(onward);
+                return self.next_offer(now, onward);
+            }
+            return Some((onward, to, message));
+        }
+        if let Some((to, _)) = before
+            && let Some(message) = layers.view.poll_back()
+        {
+            return Some((back, to, message));
+        }
+        let agreed = |peer: Option<(u16, bool)>| peer.is_some_and(|(_, agreed)| agreed);
+        if layers.view.outstanding().is_none() {
+            if agreed(next)
+                && let Some(message) = layers.lease.poll_onward(&context)
+                && let Some((to, _)) = next
+            {
+                return Some((onward, to, message));
+            }
+            if agreed(before)
+                && let Some(message) = layers.lease.poll_back(&context)
+                && let Some((to, _)) = before
+            {
+                return Some((back, to, message));
+            }
+        }
+        if let Some(message) = layers.round.poll_onward(&context, agreed(next))
+            && let Some((to, _)) = next
+        {
+            return Some((onward, to, message));
+        }
+        let message = layers.round.poll_back(&context, agreed(before))?;
+        let (to, _) = before?;
+        Some((back, to, message))
     }
 }

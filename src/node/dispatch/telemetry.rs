@@ -1,6 +1,7 @@
 //! Reports of this relay's state to a ground station that watches, and those that it hands on.
 
 use super::Node;
+use crate::features::{AUTH, TELEMETRY};
 use crate::node::reports::{FIRST_PATIENCE, Own, PATIENCE};
 use crate::node::round::state::Phase;
 use crate::side::Side;
@@ -12,7 +13,7 @@ impl Node {
     /// Handles a telemetry message of node `from` at `side`: a Watch (request for reports) or a Report. The node need
     /// not be a neighbour.
     pub(super) fn on_telemetry(&mut self, now: Instant, side: Side, from: u16, message: &Message) {
-        if !cfg!(feature = "auth") {
+        if !AUTH {
             return; // Ground stations sign all frames.
         }
         if message.digest() != Some(self.member.digest) {
@@ -40,7 +41,7 @@ impl Node {
         if !self.reporting.is_due(now, wait) {
             return None;
         }
-        let own = if cfg!(feature = "telemetry") {
+        let own = if TELEMETRY {
             self.own(now)
         } else {
             Own::default()
@@ -56,9 +57,7 @@ impl Node {
             Phase::Holding | Phase::Infeasible | Phase::NoQuorum
         );
         match self.agreed_place() {
-            _ if is_idle || !self.searches() || !cfg!(feature = "telemetry") => {
-                Duration::from_micros(0)
-            }
+            _ if is_idle || !self.searches() || !TELEMETRY => Duration::from_micros(0),
             Some(_) => PATIENCE,
             None => FIRST_PATIENCE,
         }

@@ -1,40 +1,28 @@
 //! State of a relay's part in a round of agreement: the current pass, its position and its target.
 //!
-//! The leader also has a task: the choice of the next pass, and the computation before it (prediction, targets or altitudes to
-//! try).
+//! All passes share this state, so it has the state of each kind of pass, and the leader's task. The files of the passes have their
+//! handlers.
 
-use super::gathering::Seats;
-use super::sense::{SENSING, Sense, Sensing};
 use super::state::{Action, Phase, RoundState};
-use super::sweep::SweepPass;
-use super::turn::TurnPass;
-use crate::mission::Profile;
+use crate::features::{ADJUST, ALTITUDE, SENSING};
+use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
-use crate::node::sample::Meter;
+use crate::node::sample::{Meter, Sense, Sensing};
+use crate::optimiser::PerTarget;
 use crate::optimiser::joint::fitted::SlotShares;
-use crate::optimiser::joint::{MOST_SOLVED, Solver};
+use crate::optimiser::joint::{MOST_SOLVED, Seat, Solver};
 use crate::optimiser::ladder::Ladder;
-use crate::optimiser::local::HopEnd;
-use crate::optimiser::pass::origins;
+use crate::optimiser::local::{HopEnd, Hops, LocalSearch};
+use crate::optimiser::pass::{Behind, Link, Verdict, close};
 use crate::optimiser::plan::Planner;
 use crate::optimiser::search::{Infeasible, Schedule, Search};
+use crate::optimiser::spacing::RequiredPosition;
 use crate::place::{CrossSection, Placement, Station};
-use crate::settings::{Adjust, Method, Settings};
+use crate::settings::{Adjust, Settings};
+use crate::side::Heading;
 use crate::time::Instant;
 use crate::wire::message::{AdjustStep, Message, Moved, Roster, Sweep, SweepVerdict, Token};
-
-/// Number of positions that one call of [`Computation::work`] evaluates in Algorithm 2. The first value is for
-/// traffic from Tx to Rx only, the second for both directions.
-///
-/// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
-pub(super) const PLACES_AT_ONCE: [u16; 2] = [600, 300];
-
-/// True with the feature `altitude` (joint method: all positions are optimised together). If false, the compiler
-/// drops that code.
-pub(crate) const ALTITUDE: bool = cfg!(feature = "altitude");
-
-/// True with the feature `adjust` (Algorithm 2: relays move one by one). If false, the compiler drops that code.
-pub(crate) const ADJUST: bool = cfg!(feature = "adjust");
+use core::task::Poll;
 
 /// Kind and data of the current pass (message along the chain) at this relay.
 #[derive(Clone, Debug)]
@@ -206,37 +194,48 @@ impl Computation {
         }
     }
 
+    pub(super) fn begin(&mut self) {
+        self.state.begin();
+        self.began = true;
+    }
+
+    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if there
+    /// is one. `last` is true if no other algorithm follows.
+    pub(super) fn search_with(
+        &mut self,
+        context: &Context<'_>,
+        ladder: Option<Ladder>,
+        last: bool,
+    ) -> Result<(), Infeasible> {
+        self.search_by(context, Schedule::Bracketed, ladder, last, false)
+    }
+
+    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if no target is feasible
+    /// at those of the joint method.
+    pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
+        self.search_by(context, Schedule::Bracketed, None, true, true)
+    }
+
+    #[inline(never)]
+    pub(super) fn search_by(
+        &mut self,
+        context: &Context<'_>,
+        schedule: Schedule,
+        ladder: Option<Ladder>,
+        last: bool,
+        given: bool,
+    ) -> Result<(), Infeasible> {
+        let mut search = Search::new(context.mission(), self.profile, schedule)?;
+        if let Some(ladder) = ladder {
+            search.begin_with(ladder);
+        }
+        self.task.search(search, last, given);
+        Ok(())
+    }
+
     pub(super) fn give_up(&mut self) -> Action {
         self.state.give_up();
         Action::Infeasible
-    }
-
-    /// Continues this relay's part in the current pass, or the leader's preparation of the next one.
-    ///
-    /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten
-    /// relays of the joint method, or 624 positions of Algorithm 2.
-    pub(crate) fn work(&mut self, context: &Context<'_>) -> Action {
-        if self.state.phase() == Phase::Waiting {
-            match &self.pass {
-                PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => {
-                    let unknown = ALTITUDE && sweep_pass.chosen && self.chosen.is_none();
-                    if unknown && self.solve(context).is_none() {
-                        return Action::Work;
-                    }
-                    return self.continue_sweep(context);
-                }
-                PassKind::Turn(_) if ADJUST => return self.continue_turn(context),
-                _ => {}
-            }
-        }
-        if context.index() != context.mission().leader() || self.state.phase() == Phase::Waiting {
-            return self.solve_ahead(context);
-        }
-        match self.plan(context) {
-            Ok(true) => self.begin_pass(context),
-            Ok(false) => Action::Work,
-            Err(Infeasible) => self.give_up(),
-        }
     }
 
     /// Returns the message of the current pass for the next relay along the chain. `None` if the pass has ended, or
@@ -466,144 +465,297 @@ impl LeaderTask {
     }
 }
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
-/// interference varies along x, it predicts only part of one hop.
-const HOPS_AT_ONCE: u16 = 12;
+/// State of a sweep of target SIRs at one relay.
+#[derive(Clone, Debug)]
+pub(crate) struct SweepPass {
+    pub(crate) ladder: Ladder,
+    /// Checksum of the previous relay's data in the sweep, to recognise duplicates; see [`fingerprint`].
+    pub(crate) fingerprint: u32,
+    /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
+    pub(crate) chosen: bool,
+    /// True if a later relay on this pass has its own power or fixed altitude, other than the mission's.
+    pub(crate) own: bool,
+    behind: Option<Behind>,
+    /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
+    from: PerTarget,
+    /// Reaches of this relay, one for each target SIR, m. A reach is the farthest x in the direction of the pass at
+    /// which the relay meets the target.
+    pub(crate) reaches: PerTarget,
+    /// True once this relay's farthest x is computed for all targets.
+    done: bool,
+    pub(crate) verdict: Verdict,
+    /// x of this relay for the target SIR that was committed, m; `None` if none was committed.
+    place: Option<f32>,
+    /// x that the previous relay must take for the target SIR that was committed, m. `None` if it takes the farthest
+    /// x that meets the target.
+    required_x_m: Option<f32>,
+}
 
-/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A field is a known
-/// distribution of the interference. Its hops cost twice as much as with an interferer, for which the maximum is
-/// [`HOPS_AT_ONCE`].
-const FIELD_HOPS_AT_ONCE: u16 = 8;
+impl SweepPass {
+    pub(crate) const fn new(ladder: Ladder) -> Self {
+        Self {
+            ladder,
+            fingerprint: 0,
+            chosen: false,
+            own: false,
+            behind: None,
+            from: PerTarget::new(),
+            reaches: PerTarget::new(),
+            done: false,
+            verdict: Verdict {
+                commit: None,
+                slacks: PerTarget::new(),
+            },
+            place: None,
+            required_x_m: None,
+        }
+    }
 
-impl Computation {
-    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and the
-    /// error `Infeasible` if no target SIR is feasible.
-    pub(super) fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
-        if self.must_distribute(context) || self.must_gather(context) {
-            return Ok(true);
+    /// Starts a sweep with the data of its sender, the node before this relay on the pass. `behind` describes that
+    /// relay, `None` if the node is Tx or Rx; `from` has its farthest x for each target, m.
+    pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
+        self.fingerprint = fingerprint(behind, from);
+        self.behind = behind;
+        self.from.clone_from(from);
+        self.reaches.clear();
+        self.done = false;
+        self.own = false;
+        self.place = None;
+        self.required_x_m = None;
+    }
+
+    /// Continues the computation of this relay's farthest x for each target. The last relay also decides the verdict,
+    /// which says if a target is committed. Returns true when the computation is complete.
+    ///
+    /// Work: at most 16 targets; in a field of interference 128 of its points, or one target.
+    pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
+        let link = self.link(link);
+        let targets = self.ladder.targets();
+        self.done = link.go_on(&targets, &self.from, &mut self.reaches);
+        if self.done && link.mission.after(link.index).is_none() {
+            self.verdict = close(&link, self.ladder, &self.from, &self.reaches);
+            let place = self
+                .committed()
+                .zip(self.committed_before())
+                .and_then(|((target, reach), from_m)| Some(link.ending(target, from_m, reach)?.1));
+            self.store_position(&link, place);
         }
-        if self.is_solving(context) {
-            if let Some(target) = self.solve(context) {
-                self.search_chosen(context, target)?;
-                return Ok(true);
-            }
-            return Ok(false);
+        self.done
+    }
+
+    /// Accepts a verdict, the result of a sweep, if this relay has a position for the committed target. Returns true
+    /// if the verdict was accepted.
+    pub(crate) fn apply_sweep_verdict(&mut self, link: Link<'_>, answer: &SweepVerdict) -> bool {
+        let link = self.link(link);
+        let (verdict, slacks) = (&answer.verdict, &answer.verdict.slacks);
+        let met = |target: u8| {
+            slacks
+                .get(usize::from(target))
+                .is_some_and(|slack| *slack >= 0.0)
+        };
+        let fits = slacks.len() <= self.reaches.len() && verdict.commit.is_none_or(met);
+        if !(self.done && fits) {
+            return false;
         }
-        let (mission, profile) = (context.mission(), self.profile);
-        match &mut self.task {
-            LeaderTask::Idle => {
-                self.begin_task(context)?;
-                Ok(false)
+        let position = |(_, reach): (f32, f32)| match (answer.required_x_m, link.mission.heading())
+        {
+            (None, _) => Some(reach),
+            (Some(x_m), Heading::TowardRx) => (x_m <= reach).then_some(x_m),
+            (Some(x_m), Heading::TowardTx) => (reach..=link.mission.config().distance_m)
+                .contains(&x_m)
+                .then_some(x_m),
+        };
+        self.verdict = verdict.clone();
+        self.own = answer.own;
+        let place = self.committed().and_then(position);
+        self.store_position(&link, place);
+        true
+    }
+
+    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from it the x that the previous relay
+    /// must take. If that relay has no such x, the commitment is revoked.
+    fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
+        if self.verdict.commit.is_none() {
+            return;
+        }
+        let before = self.committed_before();
+        let required = match (self.committed(), before, place) {
+            (Some((target, _)), Some(from_m), Some(place)) => {
+                link.required_position(target, from_m, place)
             }
-            LeaderTask::Predicting(planner) => {
-                // The leader knows only its own profile, and assumes the mission's common one for the other relays.
-                let profile_of = |index| {
-                    if index == context.index() {
-                        profile
-                    } else {
-                        mission.config().common
-                    }
+            _ => None,
+        };
+        match required {
+            Some(required) => {
+                self.place = place;
+                self.required_x_m = match required {
+                    RequiredPosition::AtReach => None,
+                    RequiredPosition::At(x_m) => Some(x_m),
                 };
-                let hops = match mission.field() {
-                    None => HOPS_AT_ONCE,
-                    Some(field) if field.is_constant() => FIELD_HOPS_AT_ONCE,
-                    Some(_) => 1,
+            }
+            None => self.verdict.commit = None,
+        }
+    }
+
+    /// Returns the target SIR that was committed, and the farthest x, m, at which this relay meets it. `None` if none
+    /// was.
+    fn committed(&self) -> Option<(f32, f32)> {
+        let commit = usize::from(self.verdict.commit?);
+        Some((
+            *self.ladder.targets().get(commit)?,
+            *self.reaches.get(commit)?,
+        ))
+    }
+
+    /// Returns the farthest x, m, at which the previous node meets the committed target SIR. `None` if no target is
+    /// committed.
+    fn committed_before(&self) -> Option<f32> {
+        self.from.get(usize::from(self.verdict.commit?)).copied()
+    }
+
+    /// Returns this relay's agreed x, m, and the committed target SIR. `None` if no target is committed.
+    pub(crate) fn agreed(&self) -> Option<(f32, f32)> {
+        Some((self.place?, self.committed()?.0))
+    }
+
+    pub(crate) const fn required_x_m(&self) -> Option<f32> {
+        self.required_x_m
+    }
+
+    pub(crate) const fn is_done(&self) -> bool {
+        self.done
+    }
+
+    fn link<'a>(&self, link: Link<'a>) -> Link<'a> {
+        Link {
+            behind: self.behind,
+            plain: link.plain || self.ladder.is_plain(),
+            ..link
+        }
+    }
+}
+
+/// Returns a checksum of the data of a sweep's sender. `behind` is `None` if the pass starts at this relay, next to Tx
+/// or Rx. The checksum distinguishes a duplicate from a sweep that a restarted relay sends with other data.
+pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
+    let values = behind.map_or([0.0; 3], |behind| {
+        let Station {
+            cross_section,
+            power_w,
+        } = behind.relay;
+        [cross_section.y_m, cross_section.altitude_m, power_w]
+    });
+    values.iter().chain(from).fold(0, |sum: u32, value| {
+        sum.rotate_left(5).wrapping_add(value.to_bits())
+    })
+}
+
+/// State of one relay in a pass of the token of Algorithm 2.
+#[derive(Clone, Debug)]
+pub(crate) struct TurnPass {
+    /// Action of this pass of Algorithm 2: look, move or stop.
+    pub(crate) turn: AdjustStep,
+    /// SIR of the chain's worst hop before this pass of Algorithm 2, linear.
+    pub(crate) sir: f32,
+    /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
+    pub(super) before: Option<HopEnd>,
+    search: Option<LocalSearch>,
+    /// True if this relay or a later one has moved in this pass of Algorithm 2.
+    pub(crate) any: bool,
+    /// Worst SIR of the hops between this relay and Rx, linear.
+    pub(crate) worst: f32,
+}
+
+impl TurnPass {
+    pub(crate) const fn new(turn: AdjustStep, sir: f32, before: Option<HopEnd>) -> Self {
+        Self {
+            turn,
+            sir,
+            before,
+            search: None,
+            any: false,
+            worst: f32::MAX,
+        }
+    }
+
+    /// Starts a search for a better position around `at`. `band` has the lowest and the highest altitude, m. Returns
+    /// false if relays do not move in this pass.
+    pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
+        if let AdjustStep::Move { explore_m, local } = self.turn {
+            self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
+        }
+        self.search.is_some()
+    }
+
+    /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
+    ///
+    /// Returns `Ready` at the end of the search: with a position that is better than the relay's present one, or with
+    /// `None` if there is none.
+    pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
+        let Some(search) = &mut self.search else {
+            return Poll::Ready(None);
+        };
+        let Poll::Ready(found) = search.step(budget) else {
+            return Poll::Pending;
+        };
+        self.search = None;
+        self.any |= found.is_some();
+        Poll::Ready(found)
+    }
+
+    pub(crate) const fn is_searching(&self) -> bool {
+        self.search.is_some()
+    }
+}
+
+/// Altitudes and transmit powers of the relays of the view, as far as they are known.
+#[derive(Clone, Debug)]
+pub(super) struct Seats {
+    /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.
+    pub(super) known: Option<u16>,
+    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it; the power is 0 for a
+    /// relay with the mission's common profile.
+    own: [[f32; 2]; MOST_SOLVED],
+}
+
+impl Seats {
+    pub(super) const UNKNOWN: Self = Self {
+        known: None,
+        own: [[0.0; 2]; MOST_SOLVED],
+    };
+
+    /// Returns the profile of relay `index`: its own if it was collected, else the mission's common one.
+    #[inline(never)] // the solver asks in many places
+    pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
+        let at = usize::from(index).wrapping_sub(1);
+        match self.own.get(at) {
+            Some(&[altitude_m, power_w]) if power_w > 0.0 => {
+                let own = Profile {
+                    altitude_m,
+                    power_w,
                 };
-                let ladder = match planner.step(mission, profile_of, hops) {
-                    Ok(None) => return Ok(false),
-                    Ok(Some(agreed)) => Some(agreed.ladder),
-                    // Other relays may have other profiles, so the search decides.
-                    Err(Infeasible) => None,
-                };
-                let last = context.settings().method == Method::Align;
-                self.search_with(context, ladder, last)?;
-                Ok(true)
+                Seat::of(mission, own, altitude_m > 0.0)
             }
-            _ => Ok(true),
+            _ => Seat::common(mission),
         }
     }
 
-    #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
-    fn begin_task(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
-        let Settings {
-            predict, schedule, ..
-        } = *context.settings();
-        if predict && schedule == Schedule::Bracketed {
-            let planner = Planner::new(context.mission(), self.profile, schedule)?;
-            self.task.predict(planner);
-            return Ok(());
-        }
-        self.search_by(
-            context,
-            schedule,
-            None,
-            context.settings().method == Method::Align,
-            false,
-        )
+    /// Returns true if the collection of profiles has begun, but some of the `relays` profiles are missing.
+    pub(super) fn is_partial(&self, relays: u16) -> bool {
+        self.known.is_some_and(|known| known < relays)
     }
 
-    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if there
-    /// is one. `last` is true if no other algorithm follows.
-    pub(super) fn search_with(
-        &mut self,
-        context: &Context<'_>,
-        ladder: Option<Ladder>,
-        last: bool,
-    ) -> Result<(), Infeasible> {
-        self.search_by(context, Schedule::Bracketed, ladder, last, false)
-    }
-
-    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if no target is feasible
-    /// at those of the joint method.
-    pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
-        self.search_by(context, Schedule::Bracketed, None, true, true)
-    }
-
-    #[inline(never)]
-    fn search_by(
-        &mut self,
-        context: &Context<'_>,
-        schedule: Schedule,
-        ladder: Option<Ladder>,
-        last: bool,
-        given: bool,
-    ) -> Result<(), Infeasible> {
-        let mut search = Search::new(context.mission(), self.profile, schedule)?;
-        if let Some(ladder) = ladder {
-            search.begin_with(ladder);
-        }
-        self.task.search(search, last, given);
-        Ok(())
-    }
-
-    /// Starts the pass along the chain that the leader has planned.
-    pub(super) fn begin_pass(&mut self, context: &Context<'_>) -> Action {
-        let mission = context.mission();
-        if self.must_distribute(context) {
-            return self.begin_sense(context);
-        }
-        if self.must_gather(context) {
-            self.begin();
-            return self.begin_gathering(context);
-        }
-        match &self.task {
-            LeaderTask::Searching { search, given, .. } => {
-                let ladder = *search.ladder();
-                let chosen = context.joins() && self.chosen.is_some() && !given;
-                self.begin();
-                self.sweep_on(context, ladder, chosen, None, &origins(mission))
+    /// Stores the profiles in `roster`, the result of a pass along `relays` relays. Returns true if all profiles are
+    /// now known.
+    pub(super) fn adopt(&mut self, roster: &Roster, relays: u16) -> bool {
+        for seat in &roster.seats {
+            let at = usize::from(seat.index).wrapping_sub(1);
+            if let Some(own) = self.own.get_mut(at) {
+                *own = [seat.held_m, seat.power_w];
             }
-            LeaderTask::Adjusting(rounds) if ADJUST => {
-                let (turn, sir) = (rounds.turn(), rounds.sir);
-                self.begin();
-                self.take_turn(context, TurnPass::new(turn, sir, None))
-            }
-            _ => Action::Work,
         }
-    }
-
-    pub(super) fn begin(&mut self) {
-        self.state.begin();
-        self.began = true;
+        let last = roster.seats.last().filter(|_| roster.seats.is_full());
+        self.known = Some(last.map_or(relays, |last| last.index));
+        !self.is_partial(relays)
     }
 }

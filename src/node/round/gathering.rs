@@ -6,13 +6,11 @@
 //!
 //! Then each relay solves the whole chain without further messages, and uses its own position in the solution.
 
-use super::computation::LeaderTask;
-use super::computation::{Computation, JointPlace, PassKind};
+use super::computation::{Computation, JointPlace, LeaderTask, PassKind, Seats};
 use super::state::Action;
-use crate::mission::{Mission, Profile};
 use crate::node::context::Context;
+use crate::optimiser::joint::Seat;
 use crate::optimiser::joint::fitted::SlotShares;
-use crate::optimiser::joint::{MOST_SOLVED, Seat};
 use crate::optimiser::ladder::Ladder;
 use crate::optimiser::pass::Link;
 use crate::optimiser::search::Infeasible;
@@ -131,61 +129,7 @@ impl Computation {
         }
         Action::Answer { agreed: false }
     }
-}
 
-/// Altitudes and transmit powers of the relays of the view, as far as they are known.
-#[derive(Clone, Debug)]
-pub(super) struct Seats {
-    /// Number of relays, from Tx on, whose profiles are known. `None` before the first pass that collects profiles.
-    pub(super) known: Option<u16>,
-    /// Altitude, m, and power, W, of each relay. The altitude is 0 if the relay chooses it; the power is 0 for a
-    /// relay with the mission's common profile.
-    own: [[f32; 2]; MOST_SOLVED],
-}
-
-impl Seats {
-    pub(super) const UNKNOWN: Self = Self {
-        known: None,
-        own: [[0.0; 2]; MOST_SOLVED],
-    };
-
-    /// Returns the profile of relay `index`: its own if it was collected, else the mission's common one.
-    #[inline(never)] // the solver asks in many places
-    pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
-        let at = usize::from(index).wrapping_sub(1);
-        match self.own.get(at) {
-            Some(&[altitude_m, power_w]) if power_w > 0.0 => {
-                let own = Profile {
-                    altitude_m,
-                    power_w,
-                };
-                Seat::of(mission, own, altitude_m > 0.0)
-            }
-            _ => Seat::common(mission),
-        }
-    }
-
-    /// Returns true if the collection of profiles has begun, but some of the `relays` profiles are missing.
-    pub(super) fn is_partial(&self, relays: u16) -> bool {
-        self.known.is_some_and(|known| known < relays)
-    }
-
-    /// Stores the profiles in `roster`, the result of a pass along `relays` relays. Returns true if all profiles are
-    /// now known.
-    pub(super) fn adopt(&mut self, roster: &Roster, relays: u16) -> bool {
-        for seat in &roster.seats {
-            let at = usize::from(seat.index).wrapping_sub(1);
-            if let Some(own) = self.own.get_mut(at) {
-                *own = [seat.held_m, seat.power_w];
-            }
-        }
-        let last = roster.seats.last().filter(|_| roster.seats.is_full());
-        self.known = Some(last.map_or(relays, |last| last.index));
-        !self.is_partial(relays)
-    }
-}
-
-impl Computation {
     /// Returns true while this relay has yet to compute its position by the joint method.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());

@@ -3,11 +3,14 @@
 //! | file | content |
 //! | --- | --- |
 //! | [`state`] | state table of a pass, and pass numbers |
-//! | `computation` | state of a relay's part in a round, and the leader's choice of the next pass |
+//! | `computation` | state of a relay's part in a round, shared by all passes |
 //! | `sweep` | sweep of targets (Algorithms 1 and 4) and its verdict |
 //! | `gathering` | joint method: collection of profiles, and the relay's own solution of the chain |
 //! | `turn` | token of Algorithm 2 |
 //! | `sense` | collection of interference measurements, and the estimate |
+//!
+//! The passes import `computation`, which imports `state`; this file has the order of the passes: received messages, timers, and the
+//! leader's choice of the next pass.
 //!
 //! A reply proves that the neighbour was alive after this relay sent the message that it answers. The result of a pass proves it
 //! for the next relay, from the time at which the pass was first forwarded. The next pass proves it for the previous relay, from
@@ -26,16 +29,19 @@ mod turn;
 use super::circulation::{Circulation, Path, Reply};
 use super::context::{Context, Effects, LayerEvent, Member, Peer};
 use super::context::{PAUSE, earliest};
-use super::sample::{Meter, Sample};
+use super::sample::{Findings, Meter, Sample, Sensing};
+use crate::features::{ADJUST, ALTITUDE, SENSING};
 use crate::mission::Profile;
 use crate::optimiser::joint::fitted::SlotShares;
+use crate::optimiser::pass::origins;
+use crate::optimiser::plan::Planner;
+use crate::optimiser::search::{Infeasible, Schedule};
 use crate::place::Placement;
-use crate::settings::Settings;
+use crate::settings::{Method, Settings};
 use crate::time::Instant;
 use crate::wire::message::Message;
 
-use computation::{ADJUST, ALTITUDE, Computation};
-use sense::{Findings, SENSING, Sensing};
+use computation::{Computation, LeaderTask, PassKind, TurnPass};
 use state::{Action, Phase};
 
 #[derive(Clone, Debug)]
@@ -332,5 +338,137 @@ impl Round {
 
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         self.computation.rounds()
+    }
+}
+
+/// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
+/// interference varies along x, it predicts only part of one hop.
+const HOPS_AT_ONCE: u16 = 12;
+
+/// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A field is a known
+/// distribution of the interference. Its hops cost twice as much as with an interferer, for which the maximum is
+/// [`HOPS_AT_ONCE`].
+const FIELD_HOPS_AT_ONCE: u16 = 8;
+
+/// Choice of the next pass at the leader, and the computation before it.
+impl Computation {
+    /// Continues this relay's part in the current pass, or the leader's preparation of the next one.
+    ///
+    /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten
+    /// relays of the joint method, or 624 positions of Algorithm 2.
+    fn work(&mut self, context: &Context<'_>) -> Action {
+        if self.state.phase() == Phase::Waiting {
+            match &self.pass {
+                PassKind::Sweep(sweep_pass) if !sweep_pass.is_done() => {
+                    let unknown = ALTITUDE && sweep_pass.chosen && self.chosen.is_none();
+                    if unknown && self.solve(context).is_none() {
+                        return Action::Work;
+                    }
+                    return self.continue_sweep(context);
+                }
+                PassKind::Turn(_) if ADJUST => return self.continue_turn(context),
+                _ => {}
+            }
+        }
+        if context.index() != context.mission().leader() || self.state.phase() == Phase::Waiting {
+            return self.solve_ahead(context);
+        }
+        match self.plan(context) {
+            Ok(true) => self.begin_pass(context),
+            Ok(false) => Action::Work,
+            Err(Infeasible) => self.give_up(),
+        }
+    }
+
+    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and the
+    /// error `Infeasible` if no target SIR is feasible.
+    fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
+        if self.must_distribute(context) || self.must_gather(context) {
+            return Ok(true);
+        }
+        if self.is_solving(context) {
+            if let Some(target) = self.solve(context) {
+                self.search_chosen(context, target)?;
+                return Ok(true);
+            }
+            return Ok(false);
+        }
+        let (mission, profile) = (context.mission(), self.profile);
+        match &mut self.task {
+            LeaderTask::Idle => {
+                self.begin_task(context)?;
+                Ok(false)
+            }
+            LeaderTask::Predicting(planner) => {
+                // The leader knows only its own profile, and assumes the mission's common one for the other relays.
+                let profile_of = |index| {
+                    if index == context.index() {
+                        profile
+                    } else {
+                        mission.config().common
+                    }
+                };
+                let hops = match mission.field() {
+                    None => HOPS_AT_ONCE,
+                    Some(field) if field.is_constant() => FIELD_HOPS_AT_ONCE,
+                    Some(_) => 1,
+                };
+                let ladder = match planner.step(mission, profile_of, hops) {
+                    Ok(None) => return Ok(false),
+                    Ok(Some(agreed)) => Some(agreed.ladder),
+                    // Other relays may have other profiles, so the search decides.
+                    Err(Infeasible) => None,
+                };
+                let last = context.settings().method == Method::Align;
+                self.search_with(context, ladder, last)?;
+                Ok(true)
+            }
+            _ => Ok(true),
+        }
+    }
+
+    #[inline(never)] // a planner is built here once; its stack is not for every call of `work`
+    fn begin_task(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
+        let Settings {
+            predict, schedule, ..
+        } = *context.settings();
+        if predict && schedule == Schedule::Bracketed {
+            let planner = Planner::new(context.mission(), self.profile, schedule)?;
+            self.task.predict(planner);
+            return Ok(());
+        }
+        self.search_by(
+            context,
+            schedule,
+            None,
+            context.settings().method == Method::Align,
+            false,
+        )
+    }
+
+    /// Starts the pass along the chain that the leader has planned.
+    fn begin_pass(&mut self, context: &Context<'_>) -> Action {
+        let mission = context.mission();
+        if self.must_distribute(context) {
+            return self.begin_sense(context);
+        }
+        if self.must_gather(context) {
+            self.begin();
+            return self.begin_gathering(context);
+        }
+        match &self.task {
+            LeaderTask::Searching { search, given, .. } => {
+                let ladder = *search.ladder();
+                let chosen = context.joins() && self.chosen.is_some() && !given;
+                self.begin();
+                self.sweep_on(context, ladder, chosen, None, &origins(mission))
+            }
+            LeaderTask::Adjusting(rounds) if ADJUST => {
+                let (turn, sir) = (rounds.turn(), rounds.sir);
+                self.begin();
+                self.take_turn(context, TurnPass::new(turn, sir, None))
+            }
+            _ => Action::Work,
+        }
     }
 }

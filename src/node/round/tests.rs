@@ -3,7 +3,6 @@
 extern crate std;
 
 use super::Round;
-#[cfg(feature = "adjust")]
 use super::computation::PassKind;
 use super::state::Phase;
 use crate::mission::Mission;

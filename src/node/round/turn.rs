@@ -4,14 +4,19 @@
 //! previous one with the result. In the first pass no relay moves, so that all learn their neighbours' positions. The result also
 //! collects the worst SIR, which the leader needs after every round.
 
-use super::computation::LeaderTask;
-use super::computation::{Computation, PLACES_AT_ONCE, PassKind};
+use super::computation::{Computation, LeaderTask, PassKind, TurnPass};
 use super::state::Action;
 use crate::node::context::Context;
-use crate::optimiser::local::{HopEnd, Hops, LocalSearch};
+use crate::optimiser::local::{HopEnd, Hops};
 use crate::place::Placement;
 use crate::wire::message::{AdjustStep, Moved, Token};
 use core::task::Poll;
+
+/// Number of positions that one call of [`Computation::continue_turn`] evaluates in Algorithm 2. The first value is for
+/// traffic from Tx to Rx only, the second for both directions.
+///
+/// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
+const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {
     HopEnd {
@@ -141,63 +146,5 @@ impl Computation {
             self.task.clear();
         }
         Action::Answer { agreed: stop }
-    }
-}
-
-/// State of one relay in a pass of the token of Algorithm 2.
-#[derive(Clone, Debug)]
-pub(crate) struct TurnPass {
-    /// Action of this pass of Algorithm 2: look, move or stop.
-    pub(crate) turn: AdjustStep,
-    /// SIR of the chain's worst hop before this pass of Algorithm 2, linear.
-    pub(crate) sir: f32,
-    /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
-    before: Option<HopEnd>,
-    search: Option<LocalSearch>,
-    /// True if this relay or a later one has moved in this pass of Algorithm 2.
-    pub(crate) any: bool,
-    /// Worst SIR of the hops between this relay and Rx, linear.
-    pub(crate) worst: f32,
-}
-
-impl TurnPass {
-    pub(crate) const fn new(turn: AdjustStep, sir: f32, before: Option<HopEnd>) -> Self {
-        Self {
-            turn,
-            sir,
-            before,
-            search: None,
-            any: false,
-            worst: f32::MAX,
-        }
-    }
-
-    /// Starts a search for a better position around `at`. `band` has the lowest and the highest altitude, m. Returns
-    /// false if relays do not move in this pass.
-    pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
-        if let AdjustStep::Move { explore_m, local } = self.turn {
-            self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));
-        }
-        self.search.is_some()
-    }
-
-    /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
-    ///
-    /// Returns `Ready` at the end of the search: with a position that is better than the relay's present one, or with
-    /// `None` if there is none.
-    pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
-        let Some(search) = &mut self.search else {
-            return Poll::Ready(None);
-        };
-        let Poll::Ready(found) = search.step(budget) else {
-            return Poll::Pending;
-        };
-        self.search = None;
-        self.any |= found.is_some();
-        Poll::Ready(found)
-    }
-
-    pub(crate) const fn is_searching(&self) -> bool {
-        self.search.is_some()
     }
 }

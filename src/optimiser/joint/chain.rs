@@ -3,14 +3,14 @@
 //! Powers and rooms of the relays are given as [`Seat`]. A chain is stored in segments, with the value function at the end of
 //! each, and the policies of one.
 
+use crate::features::ALTITUDE;
 use crate::mission::{Interferer, Mission, Profile};
 use crate::optimiser::joint::hop::Triple;
 use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site;
 use crate::optimiser::joint::site::{Room, Site};
 use crate::place::{CrossSection, Placement};
-use crate::power_ratio::PowerRatio;
-use crate::root::sqrt;
+use crate::root::{PowerRatio, sqrt};
 use crate::sir::{Sender, square, transmitter_gain};
 
 /// Profiles of the relays of a chain: a function of a relay's index, 1 to N.
@@ -240,11 +240,7 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 
 pub(super) const SEGMENT: usize = 10;
 /// Number of relays in a segment, the part of the chain whose computed moves are in memory at a time.
-pub(super) const STAGES: usize = if cfg!(feature = "altitude") {
-    SEGMENT
-} else {
-    0
-};
+pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
 /// Stored state at the begin of one segment (ten relays): x of the previous relay, and derivatives. The derivatives are those of the

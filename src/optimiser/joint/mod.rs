@@ -16,6 +16,7 @@
 //! | `starts` | initial chains and initial targets of the ascents |
 //! | [`solver`] | the solution of a whole chain without messages |
 
+use crate::features::ALTITUDE;
 mod ascent;
 mod chain;
 pub mod fitted;
@@ -31,4 +32,4 @@ pub use site::Room;
 pub use solver::Solver;
 
 /// Maximum number of relays for which the joint method works; 0 without the feature `altitude`.
-pub const MOST_SOLVED: usize = if cfg!(feature = "altitude") { 100 } else { 0 };
+pub const MOST_SOLVED: usize = if ALTITUDE { 100 } else { 0 };

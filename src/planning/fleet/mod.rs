@@ -21,11 +21,9 @@ use crate::mission::{MAX_RELAYS, Mission, Profile};
 use crate::optimiser::pass::{Walk, origin};
 use crate::place::Placement;
 use crate::root::bisected;
-#[cfg(feature = "internals")]
 use crate::root::sqrt;
 use crate::side::Heading;
 use crate::sir;
-#[cfg(feature = "internals")]
 use crate::sir::square;
 
 /// Minimum number of relays for a target SIR.
@@ -221,7 +219,6 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
 /// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
 const MORE: u16 = 32;
 
-#[cfg(feature = "internals")]
 const TARGETS: u8 = 48;
 
 fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {

@@ -22,29 +22,37 @@ pub use self::round::{
 pub use self::view::{Decision, Orders, Poll, Proposal, Pulse, Pulsed, Requests, Successor};
 
 use self::parts::{PassId, Word, read, tag, write};
-use super::upload::{UPLOAD, Upload};
+use super::upload::Upload;
+use crate::features::{ADJUST, ALTITUDE, FIELD, GUARD, SENSING, UPLOAD};
 use crate::guard::Fence;
 
 /// Maximum length of a sweep message's body, bytes. A sweep carries target SIRs along the chain.
 const SWEEP: usize = 88;
 
 /// Maximum length of a message body other than a mission offer, bytes.
-const LONG: usize = if cfg!(feature = "sensing") {
-    round::HEARD
-} else {
-    SWEEP
-};
+const LONG: usize = if SENSING { round::HEARD } else { SWEEP };
 
 /// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it
 /// is the collection of measurements, or a sweep.
-#[cfg(feature = "upload")]
-pub const MAX_BODY: usize = if offer::LENGTH > LONG {
-    offer::LENGTH
+pub const MAX_BODY: usize = if Upload::OFFER > LONG {
+    Upload::OFFER
 } else {
     LONG
 };
+
 #[cfg(not(feature = "upload"))]
-pub const MAX_BODY: usize = LONG;
+impl Upload {
+    /// Length of an offer's body without an upload, bytes: its tag.
+    const OFFER: usize = 1;
+
+    const fn encode_offer(&self, _: u16, _: &mut [u8]) -> Option<usize> {
+        match *self {}
+    }
+
+    const fn decode_offer(_: &[u8]) -> Result<(Self, u16), MessageError> {
+        Err(MessageError::Encoding)
+    }
+}
 
 /// Message between neighbours. A *pass* is a message that goes along the chain once, and whose result comes back.
 /// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
@@ -199,11 +207,11 @@ impl Message {
     pub fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         match self {
             // Messages of a missing feature are never sent.
-            Self::Gather(_) | Self::Gathered(_) if !cfg!(feature = "altitude") => None,
-            Self::Sense(_) | Self::Sensed(_) if !cfg!(feature = "sensing") => None,
-            Self::Level { .. } if !(cfg!(feature = "sensing") && UPLOAD) => None,
-            Self::Token(_) | Self::Moved(_) if !cfg!(feature = "adjust") => None,
-            Self::Fence { .. } if !cfg!(feature = "guard") => None,
+            Self::Gather(_) | Self::Gathered(_) if !ALTITUDE => None,
+            Self::Sense(_) | Self::Sensed(_) if !SENSING => None,
+            Self::Level { .. } if !(SENSING && UPLOAD) => None,
+            Self::Token(_) | Self::Moved(_) if !ADJUST => None,
+            Self::Fence { .. } if !GUARD => None,
             Self::Sweep(sweep) => sweep.encode(buffer),
             Self::Verdict(answer) => answer.encode(buffer),
             Self::Busy { number: sweep } => write(&(tag::BUSY, Word::new(*sweep)), buffer),
@@ -227,13 +235,10 @@ impl Message {
             Self::Proposal(proposal) => proposal.encode(buffer),
             Self::Decision(decision) => decision.encode(buffer),
             Self::Fence { line_digest, fence } => link::encode_fence(*line_digest, fence, buffer),
-            #[cfg(feature = "upload")]
             Self::Offer {
                 upload,
                 offer_number,
-            } => offer::encode(upload, *offer_number, buffer),
-            #[cfg(not(feature = "upload"))]
-            Self::Offer { upload, .. } => match *upload {},
+            } => upload.encode_offer(*offer_number, buffer),
             Self::Level { mission, power_w } => round::encode_level(*mission, *power_w, buffer),
             Self::Claim(claim) => claim.encode(buffer),
             Self::Watch { number, mission } => {
@@ -252,14 +257,12 @@ impl Message {
     pub fn decode(bytes: &[u8]) -> Result<Self, MessageError> {
         let (tag, body) = bytes.split_first().ok_or(MessageError::Encoding)?;
         match *tag {
-            tag::MEASURED if !cfg!(feature = "field") => Err(MessageError::Value),
-            tag::ASIDE | tag::GATHER | tag::GATHERED if !cfg!(feature = "altitude") => {
-                Err(MessageError::Value)
-            }
-            tag::SENSE | tag::SENSED if !cfg!(feature = "sensing") => Err(MessageError::Value),
-            tag::LEVEL if UPLOAD && !cfg!(feature = "sensing") => Err(MessageError::Value),
-            tag::TOKEN | tag::MOVED if !cfg!(feature = "adjust") => Err(MessageError::Value),
-            tag::FENCE if !cfg!(feature = "guard") => Err(MessageError::Value),
+            tag::MEASURED if !FIELD => Err(MessageError::Value),
+            tag::ASIDE | tag::GATHER | tag::GATHERED if !ALTITUDE => Err(MessageError::Value),
+            tag::SENSE | tag::SENSED if !SENSING => Err(MessageError::Value),
+            tag::LEVEL if UPLOAD && !SENSING => Err(MessageError::Value),
+            tag::TOKEN | tag::MOVED if !ADJUST => Err(MessageError::Value),
+            tag::FENCE if !GUARD => Err(MessageError::Value),
             tag @ (tag::SWEEP | tag::MEASURED | tag::ASIDE) => {
                 Sweep::decode(tag, body).map(Self::Sweep)
             }
@@ -290,9 +293,8 @@ impl Message {
                 let (line_digest, fence) = link::decode_fence(body)?;
                 Ok(Self::Fence { line_digest, fence })
             }
-            #[cfg(feature = "upload")]
             tag::OFFER => {
-                let (upload, offer_number) = offer::decode(body)?;
+                let (upload, offer_number) = Upload::decode_offer(body)?;
                 Ok(Self::Offer {
                     upload,
                     offer_number,

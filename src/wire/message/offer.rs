@@ -8,17 +8,21 @@ use crate::geodetic::{SITES_LENGTH, Sites};
 use crate::mission::{Band, Interference, Interferer, MissionConfig, Profile};
 use crate::wire::upload::Upload;
 
-pub(super) const LENGTH: usize = Upload::LENGTH + size_of::<Word>();
+/// Encoding in an offer message, which repeats the number of the hello that it answers.
+impl Upload {
+    /// Length of an offer's body, bytes.
+    pub(super) const OFFER: usize = Self::LENGTH + size_of::<Word>();
 
-pub(super) fn encode(upload: &Upload, answer: u16, buffer: &mut [u8]) -> Option<usize> {
-    let body = (tag::OFFER, OfferBody::of(upload), Word::new(answer));
-    write(&body, buffer)
-}
+    pub(super) fn encode_offer(&self, answer: u16, buffer: &mut [u8]) -> Option<usize> {
+        let body = (tag::OFFER, OfferBody::of(self), Word::new(answer));
+        write(&body, buffer)
+    }
 
-pub(super) fn decode(body: &[u8]) -> Result<(Upload, u16), MessageError> {
-    let (body, answer): (OfferBody, Word) = read(body)?;
-    let upload = body.checked().ok_or(MessageError::Value)?;
-    Ok((upload, answer.number()))
+    pub(super) fn decode_offer(body: &[u8]) -> Result<(Self, u16), MessageError> {
+        let (body, answer): (OfferBody, Word) = read(body)?;
+        let upload = body.checked().ok_or(MessageError::Value)?;
+        Ok((upload, answer.number()))
+    }
 }
 
 /// Encoding of an uploaded mission for storage: an offer message without its `offer_number`.

@@ -173,6 +173,11 @@ impl Reports {
         self.pass.digest()
     }
 
+    /// Returns the details of the relay in the first entry, and the states of up to four relays.
+    pub(crate) fn states(&self) -> (Option<Detail>, &[Entry]) {
+        (self.detail, &self.entries)
+    }
+
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         write(&(tag::REPORT, self), buffer)
     }
@@ -210,6 +215,12 @@ impl Reports {
     pub fn mission(&self) -> u16 {
         let digest = self.0.get(2..4).and_then(<[u8]>::first_chunk);
         digest.map_or(0, |digest| u16::from_le_bytes(*digest))
+    }
+
+    /// Returns no states, since they are not decoded.
+    #[expect(clippy::unused_self, reason = "as with the feature")]
+    pub(crate) const fn states(&self) -> (Option<Detail>, &[Entry]) {
+        (None, &[])
     }
 
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {

@@ -19,6 +19,7 @@ mod both;
 mod judge;
 mod passes;
 
+use crate::features::{ALTITUDE, REVERSE};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::Ascent;
 use crate::optimiser::joint::chain::{Chain, Mark, SEGMENT, STAGES, Seat, SeatOf, Stage};
@@ -221,15 +222,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 /// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
-const BOTH: usize = if cfg!(all(feature = "altitude", feature = "reverse")) {
-    1
-} else {
-    0
-};
+const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
 /// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is a time slot as long as
 /// its hop needs.
-const FITTED: usize = if cfg!(feature = "altitude") { 1 } else { 0 };
+const FITTED: usize = ALTITUDE as usize;
 
 /// Joint solver of a chain: that for one direction, for both directions, or for fitted slots.
 ///
