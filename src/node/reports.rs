@@ -7,8 +7,8 @@
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
-//! | own state changed: [`Urgent`] | the own entry is due; this report and the next one do not wait for an agreement |
-//! | entry of another relay stored whose state has changed | send it ahead of its turn, too |
+//! | own state or that of a stored entry has changed: [`Urgent`] | the next report does not wait for an agreement |
+//! | the same, but not only the reasons to hold | send the entry ahead of its turn |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -114,7 +114,7 @@ struct Stored {
 enum Rank {
     Sent,
     New,
-    /// New, with a changed state.
+    /// New, with a change that begins or ends an alarm.
     Changed,
 }
 
@@ -153,9 +153,9 @@ struct Watched {
     /// Time of the last own entry, and the time of the state in it.
     own_at: Instant,
     own_state_at: Instant,
-    /// Number of own entries that do not wait for an agreement. The first of two is ahead of its turn, too.
+    /// Number of own entries that do not wait for an agreement: 2 for an alarm, the first ahead of its turn; 1 for other changes.
     urgent: u8,
-    /// True while the changed state of another relay is to be sent.
+    /// True while such a change of another relay is to be sent.
     is_changed: bool,
     /// Number of own entries, wrapping.
     count: u8,
@@ -190,9 +190,13 @@ impl Reporting {
         let now = (urgent(own.0 + 4096 * self.control), version);
         let before = core::mem::replace(&mut self.observed, now);
         for watched in self.watched.iter_mut().filter(|_| before != now) {
-            watched.own_from = watched.own_from.min(watched.own_at + APART);
-            // The first one may be lost.
-            watched.urgent = 2;
+            if is_alarm(before.0, now.0) || before.1 != version {
+                watched.own_from = watched.own_from.min(watched.own_at + APART);
+                // The first one may be lost.
+                watched.urgent = 2;
+            } else {
+                watched.urgent = watched.urgent.max(1);
+            }
             if before.1 != version {
                 watched.count = 0;
             }
@@ -330,6 +334,11 @@ const fn urgent(state: u16) -> u16 {
     }
 }
 
+/// Returns true if what has changed between two such states begins or ends an alarm: more than the reasons to hold, 8 and 64.
+const fn is_alarm(before: u16, now: u16) -> bool {
+    (before & !0o770) != (now & !0o770)
+}
+
 const fn is_relay(member: &Member, node: u16) -> bool {
     node >= 1 && node <= member.all
 }
@@ -462,16 +471,24 @@ impl Reporting {
         for entry in &report.entries {
             let detail = detail.take();
             if let Some(at) = entry.time(now) {
-                let is_changed = self.store(now, *entry, detail, at);
-                self.at(side.other()).is_changed |= is_changed;
+                let (is_alarm, is_changed) = self.store(now, *entry, detail, at);
+                let watched = self.at(side.other());
+                watched.is_changed |= is_alarm;
+                watched.urgent = watched.urgent.max(is_changed.into());
             }
         }
         true
     }
 
     /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
-    /// else the oldest one, is dropped. Returns true for a changed state.
-    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
+    /// else the oldest one, is dropped. Returns if the change is an alarm's, and if the state is changed.
+    fn store(
+        &mut self,
+        now: Instant,
+        entry: Entry,
+        detail: Option<Detail>,
+        at: Instant,
+    ) -> (bool, bool) {
         let mut stored = Stored {
             entry,
             detail,
@@ -483,13 +500,13 @@ impl Reporting {
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
             if at > old.at + ROUNDING {
                 let [was, is] = [old.entry, entry].map(|entry| urgent(entry.state()));
-                if was != is {
+                if is_alarm(was, is) {
                     stored.rank = Rank::Changed;
                 }
                 stored.rank = stored.rank.max(old.rank);
                 stored.detail = detail.or(old.detail);
                 *old = stored;
-                return old.rank == Rank::Changed;
+                return (old.rank == Rank::Changed, was != is);
             } else if old.detail.is_none() {
                 old.detail = detail;
             }
@@ -499,7 +516,7 @@ impl Reporting {
                 *worst = stored;
             }
         }
-        false
+        (false, false)
     }
 
     /// Returns the report toward `side` that is due now; `None` if there is nothing to report.

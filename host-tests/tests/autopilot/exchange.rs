@@ -64,7 +64,12 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         let (is_news, position) = vehicle.link.exchange(relay, now);
         // Control before the position: the first position of an engaged drone is where its relay starts.
         expected.handle_control(now, vehicle.link.is_flown());
-        expected.report_control(vehicle.link.state());
+        let state = vehicle.link.state();
+        // An autopilot that has not been received yet may be starting.
+        if state != State::Silent || now >= vehicle.began + uav_relay::Duration::from_millis(3_000)
+        {
+            expected.report_control(state);
+        }
         if let Some(position) = position {
             assert!(is_news);
             expected.handle_position(now, position.place, position.at);

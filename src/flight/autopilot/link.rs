@@ -860,8 +860,11 @@ impl Autopilot {
         self.follow(relay, now);
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
+        // After a start an autopilot that has not been received yet is not lost.
         #[cfg(feature = "telemetry")]
-        relay.report_control(self.state());
+        if self.state() != State::Silent || now >= self.began + super::vehicle::SILENT {
+            relay.report_control(self.state());
+        }
         let position = self.poll_position();
         if let Some(Position { at, place, .. }) = position {
             relay.handle_position(now, place, at);
