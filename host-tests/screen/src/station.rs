@@ -62,6 +62,8 @@ struct Known {
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
+    /// True once the relay has reported an autopilot. After a restart its first reports have no control state.
+    was_linked: bool,
     /// Time of the first report of an agreed position without a lease; `None` while that is not so.
     unleased_at: Option<Instant>,
     /// Slowly decaying maximum of the ages of its reports at the arrival of the next one.
@@ -77,6 +79,7 @@ impl Known {
             was_engaged: false,
             is_released: false,
             is_link_lost: false,
+            was_linked: false,
             unleased_at: None,
             longest_age: Duration::from_micros(0),
             nearest: None,
@@ -97,9 +100,8 @@ impl Known {
             }
             Some(State::Silent) | None => {}
         }
-        let was_linked = before.control.is_some_and(|it| it != State::Silent);
-        self.is_link_lost =
-            report.control == Some(State::Silent) && (self.is_link_lost || was_linked);
+        self.is_link_lost = report.control == Some(State::Silent) && self.was_linked;
+        self.was_linked |= report.control.is_some_and(|it| it != State::Silent);
         let is_unleased = report.agreed.is_some() && !report.holds_lease;
         self.unleased_at = is_unleased.then(|| self.unleased_at.unwrap_or(report.at));
         let known = self.nearest.filter(|_| before.setpoint == report.setpoint);

@@ -860,9 +860,11 @@ impl Autopilot {
         self.follow(relay, now);
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
-        // After a start an autopilot that has not been received yet is not lost.
+        // After a start an autopilot that has not been received yet, or not yet with a position, has lost nothing.
         #[cfg(feature = "telemetry")]
-        if self.state() != State::Silent || now >= self.began + super::vehicle::SILENT {
+        if now >= self.began + super::vehicle::SILENT
+            || self.vehicle.position(self.clock.internal(now)).is_some()
+        {
             relay.report_control(self.state());
         }
         let position = self.poll_position();
