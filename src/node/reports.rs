@@ -8,7 +8,7 @@
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
 //! | own state or that of a stored entry has changed: [`Urgent`] | the next report does not wait for an agreement |
-//! | the same, but not only the reasons to hold | send the entry ahead of its turn |
+//! | the same, and the change begins an alarm: [`is_alarm`] | send the entry ahead of its turn |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -21,6 +21,7 @@ use heapless::Vec;
 use super::context::Member;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
+use crate::flight::autopilot::state::State;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -334,9 +335,16 @@ const fn urgent(state: u16) -> u16 {
     }
 }
 
-/// Returns true if what has changed between two such states begins or ends an alarm: more than the reasons to hold, 8 and 64.
+/// Returns true if a change between two such states begins an alarm, or ends one without a change of the control state.
+///
+/// These are a silent autopilot, an unknown position, the end of the relay's control, silent neighbours, a duplicate number, and the two phases.
 const fn is_alarm(before: u16, now: u16) -> bool {
-    (before & !0o770) != (now & !0o770)
+    const SILENT: u16 = State::Silent as u16 + 1;
+    const ENGAGED: u16 = State::Engaged as u16 + 1;
+    const BLIND: u16 = State::Blind as u16 + 1;
+    let (was, is) = (before / 4096 % 6, now / 4096 % 6);
+    let begins = is != was && (is == SILENT || is == BLIND || was == ENGAGED);
+    begins || (before ^ now) & 0o3007 != 0 || before / 24_576 != now / 24_576
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
