@@ -74,6 +74,7 @@ pub(crate) fn scenario(
         link: None,
         reverse: 0.0,
         areas: std::collections::BTreeMap::new(),
+        masts_m: std::collections::BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
         plan: None,

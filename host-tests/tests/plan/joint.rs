@@ -75,6 +75,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
         link: None,
         reverse: 0.0,
         areas: BTreeMap::new(),
+        masts_m: BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
         plan: None,

@@ -82,6 +82,7 @@ fn scenario(rng: &mut impl Rng) -> Scenario {
         link: None,
         reverse: 0.0,
         areas: BTreeMap::new(),
+        masts_m: BTreeMap::new(),
         no_fly: Vec::new(),
         terrain: None,
         plan: None,

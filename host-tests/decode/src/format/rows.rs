@@ -28,7 +28,7 @@ pub(super) fn tables(text: &str) -> Vec<Table<'_>> {
         if !line.starts_with('|') {
             inside = false;
         } else if let (true, Some(table)) = (inside, all.last_mut()) {
-            if !line.starts_with("| ---") {
+            if !line.starts_with("|-") {
                 table.rows.push(cells(line));
             }
         } else {
