@@ -123,7 +123,7 @@ enum Rank {
     Changed,
 }
 
-/// Part of a relay's state whose changes are reported ahead of their turn, and its version of the mission.
+/// Part of a relay's state whose changes are reported at once, and its version of the mission.
 ///
 /// These are the state without the lease and the phases of an agreement.
 type Urgent = (u16, u16);
@@ -155,7 +155,9 @@ struct Watched {
     free: Instant,
     /// Time from which the own entry is part of a report.
     own_from: Instant,
-    /// Number of own entries that do not wait for an agreement: 2 for an alarm, the first ahead of its turn; 1 for other changes.
+    /// Number of own entries that do not wait for an agreement.
+    ///
+    /// It is 2 after a change that is an alarm, whose first entry is ahead of its turn, and 1 after other changes.
     urgent: u8,
     /// True while such a change of another relay is to be sent.
     is_changed: bool,
@@ -326,7 +328,9 @@ const fn before(at: Instant, span: Duration) -> Instant {
     Instant::from_micros(at.as_micros().saturating_sub(span.as_micros()))
 }
 
-/// Returns an entry's state without what changes in every agreement: the lease, and phases other than infeasible and no quorum.
+/// Returns an entry's state without the parts that change in every agreement.
+///
+/// These are the lease, and the phases other than infeasible and no quorum.
 const fn urgent(state: u16) -> u16 {
     let phase = state % 8;
     let rest = state - phase - (state / 2048 % 2) * 2048;
@@ -336,7 +340,9 @@ const fn urgent(state: u16) -> u16 {
     }
 }
 
-/// Returns true if a change between two such states begins an alarm, or ends one without a change of the control state.
+/// Returns true if a change between two such states is one of an alarm.
+///
+/// A change of the control state counts only if it begins an alarm.
 ///
 /// These are a silent autopilot, an unknown position, the end of the relay's control, silent neighbours, a duplicate number, and the two phases.
 const fn is_alarm(before: u16, now: u16) -> bool {

@@ -1,5 +1,6 @@
-//! Measurements of a relay: the interference that it derives from them at its setpoint, and its state in the estimation of an unknown
-//! interferer.
+//! Measurements of a relay: the interference at its setpoint, and its state in the estimation.
+//!
+//! The estimation is that of an unknown interferer.
 //!
 //! The interference at the setpoint is estimated as often as the relay moves. That estimate is replaced once the number of samples of `Settings::measure` has been taken at a position. Before that the
 //! estimate of the last position is used, so a relay reports the same value during one agreement.

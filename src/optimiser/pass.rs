@@ -519,7 +519,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         }
     }
 
-    /// Returns the reaches of the relays in the order of the pass, before the first hop that cannot meet the target.
+    /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
     ///
     /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
     fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {

@@ -41,7 +41,7 @@ fn place(rng: &mut ChaCha8Rng) -> Placement {
     }
 }
 
-/// Checks that a position reaches the station although the relay has reported just before that it has none.
+/// Checks that a position reaches the station right after a report without a position.
 #[test]
 fn a_position_that_is_given_once_reaches_the_station() {
     for (relays, access) in [(2, None), (4, None), (8, Some(Access::Ideal))] {
@@ -77,7 +77,7 @@ fn a_position_that_is_given_once_reaches_the_station() {
     }
 }
 
-/// Checks that the station knows the last state of every relay some time after the last change, whatever came before.
+/// Checks that the station knows every relay's last state in time after the last change.
 #[test]
 fn the_last_state_reaches_the_station() {
     for seed in 0..40 {
@@ -146,7 +146,9 @@ fn the_last_state_reaches_the_station() {
     }
 }
 
-/// Part of a report whose changes are to be known in time: control state, waits, faults of the agreement, and version.
+/// Part of a report whose changes have to be known in time.
+///
+/// It has the control state, the waits, the faults of the agreement, and the version.
 type Changing = (Option<State>, [Option<HoldReason>; 2], Option<Phase>, u16);
 
 fn changing(report: &Report) -> Changing {

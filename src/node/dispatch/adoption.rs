@@ -1,4 +1,6 @@
-//! Adoption of a decided view, with its mission; setpoint for the autopilot, and the reports of the drone that it depends on.
+//! Adoption of a decided view, with its mission, and the setpoint for the autopilot.
+//!
+//! The setpoint depends on the drone's reports, which are handled here, too.
 
 use super::Node;
 use super::departure::Leaving;

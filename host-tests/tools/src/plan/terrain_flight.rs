@@ -193,7 +193,7 @@ pub struct Without {
 pub struct Flight {
     /// SIR of the worst hop with terrain at these positions, dB.
     pub terrain_sir_db: f64,
-    /// By how much a plan with other positions is better, dB; absent if the plan has these positions.
+    /// Gain of the plan over these positions, dB; absent if the plan has these positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
     /// Largest distance of a relay from its position in that plan, m.
