@@ -51,17 +51,13 @@ fn every_row_of_a_table_is_displayed_in_a_table() {
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();
         let lines = prose(&text);
-        let is_row = |at: usize| {
-            lines
-                .get(at)
-                .is_some_and(|(_, line)| line.starts_with("| "))
-        };
+        let is_row = |at: usize| lines.get(at).is_some_and(|(_, line)| line.starts_with('|'));
         for at in 0..lines.len() {
             let begins = is_row(at) && (at == 0 || !is_row(at - 1));
             let is_headed = || {
                 lines
                     .get(at + 1)
-                    .is_some_and(|(_, line)| line.starts_with("| ---"))
+                    .is_some_and(|(_, line)| line.starts_with("|-") || line.starts_with("| -"))
             };
             if begins && !is_headed() {
                 cut.push(format!("{}:{}", page.display(), lines[at].0));
