@@ -35,12 +35,6 @@ impl Reporting {
 
     pub(crate) fn handle_measured(&mut self, _: f32) {}
 
-    pub(crate) fn is_watched(&self) -> bool {
-        false
-    }
-
-    pub(crate) fn observe(&mut self, _: Own, _: u16) {}
-
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         None
     }

@@ -7,8 +7,6 @@
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
-//! | own state or that of a stored entry has changed: [`Urgent`] | the next report does not wait for an agreement |
-//! | the same, and the change begins an alarm: [`is_alarm`] | send the entry ahead of its turn |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -16,14 +14,11 @@
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
-use core::num::NonZeroU16;
-
 use heapless::Vec;
 
 use super::context::Member;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
-use crate::flight::autopilot::state::State;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -54,18 +49,6 @@ pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 /// The same for the first agreement.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
-/// Minimum time from an own entry to that with a changed state.
-const APART: Duration = Duration::from_millis(500);
-
-/// Time by which an own entry is newer than the one before, at least. Relays on the way take an entry for newer after [`ROUNDING`].
-const STEP: Duration = Duration::from_millis(400);
-
-/// Difference of the times of one entry that was received on two ways, at most. Ages are rounded.
-const ROUNDING: Duration = Duration::from_millis(300);
-
-/// Time by which a report of a changed state may be ahead of the share of the channel.
-const AHEAD: Duration = Duration::from_millis(1_000);
-
 /// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
 
@@ -93,9 +76,6 @@ pub(crate) struct Reporting {
     control: u16,
     /// Last measured interference, W; 0 before any.
     power_w: f32,
-    observed: Urgent,
-    /// Time of the state in the last own entry.
-    own_state_at: Instant,
     stored: Vec<Stored, STORED>,
     watched: [Watched; 2],
     /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
@@ -111,22 +91,8 @@ struct Stored {
     at: Instant,
     /// Time from which the entry may be sent. After it has been sent, a newer one should arrive before.
     from: Instant,
-    rank: Rank,
+    is_new: bool,
 }
-
-/// Order in which stored entries are sent, the last one first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Rank {
-    Sent,
-    New,
-    /// New, with a change that begins or ends an alarm.
-    Changed,
-}
-
-/// Part of a relay's state whose changes are reported at once, and its version of the mission.
-///
-/// These are the state without the lease and the phases of an agreement.
-type Urgent = (u16, u16);
 
 /// Side with a ground station that watches.
 #[derive(Clone, Copy, Debug, Default)]
@@ -148,19 +114,13 @@ struct Watched {
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake is due that requests a reply.
-    to_greet: Option<NonZeroU16>,
+    to_greet: Option<u16>,
     /// Time of the next report, at least `free`.
     due: Instant,
     /// Time from which the share of the channel allows a report.
     free: Instant,
     /// Time from which the own entry is part of a report.
     own_from: Instant,
-    /// Number of own entries that do not wait for an agreement.
-    ///
-    /// It is 2 after a change that is an alarm, whose first entry is ahead of its turn, and 1 after other changes.
-    urgent: u8,
-    /// True while such a change of another relay is to be sent.
-    is_changed: bool,
     /// Number of own entries, wrapping.
     count: u8,
     /// True if entries have arrived since the last report.
@@ -179,30 +139,11 @@ impl Reporting {
         self.power_w = power_w;
     }
 
+    /// Takes the control state; a change is reported as soon as the share of the channel allows.
     pub(crate) fn handle_control(&mut self, control: u16) {
-        self.control = control;
-    }
-
-    /// Returns true while a ground station watches.
-    pub(crate) fn is_watched(&self) -> bool {
-        let mut watched = self.watched.iter();
-        watched.any(|watched| watched.until > Instant::ZERO)
-    }
-
-    /// Compares the own state with that of the last call: a change is reported ahead of its turn.
-    pub(crate) fn observe(&mut self, own: Own, version: u16) {
-        let now = (urgent(own.0 + 4096 * self.control), version);
-        let before = core::mem::replace(&mut self.observed, now);
-        for watched in self.watched.iter_mut().filter(|_| before != now) {
-            if is_alarm(before.0, now.0) || before.1 != version {
-                watched.own_from = watched.own_from.min(self.own_state_at + APART);
-                // The first one may be lost.
-                watched.urgent = 2;
-            } else {
-                watched.urgent = watched.urgent.max(1);
-            }
-            if before.1 != version {
-                watched.count = 0;
+        if core::mem::replace(&mut self.control, control) != control {
+            for watched in &mut self.watched {
+                (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
             }
         }
     }
@@ -254,7 +195,8 @@ impl Reporting {
         for side in [Side::Upstream, Side::Downstream] {
             let watched = self.at(side);
             watched.expire(now, member);
-            while watched.hand_on != 0 && now >= watched.hand_on_at + wait {
+            let is_ready = |at| now >= at + wait;
+            while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
                 let distance = if watched.hand_on & 1 != 0 {
                     1
                 } else {
@@ -272,7 +214,7 @@ impl Reporting {
                     let mission = member.digest;
                     if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
                         // It may have restarted: then it accepts only handshakes.
-                        watched.to_greet = NonZeroU16::new(to).filter(|_| watched.unconfirmed > 0);
+                        watched.to_greet = Some(to).filter(|_| watched.unconfirmed > 0);
                         watched.hand_on |= mask(CANDIDATES);
                         watched.hand_on_at = now + REPEAT_AFTER.times(1 << watched.unconfirmed);
                         watched.unconfirmed = (watched.unconfirmed + 1).min(MOST_DOUBLINGS);
@@ -280,7 +222,8 @@ impl Reporting {
                     return Some((away, to, Message::Watch { number, mission }));
                 }
             }
-            if watched.report_at(wait).is_some_and(|at| now >= at)
+            if let Some(at) = watched.report_at()
+                && is_ready(at)
                 && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
                 && let Some(report) = self.report(now, member, neighbours, side, own)
             {
@@ -295,7 +238,7 @@ impl Reporting {
     /// Returns the next node to which a handshake is due that requests a reply.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         let mut watched = self.watched.iter_mut();
-        watched.find_map(|watched| watched.to_greet.take().map(NonZeroU16::get))
+        watched.find_map(|watched| watched.to_greet.take())
     }
 
     /// Records that the relay's timers have been handled up to `now`.
@@ -315,43 +258,12 @@ impl Reporting {
 
     /// Returns the times at which a Watch or a Report is due.
     fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
-        let times = self.watched.iter().flat_map(move |watched| {
-            let hand_on = (watched.hand_on != 0).then(|| watched.hand_on_at + wait);
-            [watched.report_at(wait), hand_on]
+        let times = self.watched.iter().flat_map(|watched| {
+            let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
+            [watched.report_at(), hand_on]
         });
-        times.flatten()
+        times.flatten().map(move |at| at + wait)
     }
-}
-
-/// Returns the time `span` before `at`, at least 0.
-const fn before(at: Instant, span: Duration) -> Instant {
-    Instant::from_micros(at.as_micros().saturating_sub(span.as_micros()))
-}
-
-/// Returns an entry's state without the parts that change in every agreement.
-///
-/// These are the lease, and the phases other than infeasible and no quorum.
-const fn urgent(state: u16) -> u16 {
-    let phase = state % 8;
-    let rest = state - phase - (state / 2048 % 2) * 2048;
-    match phase {
-        5 | 7 => rest + phase,
-        _ => rest,
-    }
-}
-
-/// Returns true if a change between two such states is one of an alarm.
-///
-/// A change of the control state counts only if it begins an alarm.
-///
-/// These are a silent autopilot, an unknown position, the end of the relay's control, silent neighbours, a duplicate number, and the two phases.
-const fn is_alarm(before: u16, now: u16) -> bool {
-    const SILENT: u16 = State::Silent as u16 + 1;
-    const ENGAGED: u16 = State::Engaged as u16 + 1;
-    const BLIND: u16 = State::Blind as u16 + 1;
-    let (was, is) = (before / 4096 % 6, now / 4096 % 6);
-    let begins = is != was && (is == SILENT || is == BLIND || was == ENGAGED);
-    begins || (before ^ now) & 0o3007 != 0 || before / 24_576 != now / 24_576
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
@@ -389,16 +301,9 @@ impl Watched {
         }
     }
 
-    /// Returns the time of the next report; `None` while nobody watches. A changed state does not `wait`.
-    fn report_at(&self, wait: Duration) -> Option<Instant> {
-        let (turn, ahead) = (self.due.max(self.free), before(self.free, AHEAD));
-        let own = match self.urgent {
-            0 => turn + wait,
-            1 => turn,
-            _ => self.own_from.max(ahead),
-        };
-        let next = if self.is_changed { own.min(ahead) } else { own };
-        (self.until > Instant::ZERO).then(|| next.min(turn + wait))
+    /// Returns the time of the next report; `None` while nobody watches.
+    fn report_at(&self) -> Option<Instant> {
+        (self.until > Instant::ZERO).then(|| self.due.max(self.free))
     }
 }
 
@@ -419,7 +324,6 @@ impl Reporting {
         if begins {
             watched.due = now;
             watched.own_from = now;
-            watched.urgent = 0;
             watched.count = 0;
         }
         if begins || (1..0x8000).contains(&ahead) {
@@ -486,52 +390,40 @@ impl Reporting {
         for entry in &report.entries {
             let detail = detail.take();
             if let Some(at) = entry.time(now) {
-                let (is_alarm, is_changed) = self.store(now, *entry, detail, at);
-                let watched = self.at(side.other());
-                watched.is_changed |= is_alarm;
-                watched.urgent = watched.urgent.max(is_changed.into());
+                self.store(now, *entry, detail, at);
             }
         }
         true
     }
 
     /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
-    /// else the oldest one, is dropped. Returns if the change is an alarm's, and if the state is changed.
-    fn store(
-        &mut self,
-        now: Instant,
-        entry: Entry,
-        detail: Option<Detail>,
-        at: Instant,
-    ) -> (bool, bool) {
+    /// else the oldest one, is dropped.
+    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) {
         let mut stored = Stored {
             entry,
             detail,
             at,
             from: now,
-            rank: Rank::New,
+            is_new: true,
         };
         let mut all = self.stored.iter_mut();
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
-            if at > old.at + ROUNDING {
-                let [was, is] = [old.entry, entry].map(|entry| urgent(entry.state()));
-                if is_alarm(was, is) {
-                    stored.rank = Rank::Changed;
-                }
-                stored.rank = stored.rank.max(old.rank);
+            // Two ways of one entry differ by the rounding of its age.
+            if at > old.at + Duration::from_millis(300) {
                 stored.detail = detail.or(old.detail);
                 *old = stored;
-                return (old.rank == Rank::Changed, was != is);
             } else if old.detail.is_none() {
                 old.detail = detail;
             }
         } else if let Err(stored) = self.stored.push(stored) {
-            let worst = self.stored.iter_mut().min_by_key(|old| (old.rank, old.at));
+            let worst = self
+                .stored
+                .iter_mut()
+                .min_by_key(|old| (old.is_new, old.at));
             if let Some(worst) = worst {
                 *worst = stored;
             }
         }
-        (false, false)
     }
 
     /// Returns the report toward `side` that is due now; `None` if there is nothing to report.
@@ -547,38 +439,29 @@ impl Reporting {
         let period = period(member, side, byte);
         let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
         let (control, power_w) = (self.control, self.power_w);
-        let earliest = self.own_state_at + STEP;
         let watched = self.at(side);
         let mut report = Reports::new(watched.number, member.digest);
         let is_due = now >= watched.own_from;
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
-            // A position from before the last entry would not count as newer: that entry may have had none, or another state.
-            let state_at = position.map_or(now, |(at, _)| at);
-            let state_at = state_at.max(earliest).min(now);
-            self.own_state_at = state_at;
-            let entry = Entry::new(member.node, age(now, state_at), own.0 + 4096 * control, at);
+            let age = position.map_or(0, |(at, _)| age(now, at));
+            let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }
-        // Entries that are not sent any more show which later ones are changed.
-        self.stored.retain(|stored| now.since(stored.at) < OLDEST);
-        let (mut is_left, mut is_changed) = (false, false);
-        for rank in [Rank::Changed, Rank::New, Rank::Sent] {
+        self.stored.retain(|stored| {
+            let age = now.since(stored.at);
+            age < OLDEST && (stored.is_new || age < period.times(3))
+        });
+        let mut is_left = false;
+        for are_new in [true, false] {
             for stored in &mut self.stored {
                 let is_toward = (stored.entry.relay() > member.node) == (side == Side::Upstream);
-                let is_over = rank == Rank::Sent && now.since(stored.at) >= period.times(3);
-                if is_toward && stored.rank == Rank::Sent && now.since(stored.at) >= period.times(3)
-                {
-                    // Later details may have taken another way.
-                    stored.detail = None;
-                }
-                if stored.rank != rank || !is_toward || is_over || now < stored.from {
+                if stored.is_new != are_new || !is_toward || now < stored.from {
                     continue;
                 }
                 stored.entry.age = age(now, stored.at);
                 if report.entries.push(stored.entry).is_err() {
-                    is_left |= rank != Rank::Sent;
-                    is_changed |= rank == Rank::Changed;
+                    is_left |= are_new;
                     continue;
                 }
                 if report.detail.is_none() && stored.detail.is_some() {
@@ -587,7 +470,7 @@ impl Reporting {
                         core::mem::swap(first, last);
                     }
                 }
-                stored.rank = Rank::Sent;
+                stored.is_new = false;
                 stored.from = now + period;
             }
         }
@@ -597,8 +480,7 @@ impl Reporting {
             let nodes = neighbours.nodes().map(|node| node.map_or(0, distance));
             let places = own.1.map(Coarse::of);
             report.detail = Some(Detail::new(places, nodes, power_w, member.active.version));
-            // A change is sent twice, with its details.
-            watched.count = u8::from(watched.urgent < 2);
+            watched.count = 1;
         } else if is_due && !watched.count.is_multiple_of(8) {
             watched.count += 1;
         }
@@ -608,15 +490,13 @@ impl Reporting {
         // On a shared channel half a period's share may be sent at once. On wires that would overflow the stores of relays nearer to the station.
         let saved = match member.settings.wiring {
             Wiring::Pair => now,
-            Wiring::Shared => before(now, Duration::from_micros(half.into())),
+            Wiring::Shared => Instant::from_micros(now.as_micros().saturating_sub(half.into())),
         };
         watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
         let late = Duration::from_micros((half / 4).into());
         if is_due {
             watched.own_from = now + late.times(6);
-            watched.urgent = watched.urgent.saturating_sub(1);
         }
-        watched.is_changed = is_changed;
         watched.due = match (is_left, watched.is_fed) {
             (true, _) => now,
             // The reports of relays behind come first.

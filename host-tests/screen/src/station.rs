@@ -61,8 +61,7 @@ struct Known {
     /// True from the control by the relay until the pilot takes it, also without a link to the autopilot.
     was_engaged: bool,
     is_released: bool,
-    /// True once the relay has reported an autopilot. After a restart its first reports have no control state.
-    was_linked: bool,
+    is_link_lost: bool,
     /// Time of the first report of an agreed position without a lease; `None` while that is not so.
     unleased_at: Option<Instant>,
     /// Slowly decaying maximum of the ages of its reports at the arrival of the next one.
@@ -77,7 +76,7 @@ impl Known {
             report,
             was_engaged: false,
             is_released: false,
-            was_linked: false,
+            is_link_lost: false,
             unleased_at: None,
             longest_age: Duration::from_micros(0),
             nearest: None,
@@ -98,7 +97,9 @@ impl Known {
             }
             Some(State::Silent) | None => {}
         }
-        self.was_linked |= report.control.is_some_and(|it| it != State::Silent);
+        let was_linked = before.control.is_some_and(|it| it != State::Silent);
+        self.is_link_lost =
+            report.control == Some(State::Silent) && (self.is_link_lost || was_linked);
         let is_unleased = report.agreed.is_some() && !report.holds_lease;
         self.unleased_at = is_unleased.then(|| self.unleased_at.unwrap_or(report.at));
         let known = self.nearest.filter(|_| before.setpoint == report.setpoint);
@@ -121,11 +122,6 @@ impl Known {
         }
         let usual = Duration::from_micros(self.longest_age.as_micros() * 3 / 2);
         usual.clamp(SILENT_AFTER, SILENT_AFTER.times(2))
-    }
-
-    /// Returns true if the relay does not receive its autopilot any more.
-    fn is_link_lost(&self) -> bool {
-        self.report.control == Some(State::Silent) && self.was_linked
     }
 
     fn is_stuck(&self) -> bool {
@@ -330,7 +326,7 @@ impl StationView {
             let own = [
                 (Reason::Duplicate, known.report.is_duplicated),
                 (Reason::Blind, known.is_blind()),
-                (Reason::LinkLost, known.is_link_lost()),
+                (Reason::LinkLost, known.is_link_lost),
                 (Reason::Released, known.is_released),
                 (Reason::Stuck, known.is_stuck()),
             ];

@@ -859,13 +859,8 @@ impl Autopilot {
         self.follow(relay, now);
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
-        // After a start an autopilot that has not been received yet, or not yet with a position, has lost nothing.
         #[cfg(feature = "telemetry")]
-        if now >= self.began + super::vehicle::SILENT
-            || self.vehicle.position(self.clock.internal(now)).is_some()
-        {
-            relay.report_control(self.state());
-        }
+        relay.report_control(self.state());
         let position = self.poll_position();
         if let Some(Position { at, place, .. }) = position {
             relay.handle_position(now, place, at);

@@ -38,14 +38,14 @@ impl Node {
     /// pending.
     pub(super) fn next_telemetry(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let wait = self.telemetry_waits();
-        let mut own = Own::default();
-        if TELEMETRY && self.reporting.is_watched() {
-            own = self.own(now);
-            self.reporting.observe(own, self.member.active.version);
-        }
         if !self.reporting.is_due(now, wait) {
             return None;
         }
+        let own = if TELEMETRY {
+            self.own(now)
+        } else {
+            Own::default()
+        };
         let (member, neighbours) = (&self.member, &self.layers.neighbours);
         self.reporting.poll(now, member, neighbours, wait, own)
     }
