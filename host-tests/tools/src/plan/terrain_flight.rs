@@ -214,7 +214,7 @@ impl Flight {
     /// `flown` has the positions on which the relays of `scenario` agree by `method`.
     ///
     /// # Errors
-    /// [`NoPlan`]: the simulated relays find other positions or none, or the terrain is not covered.
+    /// [`NoPlan`]: the simulated relays do not agree on positions, or the terrain is not covered.
     pub fn new(
         scenario: &Scenario,
         elevation: &Elevation,
@@ -230,7 +230,10 @@ impl Flight {
         if simulates {
             let outcome = simulated(setup.clone())?;
             let taken = outcome.relays.iter().map(|relay| relay.setpoint);
-            places = taken.collect::<Option<_>>().ok_or_else(source::nothing)?;
+            places = taken
+                .collect::<Option<_>>()
+                .filter(|_| outcome.ending == Ending::Settled)
+                .ok_or_else(source::nothing)?;
             agreed = Some(outcome.ended);
         }
         let flown = settled(scenario, relays, tolerance, &places)?;
@@ -313,7 +316,12 @@ impl Flight {
 impl fmt::Display for Flight {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sir_db = self.terrain_sir_db;
-        write!(f, "simulated flight: worst hop {sir_db:.3} dB with terrain")?;
+        let what = if self.relays.len() > usize::from(MOST_RELAYS) {
+            "flight (not simulated: too many relays)"
+        } else {
+            "simulated flight"
+        };
+        write!(f, "{what}: worst hop {sir_db:.3} dB with terrain")?;
         if let (Some(loss_db), Some(off_m)) = (self.loss_db, self.off_m) {
             let than = if loss_db < 0.0 { "more" } else { "less" };
             write!(
