@@ -15,6 +15,8 @@
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
+use core::num::NonZeroU16;
+
 use heapless::Vec;
 
 use super::context::Member;
@@ -137,7 +139,7 @@ struct Watched {
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake is due that requests a reply.
-    to_greet: Option<u16>,
+    to_greet: Option<NonZeroU16>,
     /// Time of the next report, at least `free`.
     due: Instant,
     /// Time from which the share of the channel allows a report.
@@ -244,7 +246,7 @@ impl Reporting {
                     let mission = member.digest;
                     if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
                         // It may have restarted: then it accepts only handshakes.
-                        watched.to_greet = Some(to).filter(|_| watched.unconfirmed > 0);
+                        watched.to_greet = NonZeroU16::new(to).filter(|_| watched.unconfirmed > 0);
                         watched.hand_on |= mask(CANDIDATES);
                         watched.hand_on_at = now + REPEAT_AFTER.times(1 << watched.unconfirmed);
                         watched.unconfirmed = (watched.unconfirmed + 1).min(MOST_DOUBLINGS);
@@ -267,7 +269,7 @@ impl Reporting {
     /// Returns the next node to which a handshake is due that requests a reply.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         let mut watched = self.watched.iter_mut();
-        watched.find_map(|watched| watched.to_greet.take())
+        watched.find_map(|watched| watched.to_greet.take().map(NonZeroU16::get))
     }
 
     /// Records that the relay's timers have been handled up to `now`.
