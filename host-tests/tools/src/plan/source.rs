@@ -1,9 +1,9 @@
 //! Plans against one interferer: one relay by a theorem, several at their own altitudes.
 
+use crate::single::{Found, aside, theorems, without_interferer};
 use uav_relay::optimiser::plan as silent;
 use uav_relay::planning::fleet;
 use uav_relay::planning::fleet::{Fewest, Most};
-use uav_relay::planning::single::{Found, aside, theorems, without_interferer};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;

@@ -276,24 +276,6 @@ const COUNTED: &[Counted] = &[
     ),
     ("its RAM", "bytes", &["size_of_search"], None),
     (
-        "Theorem 1: one relay placed along x",
-        "instructions",
-        &["theorem_1"],
-        None,
-    ),
-    (
-        "Theorem 2: one relay placed in altitude",
-        "instructions",
-        &["theorem_2"],
-        None,
-    ),
-    (
-        "Theorem 3: one relay placed along x and in altitude",
-        "instructions",
-        &["theorem_3"],
-        None,
-    ),
-    (
         "number of relays for an SIR of 5: 22",
         "instructions",
         &["fewest"],
