@@ -80,7 +80,6 @@ mod place;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod place;
-pub mod planning;
 pub mod pointing;
 mod relay;
 #[cfg(not(feature = "internals"))]

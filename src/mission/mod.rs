@@ -635,14 +635,6 @@ impl Mission {
             Err(error) => Err(error),
         }
     }
-
-    pub(crate) const fn unseparated(&self) -> Self {
-        let config = MissionConfig {
-            min_separation_m: 0.0,
-            ..self.config
-        };
-        Self { config, ..*self }
-    }
 }
 
 impl Mission {

@@ -1,26 +1,12 @@
-//! Cost of finding the number of relays, and of the joint method, on board.
+//! Cost of the joint method on board.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
 use uav_relay::optimiser::joint::{Seat, Solver};
-use uav_relay::planning::fleet::Fewest;
 
 use super::counter::instructions;
-use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, MISSION, WIDE};
-
-/// Measures the instructions for the search for the fewest relays, with which every hop reaches a given SIR.
-#[inline(never)]
-pub(crate) fn planning() {
-    let common = HIGH.config().common;
-    let mut relays = 0;
-    let count = instructions(|| {
-        relays = Fewest::of(black_box(&MISSION), black_box(5.0), |_| common)
-            .map_or(0, |found| found.relays);
-    });
-    hprintln!("fewest {}", count);
-    hprintln!("fewest_relays {}", relays);
-}
+use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, WIDE};
 
 /// Solves a chain of `relays` relays by the joint method, in several calls of the solver.
 ///
