@@ -12,7 +12,7 @@
 use std::cell::OnceCell;
 
 use uav_relay::optimiser::plan as silent;
-use uav_relay::{Mission, MissionConfig, Placement, Profile, Schedule};
+use uav_relay::{Mission, MissionConfig, Placement, Schedule};
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
