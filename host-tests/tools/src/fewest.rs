@@ -102,9 +102,9 @@ impl Most {
     }
 }
 
-/// Returns positions with which the mission's N relays meet the SIR `target`, relay 1 first; `None` if they do not meet it.
+/// Returns positions with which the mission's N relays meet the SIR `target`, relay 1 first.
 ///
-/// Every hop but one has its maximum length, and meets the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
+/// `None` if they do not meet it. Every hop but one has its maximum length, and meets the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
 pub fn places(
     mission: &Mission,
     target: f32,
