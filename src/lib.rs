@@ -80,10 +80,13 @@ mod place;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod place;
-pub mod planning;
 pub mod pointing;
 mod relay;
+#[cfg(not(feature = "internals"))]
 mod root;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod root;
 pub mod sensing;
 pub mod serial;
 mod settings;

@@ -152,7 +152,7 @@ pub(crate) fn transmitter_gain(mission: &Mission, power_w: f32) -> f32 {
     (f64::from(power_w) * squared / (eta * heard)) as f32
 }
 
-pub(crate) const fn square(x: f32) -> f32 {
+pub const fn square(x: f32) -> f32 {
     x * x
 }
 
@@ -221,19 +221,20 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
 /// Function phi(t) with the sign of the slope of the first hop's SIR at t, a position on a line.
 ///
 /// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
-pub(crate) struct Slope<T> {
+#[derive(Debug)]
+pub struct Slope<T> {
     /// t of the point closest to the interferer, m; 0 is the t of the point closest to Tx.
-    pub(crate) p: T,
+    pub p: T,
     /// Difference p^2 + a - b, m^2.
-    pub(crate) q: T,
+    pub q: T,
     /// Squared distance of the line from the interferer, m^2.
-    pub(crate) a: T,
+    pub a: T,
     /// Squared distance of the line from Tx, m^2.
-    pub(crate) b: T,
+    pub b: T,
     /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
-    pub(crate) noise: T,
+    pub noise: T,
     /// Number of bisection steps for each extremum.
-    pub(crate) halvings: u8,
+    pub halvings: u8,
 }
 
 impl<T: Real> Slope<T> {
@@ -253,13 +254,13 @@ impl<T: Real> Slope<T> {
     }
 
     /// Returns the only maximum of the SIR for p < 0, m. `peak` is its t without noise.
-    pub(crate) fn hill(&self, peak: T) -> T {
+    pub fn hill(&self, peak: T) -> T {
         bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
     /// Returns the minimum and the maximum of the SIR for p > 0, m. `bottom` is the minimum without noise. `None` if
     /// the SIR only falls.
-    pub(crate) fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
+    pub fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
         let bends_up = |t: T| self.bends_up(t);
         if !bends_up(bottom) {
             return None;

@@ -557,7 +557,8 @@ impl Mission {
     }
 
     /// Returns the interference field combined with the receiver noise, or `None` without a field.
-    pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
+    #[doc(hidden)]
+    pub const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
             Some(field) => Some(field.in_noise(self.config.noise_w)),
             None => None,
@@ -634,14 +635,6 @@ impl Mission {
             Err(error) => Err(error),
         }
     }
-
-    pub(crate) const fn unseparated(&self) -> Self {
-        let config = MissionConfig {
-            min_separation_m: 0.0,
-            ..self.config
-        };
-        Self { config, ..*self }
-    }
 }
 
 impl Mission {
@@ -676,7 +669,8 @@ impl Mission {
     /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. The optimal position of a single
     /// relay depends on it. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2), with the powers of relay and Tx,
     /// and the interferer at (X, Y).
-    pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
+    #[doc(hidden)]
+    pub fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 

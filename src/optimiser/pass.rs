@@ -87,7 +87,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
 }
 
 /// Returns the x at which a pass starts: that of Tx, or of Rx in an interference field, m.
-pub(crate) fn origin(mission: &Mission) -> f32 {
+pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
         Heading::TowardTx => mission.config().distance_m,
@@ -152,7 +152,7 @@ impl<'a> Link<'a> {
         reaches.len() < due.min(all) || reaches.len() == all
     }
 
-    pub(crate) fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
+    pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         let mut reaches = PerTarget::new();
         self.extend(&[target], &[from_m], &mut reaches);
         reaches.first().copied()
@@ -478,20 +478,16 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
 }
 
 /// Computation of a whole chain for one target, in one program and without messages.
-pub(crate) struct Walk<'a, F> {
-    pub(crate) mission: &'a Mission,
-    target: f32,
+#[derive(Debug)]
+pub struct Walk<'a, F> {
+    pub mission: &'a Mission,
+    pub target: f32,
     plain: bool,
     profile_of: &'a F,
 }
 
 impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
-    pub(crate) const fn new(
-        mission: &'a Mission,
-        target: f32,
-        plain: bool,
-        profile_of: &'a F,
-    ) -> Self {
+    pub const fn new(mission: &'a Mission, target: f32, plain: bool, profile_of: &'a F) -> Self {
         Self {
             mission,
             target,
@@ -501,11 +497,11 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 
     /// Returns this chain with relays that all take their farthest x.
-    pub(crate) const fn plainly(&self) -> Self {
+    pub const fn plainly(&self) -> Self {
         Self::new(self.mission, self.target, true, self.profile_of)
     }
 
-    pub(crate) fn link(&self, index: u16) -> Link<'_> {
+    pub fn link(&self, index: u16) -> Link<'_> {
         let before = before(self.mission, index);
         Link {
             mission: self.mission,
@@ -522,7 +518,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
     ///
     /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
-    fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
+    pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
         relays.map_while(move |at| {
@@ -530,26 +526,6 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
             reach = self.link(at).reach(self.target, before_m)?;
             Some((at, before_m, reach))
         })
-    }
-
-    /// Computes the reach of every relay, and calls `visit` with its index and reach, m.
-    ///
-    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
-    pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
-        let reaches = self.reaches().inspect(|(at, _, reach)| visit(*at, *reach));
-        let (at, before_m, reach) = reaches.last()?;
-        let is_complete = at == last(self.mission);
-        is_complete.then(|| self.link(at).ending(self.target, before_m, reach))?
-    }
-
-    /// Returns true if the chain meets its target with relays at their reaches or required positions.
-    pub(crate) fn is_met(&self) -> bool {
-        self.closes() && (self.plainly().closes() || self.place(0).is_some())
-    }
-
-    /// Returns true if the reaches of a pass end within the last hop.
-    pub(crate) fn closes(&self) -> bool {
-        self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
     }
 
     /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
@@ -584,7 +560,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
 
     /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
     /// to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
-    pub(crate) fn place(&self, index: u16) -> Option<f32> {
+    pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
         }
@@ -610,7 +586,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
     /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
     /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
-    pub(crate) fn settle(
+    pub fn settle(
         &self,
         place: f32,
         mut visit: impl FnMut(u16, f32, Option<u16>) -> Option<f32>,

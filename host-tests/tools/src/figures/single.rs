@@ -1,8 +1,8 @@
 //! Relay at its best position (Theorem 1), against random, interference-blind and middle positions.
 
+use crate::single::theorems;
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::planning::single::theorems;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Scenario, Source, mission};
 use uav_relay_sim::report::db;

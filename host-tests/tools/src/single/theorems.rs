@@ -73,16 +73,17 @@
 //! Computed in f64, and so exact to the last place of the f32 result. Accuracy: `the_locus_is_where_the_hops_are_equal` in
 //! `host-tests/tests/theorems/`.
 
-use super::edge::{narrow, squared, touching_inside};
+use uav_relay::root::sqrt;
+use uav_relay::sir::{Extremum, first_hop_turn, square};
+use uav_relay::{Band, Interferer, Mission, Profile};
+use uav_relay_scenario::number::narrow;
+
+use super::edge::{squared, touching_inside};
 use super::{Found, Two, TwoHops};
-use crate::mission::{Band, Interferer, Mission, Profile};
-use crate::root::sqrt;
-use crate::sir::{Extremum, first_hop_turn, square};
 
 /// Case of the optimal x at a given altitude. The first five cases are those of the paper's Corollary 1, for an
 /// interferer at X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
     /// Optimum at x = 0: even right above Tx the first hop's SIR is lower than the second hop's. The ratio of the
@@ -198,7 +199,6 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
 
 /// Case of the optimal altitude at a given x. The first three cases are those of Theorem 2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum AltitudeCase {
     /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
@@ -282,7 +282,6 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
 /// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or its inside. An optimum on a
 /// corner is on the first of its edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
     /// Optimum at the lowest altitude, with this case of the optimal x (Theorem 1).
     Lowest(PlaceCase),
@@ -329,7 +328,6 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
 /// Limits of the power ratio p_t / p_u, linear, at which the case of the optimal x changes. p_t and p_u are the
 /// powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
     /// Ratio C_1: if p_t / p_u is below it, the first hop is the worse one even right above Tx. 0 with the interferer
     /// at Rx.

@@ -10,7 +10,7 @@
 //! | altitude, noise only | [`without_interferer`] | the paper's special case without interference |
 //!
 //! They use the locus of equal SIRs ([`theorems::equal_altitudes`], Lemma 1) and the extrema of the first hop's SIR
-//! ([`crate::sir::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
+//! ([`uav_relay::sir::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
 //! change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more extremum, and the
 //! optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise but
 //! [`without_interferer::best_in_noise`], which has its own.
@@ -20,9 +20,8 @@ mod edge;
 pub mod theorems;
 pub mod without_interferer;
 
-use crate::mission::{Mission, Profile};
-use crate::place::Placement;
-use crate::sir::{self, Sender};
+use uav_relay::sir::{self, Sender};
+use uav_relay::{Mission, Placement, Profile};
 
 /// Number of bisection steps for the x at which both hops have the same SIR; exact to a step of an f32.
 const HALVINGS: u8 = 40;
@@ -30,7 +29,6 @@ const HALVINGS: u8 = 40;
 /// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field it is the
 /// mean SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found {
     /// Position of the single relay.
     pub place: Placement,

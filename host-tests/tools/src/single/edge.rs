@@ -65,15 +65,15 @@
 //! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
 //! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
+use uav_relay::root::bisected;
+use uav_relay::sir::Slope;
+use uav_relay::{Band, Interferer, Mission, Placement};
+use uav_relay_scenario::number::narrow;
+
 use super::{Found, HALVINGS, TwoHops};
-use crate::mission::{Band, Interferer, Mission};
-use crate::place::Placement;
-use crate::root::bisected;
-use crate::sir::Slope;
 
 /// Coordinate that varies along an edge of the box in which a relay may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum EdgeCoordinate {
     /// Position varies from Tx toward Rx: edge along x.
@@ -185,14 +185,6 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, c) = (a.min(c), a.max(c));
     let (b, d) = (b.min(d), b.max(d));
     [a, b.min(c), b.max(c), d]
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a place is given as an f32"
-)]
-pub(super) fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 const NOISY_HALVINGS: u8 = 60;
@@ -321,7 +313,7 @@ fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
         if new.0 > slot.0 {
-            core::mem::swap(slot, &mut new);
+            std::mem::swap(slot, &mut new);
         }
     }
 }

@@ -70,11 +70,12 @@
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use super::edge::{Edge, best_in_corridor, narrow, squared, touching_inside};
+use uav_relay::root::bisected;
+use uav_relay::{Band, Interferer, Mission, Placement, Profile};
+use uav_relay_scenario::number::narrow;
+
+use super::edge::{Edge, best_in_corridor, squared, touching_inside};
 use super::{Found, TwoHops};
-use crate::mission::{Band, Interferer, Mission, Profile};
-use crate::place::Placement;
-use crate::root::bisected;
 
 pub use super::edge::EdgeCoordinate;
 
@@ -83,7 +84,6 @@ const HALVINGS: u8 = 48;
 
 /// Geometric case of the optimal position of a single relay that may move sideways.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
     /// Optimum at the lowest altitude, where the circles of constant SIR of both hops touch.
     Touching,
@@ -212,7 +212,7 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
 
 fn both_ends(band: Band) -> impl Iterator<Item = f32> {
     let other = (!band.is_single()).then_some(band.most_m);
-    core::iter::once(band.least_m).chain(other)
+    std::iter::once(band.least_m).chain(other)
 }
 
 fn holds(band: Band, value: f32) -> bool {
