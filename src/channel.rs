@@ -12,7 +12,7 @@ const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
-    /// Line of sight between drones and the ground: eta = `mu_los`, as between two drones.
+    /// Line of sight between drones and the ground: the path-loss factor eta is `mu_los`, as between two drones.
     Los,
     /// Obstructed links between drones and the ground: eta = `mu_nlos`, as between two ground stations.
     Nlos,

@@ -183,8 +183,9 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
-    /// Returns the distance along x at which two relays are the minimum separation apart in space, m. `one` and `other`
-    /// are their lateral offsets and altitudes.
+    /// Returns the least difference of x, m, with which two relays keep the minimum separation in space. `one` and
+    /// `other` are the lateral offsets and altitudes of the two relays. The result is 0 if these alone keep the
+    /// relays apart.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))

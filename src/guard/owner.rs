@@ -353,8 +353,10 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream. If `moves` is true, it may have a new fence (limit of
-    /// x). Fences are numbered only here, so that every numbered fence is sent.
+    /// Returns the pending Fence message to the downstream neighbour; `None` if no message is pending. A fence is
+    /// this relay's limit on the x of that neighbour. If `moves` is true, the message may contain a new fence with
+    /// the next number; otherwise it repeats the last fence. Only this function numbers fences, so that every
+    /// numbered fence is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

@@ -673,9 +673,11 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. The optimal position of a single
-    /// relay depends on it. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2), with the powers of relay and Tx,
-    /// and the interferer at (X, Y).
+    /// Returns G, m^2, which determines the optimal position of a single relay that sends with `power_w` watts. G is
+    /// K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is (`p_u` /
+    /// `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and of Tx.
+    /// `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
+    /// ground.
     pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }

@@ -319,7 +319,9 @@ impl IndexClaims {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns this relay's new claim number if all authentication sessions must be restarted with it. Else `None`.
+    /// Returns this relay's claim number if it must restart its authentication sessions; otherwise `None`. Of two
+    /// nodes with the same node number, the larger claim number wins. A relay that has raised its claim number
+    /// restarts its sessions with the new number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }

@@ -172,8 +172,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the highest target of a ladder over the lower of its two middle targets. The other half has the same
-/// ratio. `gap` and `growth` are the codes in a [`Ladder`].
+/// Returns a ladder's highest target divided by the lower of its two middle targets. The higher middle target divided
+/// by the lowest target gives the same ratio. `gap` and `growth` are the codes in a [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()

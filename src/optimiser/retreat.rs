@@ -57,7 +57,7 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Relative rounding error by which the squared length of a backward hop may exceed its maximum.
+/// Relative tolerance, for rounding errors, on the maximum squared length of a hop toward Tx.
 const ROUNDING: f32 = 4e-6;
 
 /// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.

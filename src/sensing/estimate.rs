@@ -173,10 +173,10 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Decides if the measurements give a new estimate that replaces the current `estimate`.
+/// Compares the measurements with the current `estimate`, and returns the estimate to adopt, if any.
 ///
-/// `mission` is based on the current estimate. `sums` has the relays' measurements, and `levels` those of transmitter
-/// and receiver. `before` is the quality of the current estimate when it was adopted.
+/// `mission` is based on the current estimate. `sums` has the measurements of all relays, and `levels` the
+/// interference measured at Tx and at Rx. `before` is the quality that the current estimate had when it was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,

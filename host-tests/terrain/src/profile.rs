@@ -136,7 +136,8 @@ impl<'a> Ground<'a> {
         Self { error_m, ..self }
     }
 
-    /// Returns by how much the ground counts as higher at `x_m` along the line, m.
+    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by
+    /// this amount. It is 0 at Tx and Rx, and grows over 100 m from them.
     pub fn raise_m(&self, x_m: f64) -> f64 {
         let from_site_m = x_m.min(self.axis.distance_m() - x_m);
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)

@@ -41,7 +41,7 @@ const MEETING_MS: u64 = 200_000;
 /// Time of observation after two settled chains have come into range, ms.
 const MET_MS: u64 = 60_000;
 
-/// Medium between two relays with the same index and the other relays.
+/// Medium that connects two relays with the same index to each other and to the other relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Medium {
     /// A shared channel, on which the two relays with the same index receive each other.

@@ -745,7 +745,7 @@ fn the_error_of_the_location_is_that_of_fits() {
     }
 }
 
-/// Checks the report and the map of the location against the simulated searches.
+/// Checks the report and the map of how well relays locate an interferer, against simulated searches.
 #[test]
 fn the_command_says_from_where_relays_locate_the_interferer() {
     let folder = tempfile::tempdir().unwrap();

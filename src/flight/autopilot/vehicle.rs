@@ -700,9 +700,10 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Simulates messages of a flight, and returns the age that each message seems to have, ms.
+    /// Simulates messages over a link with delays. Returns the age of each message by [`RemoteClock`], ms.
     ///
-    /// `clock_ms` returns the autopilot's clock at a time, and `delay` the link's delay at a time.
+    /// The autopilot sends a message every 200 ms for 80 s. `clock_ms` returns the autopilot's clock at a time, and
+    /// `delay` the link's delay at a time; all of them are in ms.
     fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();

@@ -76,7 +76,7 @@ pub enum Outgoing<'a> {
         boot_ms: u32,
         /// Name of the number, at most ten bytes; a longer one is truncated.
         name: &'a str,
-        /// Value of the number.
+        /// Value of the plotted quantity that `name` names.
         value: f32,
     },
 }

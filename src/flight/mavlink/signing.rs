@@ -88,7 +88,7 @@ pub struct Signing {
     /// Timestamp of this link at the time `at`, in units of 10 µs.
     stamp: u64,
     at: Instant,
-    /// Timestamp in the signature of the last sent MAVLink frame.
+    /// Timestamp in the signature of the last sent MAVLink frame, in units of 10 µs.
     sent: u64,
     senders: [Sender; SENDERS],
 }

@@ -620,9 +620,9 @@ impl PendingHeartbeat {
     };
 }
 
-/// Number of consecutive hellos that do not list this relay as received before a node is reported.
-///
-/// Fewer may be due to a lost frame or two.
+/// Number of consecutive hellos without this relay in their list, after which their sender is reported. A hello lists
+/// the nodes that its sender receives. This relay receives the sender, but the sender does not seem to receive this
+/// relay. A smaller number may be due to a lost frame or two.
 const NOT_RECEIVED: u8 = 8;
 
 /// Number of consecutive handshakes of a node with another key after which the node is reported.

@@ -214,8 +214,9 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, on which `place` relays have voted before. `received` has their votes (`None` at
-    /// the proposer). Returns the effects; `None` if this relay has promised a later view (Paxos).
+    /// Votes on the proposed `view`, after the `place` relays that the proposal has already visited. `received` has
+    /// the votes of these relays; `None` at the proposer. Returns the effects on the other layers. `None` if this
+    /// relay has already promised (Paxos) this view or a later one.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,

@@ -87,8 +87,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude of relay `index`, m, if it is fixed. `None` if the relay may choose its altitude, or if
-    /// the mission allows one altitude only.
+    /// Returns the altitude at which relay `index` is held, m. `None` if the relay may choose its altitude. Also
+    /// `None` if the mission allows one altitude only, since no relay then differs from the others.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -243,8 +243,9 @@ pub(super) const SEGMENT: usize = 10;
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state at the begin of one segment (ten relays): x of the previous relay, and derivatives. The derivatives are those of the
-/// chain's slack by the position of the segment's last relay.
+/// Stored state of the solver for one segment, which is ten consecutive relays of the chain. It has the x of the
+/// relay before the segment. It also has the derivatives of the chain's slack with respect to the position of the
+/// segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before this segment, m.

@@ -414,8 +414,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the coordinate and the step width of the next pass. After the last one the chain is kept if it is the
-    /// best.
+    /// Selects the coordinate and the step width of the solver's next pass over the relays. After the last pass from
+    /// one initial chain, stores the chain if it is the best so far, and goes on to the next initial chain.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;

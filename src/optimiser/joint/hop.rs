@@ -176,7 +176,8 @@ impl Coordinate {
         self.restored(at)
     }
 
-    /// Returns a symmetric matrix with rows and columns reordered as by [`Coordinate::first`].
+    /// Returns a symmetric 3 x 3 matrix with its rows and columns reordered: the coordinate `self` first. The other
+    /// two coordinates follow in the order x, y, h.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.ordered(bend).map(|row| self.first(row))
     }
@@ -218,8 +219,9 @@ pub(super) struct Tangent {
     pub(super) c: f32,
     /// Difference `c` - 1, computed without cancellation. `c` is target SIR over gain, increased by noise.
     pub(super) e: f32,
-    /// Constant in the condition s + `spare` >= `c` l for a hop to meet its target, m^2; 0 without noise. s and l are
-    /// the squared distances of the hop's end from the interferer and from the sender.
+    /// Constant in the condition that a hop meets its target SIR, s + `spare` >= `c` l, m^2. s is the squared
+    /// distance from the hop's receiver to the interferer, and l from the receiver to the sender. `spare` is 0
+    /// without noise.
     pub(super) spare: f32,
 }
 

@@ -27,11 +27,12 @@ pub(super) enum Start {
     /// searched with hops computed exactly as the relays compute them; a relay may stay short of its farthest
     /// position.
     Through { aside: f32, up: f32 },
-    /// Initial chain for relays of which some have a fixed altitude: a parabola to the side. The altitudes of the
-    /// others are interpolated.
+    /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
+    /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
+    /// altitudes of the other relays are interpolated between the fixed altitudes.
     ///
-    /// `level` is true if the altitude is constant before the first and after the last fixed one, false if it goes
-    /// down to Tx and Rx.
+    /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
+    /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
     /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation. The relays
     /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside

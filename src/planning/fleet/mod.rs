@@ -110,8 +110,8 @@ impl Most {
 impl Mission {
     /// Writes positions with which the mission's N relays meet `target` to `places`, relay 1 first.
     ///
-    /// Returns false if they do not meet it, or `places` is shorter than N. Every hop but one has its maximum length, and meets
-    /// the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
+    /// Returns false if the relays cannot meet `target`, or if `places` is shorter than N. Every hop but one has its
+    /// maximum length, and meets the target to 1e-4 relative. The work is at most two computations of all N reaches.
     pub fn places_for(
         &self,
         target: f32,

@@ -241,7 +241,9 @@ impl<'a> Search<'a> {
         each.collect()
     }
 
-    /// Returns the candidates for relay `relay` (from 0) at `x_m` and `levels` allowed altitudes.
+    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`. There are `levels` altitudes in equal
+    /// steps over the permitted range. Candidates in a no-fly area are left out. A relay with a fixed altitude has at
+    /// most one candidate.
     pub(super) fn above(
         &self,
         relay: usize,

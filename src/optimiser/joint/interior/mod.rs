@@ -49,7 +49,8 @@ const LESS: f32 = 0.3;
 
 /// Gain of the merit, over the barrier weight, below which positions have settled. For more than half a Newton step.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit, over the barrier weight, below which positions have settled. For any fraction of a Newton step.
+/// Gain below which the positions count as settled after a Newton step of any length. The gain is the increase of the
+/// merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
