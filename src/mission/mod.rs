@@ -307,17 +307,19 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of the sender's power, 1/W, in the formula of the hop's SIR. The gain is eta / (`mu_los`
-    /// `p_MSI`), with path-loss factors and the interferer's power; in an interference field `Upsilon_max` / `mu_los`, m^2/W.
+    /// Gain of a drone-to-drone hop per watt of the sender's power, in the formula of the hop's SIR. With one
+    /// interferer the gain is eta / (`mu_los` `p_MSI`), 1/W. eta and `mu_los` are the path-loss factors drone to
+    /// ground and drone to drone, and `p_MSI` is the interferer's power. In an interference field the gain is
+    /// `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of the last hop per watt of its sender, m^2/W. The SIR at Rx is this times the power over the squared
-    /// distance.
+    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's
+    /// power, divided by the squared distance.
     ///
-    /// It is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, with the interferer of power `p_MSI` at (X, Y). In a
-    /// field it is Upsilon(D) / eta. With noise it refers to the interference plus noise at Rx.
+    /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
+    /// field it is Upsilon(D) / eta. With noise, it refers to the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. 0 without noise and
-    /// in an interference field.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
+    /// noise and in an interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -564,17 +566,19 @@ impl Mission {
         }
     }
 
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m, 1/m^2: nu = N eta / `p_MSI`.
     ///
-    /// 0 without noise and in an interference field, whose Upsilon includes the noise.
+    /// The result is 0 without noise. It is also 0 in an interference field, because Upsilon of the field includes
+    /// the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Ratio r: SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx. 0 for one direction.
+    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. 0 for one
+    /// direction.
     ///
-    /// A constant without the feature `reverse`, so that the compiler drops the code for two directions. 0 while the interferer is
-    /// unknown: relays then spread evenly.
+    /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
+    /// function returns a constant, so that the compiler drops the code for two directions.
     pub const fn reverse(&self) -> f32 {
         if REVERSE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
@@ -583,8 +587,8 @@ impl Mission {
         }
     }
 
-    /// SNR gap of fitted slots, linear; 0 for equal slots. A constant without the feature `altitude`. 0 while the interferer is
-    /// unknown, as [`Mission::reverse`] is.
+    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, as
+    /// for [`Mission::reverse`]. Without the feature `altitude` the function returns a constant.
     pub const fn fitted_gap(&self) -> f32 {
         if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap
@@ -593,8 +597,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to relay N), or in an
-    /// interference field toward Tx (relay N to relay 1).
+    /// Returns the order in which the relays compute their positions. The order is toward Rx (relay 1 to relay N). In
+    /// an interference field it is toward Tx (relay N to relay 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
@@ -603,7 +607,7 @@ impl Mission {
         }
     }
 
-    /// Returns the leader, which computes its position first. It is 1, or N in an interference field.
+    /// Returns the index of the leader, which computes its position first: 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -645,25 +649,26 @@ impl Mission {
 }
 
 impl Mission {
-    /// Gain A of the first hop: its SIR is A times [`crate::sir::quiet`] over the squared length. `quiet` is the
-    /// inverse interference. A is the power of Tx over that of the interferer, `p_t` / `p_MSI`; in an interference
-    /// field `p_t` `Upsilon_max` / eta.
+    /// Returns the gain A of the first hop. The SIR of this hop is A times [`crate::sir::quiet`], the inverse
+    /// interference, divided by the squared length. With one interferer A is the power of Tx divided by the power of
+    /// the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
-    /// [`crate::sir::quiet`], the inverse interference, over the squared length. The gain is (`p_u` / `p_MSI`)(eta /
-    /// `mu_los`): the powers of relay and interferer, and the path-loss factors drone to ground and drone to drone.
-    /// In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's largest E[1/I].
+    /// Returns the gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
+    /// [`crate::sir::quiet`], the inverse interference, divided by the squared length. With one interferer the gain
+    /// is (`p_u` / `p_MSI`) (eta / `mu_los`): the powers of relay and interferer, and the path-loss factors drone to
+    /// ground and drone to drone. In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's
+    /// largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// Factor K of the last hop, m^2. The SIR at Rx is K / squared distance from the last relay, which has `power_w`
-    /// watts.
+    /// Returns the factor K of the last hop, m^2. The SIR at Rx is K divided by the squared distance to the last
+    /// relay. The last relay sends with `power_w` watts.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -682,7 +687,8 @@ impl Mission {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 
-    /// Power that a relay receives from Tx, W, at the squared distance `squared_m2` from it.
+    /// Returns the power that a relay receives from Tx, W. `squared_m2` is the squared distance from Tx to the relay,
+    /// m^2.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"

@@ -77,11 +77,11 @@ impl Fewest {
 }
 
 impl Most {
-    /// Returns the highest target SIR that any number of relays meets. `None` if it is below 1e-20 of the highest
-    /// possible SIR of the first hop.
+    /// Returns the highest target SIR that any number of relays meets; `None` if this target is too low. Too low
+    /// means below 1e-20 of the highest possible SIR of the first hop.
     ///
-    /// With different altitudes, or a minimum separation, it is a feasible target but not certainly the highest. Work: 33 times
-    /// that of [`Fewest::of`].
+    /// With different altitudes, or a minimum separation, the target is feasible but not certainly the highest. Work:
+    /// 33 times the work of [`Fewest::of`].
     pub fn of(mission: &Mission, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let meets = |target: f32| {
             let found = counted(mission, target, &profile_of)?;
@@ -193,9 +193,9 @@ fn toward_rx(
     None
 }
 
-/// Writes positions that meet the target to `places`; `None` if there are none. It first computes each relay's reach,
-/// the farthest x at which its hop meets the target; then, from the last relay back, the x that the next hop
-/// requires.
+/// Writes positions that meet the target to `places`; `None` if there are no such positions. The function first
+/// computes each relay's reach, the farthest x at which its hop meets the target. Then it computes, from the last
+/// relay back, the x that the next hop requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let (slack, place) = chain.ends(|index, reach| {
@@ -258,12 +258,12 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target SIR that the mission's N relays meet, all with `profile`, in a field. It is linear, to
-/// an f32's step.
+/// Returns the highest target SIR that the mission's N relays meet in a field, all with `profile`. The SIR is linear,
+/// exact to one step of an f32.
 ///
-/// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
+/// `None` without a field, or if no target is met. The result is the optimum if no minimum separation is binding:
 /// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven
-/// field. Work: 48 chains, each three square roots for every point of the field and relay.
+/// field. Work: 48 chains, each three square roots for every point of the field.
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
