@@ -79,7 +79,7 @@ pub struct Hops {
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
 }
 

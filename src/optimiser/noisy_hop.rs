@@ -67,7 +67,8 @@ pub(super) struct NoisyHop {
     /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times inverse interference over squared
     /// length.
     pub(super) ratio: f32,
-    /// Difference rho - 1, where rho is the hop's target SIR over its gain. It is computed without cancellation.
+    /// Difference rho - 1, where rho is the hop's target SIR divided by its gain. The difference is computed without
+    /// cancellation.
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
@@ -78,7 +79,7 @@ pub(super) struct NoisyHop {
     /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the
     /// interferer, b from the receiver to the sender. It is computed without cancellation.
     pub(super) base: f32,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2, above 0.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,
 }
 

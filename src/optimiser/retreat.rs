@@ -347,7 +347,7 @@ impl<'a> Retreat<'a> {
         Some(from_m)
     }
 
-    /// Returns the hop with the smallest x of its sender, by the search of [`least`] over the receiver's x.
+    /// Returns the hop with the smallest x of its sender, by the search of [`least`] for the receiver's x.
     #[inline(never)] // one copy for both directions and for one
     fn searched(
         &self,
@@ -479,13 +479,13 @@ struct Piece {
     slope: f32,
 }
 
-/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equal hops it is the
-/// one with the smallest x of the receiver.
+/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equally good hops the
+/// result is the hop with the smallest x of the receiver.
 ///
-/// `value` returns the sender's x for the receiver's x, y, and `quiet`, the ratio of Upsilon = E[1/I] at y to the
-/// field's largest. The result is y - sqrt(`c` quiet - s), with the sender's gain over the target `c` and the first
-/// of `squares`, s. It is `None` if the square under the root is below the second minus the first. Work: at most
-/// three values for each field point in between that a hop could reach.
+/// `value` returns the sender's x for the receiver's x, y, and for `quiet`, which is Upsilon = E[1/I] at y divided by
+/// the field's largest Upsilon. This sender's x is y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the
+/// target, and s is the first of `squares`. It is `None` if the square under the root is below the second of
+/// `squares` minus the first. Work: at most three values for each field point within reach of a hop.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

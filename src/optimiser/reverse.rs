@@ -64,7 +64,7 @@ pub struct Back {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
 }
 

@@ -61,8 +61,9 @@ const DEPTH: f32 = 1e-12;
 /// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit is the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. After such a pass the
-/// next targets are spread evenly over the bracket, and not around an interpolated optimum.
+/// Width of the bracket after a pass divided by its width before, above which the pass counts as stalled. The bracket
+/// is the interval that contains the best target. After such a pass the next targets are spread evenly over the
+/// bracket, and not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.

@@ -88,7 +88,7 @@ pub struct Hop {
     base: f32,
     /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,
-    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
@@ -133,8 +133,8 @@ impl Hop {
     }
 
     /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
-    /// altitude. The hop has no minimum length. `noise` is the noise over the interferer's power received at 1 m,
-    /// 1/m^2.
+    /// altitude. The hop has no minimum length. `noise` is the noise divided by the interferer's power received at 1
+    /// m, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -516,8 +516,8 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the receiver noise over the interferer's power received at 1 m: nu, 1/m^2. Without the feature `noise`
-    /// it is the constant 0, so that the compiler drops the search in noise.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. Without the feature
+    /// `noise` the result is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }

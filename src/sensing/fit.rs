@@ -31,8 +31,8 @@ pub enum Unfit {
 /// Weight of the operator's expected error in the estimated variance, in measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. Below it they do not
-/// show on which side of the line the source is.
+/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance
+/// the measurements do not show on which side of the line the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.

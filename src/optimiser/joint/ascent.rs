@@ -10,8 +10,8 @@ use super::outlook::Outlook;
 /// is tried if the chain does not improve.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: limit of a relay's move in one iteration, over its distance from the interferer. The same number
-/// limits the change of ln(target SIR).
+/// First *trust*: maximum move of a relay in one iteration, divided by its distance from the interferer. The same
+/// number is the maximum of the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
 /// Minimum trust at which an improvement's final target is predicted. A smaller one makes the prediction too low.
@@ -28,9 +28,10 @@ const LEAST_SLOPE: f32 = 0.3;
 /// the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's slack, over the distance Tx to Rx. With it slack cannot outweigh a penalty.
+/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. The limit keeps the slack from
+/// outweighing a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's slack, over the distance Tx to Rx.
+/// Smallest upper limit on the chain's slack, divided by the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of a negative slack relative to a positive slack, when two chains are compared.

@@ -89,7 +89,8 @@ pub struct SlotShares {
     /// Begin and end of the slot in which this relay receives from the next node toward Rx. Empty, 1 and 1, in a
     /// mission of one direction.
     pub from_rx: [f32; 2],
-    /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
+    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
+    /// times this value.
     pub bits_per_hz: f32,
 }
 
@@ -117,8 +118,8 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains over the SNR gap, r (share of data back), and minimum separation. The gains are
-/// forward and backward.
+/// Hop between two nodes: its gains, r (share of data back), and minimum separation. `gains` has the forward and the
+/// backward gain, each divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -129,7 +130,7 @@ struct Hop {
 }
 
 impl Hop {
-    /// Returns the SINR over the SNR gap, linear, forward and backward.
+    /// Returns the forward and the backward SINR, linear, each divided by the SNR gap.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -414,8 +415,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the coordinate and the step width of the solver's next pass over the relays. After the last pass from
-    /// one initial chain, stores the chain if it is the best so far, and goes on to the next initial chain.
+    /// Selects the coordinate and the step width of the solver's next pass over the relays. A pass improves this one
+    /// coordinate of all relays. After the last pass from one initial chain, the function stores the chain if it is
+    /// the best so far, and goes on to the next initial chain.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;

@@ -30,7 +30,7 @@ const HALVINGS: u8 = 12;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,

@@ -278,7 +278,7 @@ impl Plane {
         (self.loudest(s), AsideCase::Touching)
     }
 
-    /// Returns the first hop's SIR over its gain A, with the relay at (x, y) in this plane.
+    /// Returns the first hop's SIR divided by the hop's gain A, with the relay at (x, y) in this plane.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
@@ -323,7 +323,7 @@ impl Plane {
         at(bisected(0.0, 1.0, HALVINGS, rises).0 * far)
     }
 
-    /// Returns the second hop's SIR over the first hop's gain A. `s` is the relay's distance from Rx along the
+    /// Returns the second hop's SIR divided by the first hop's gain A. `s` is the relay's distance from Rx along the
     /// ground, m.
     fn second(&self, s: f64) -> f64 {
         self.g / (squared(s) + self.h2)

@@ -384,8 +384,8 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the first hop's largest SIR on a circle about Rx in this plane, over the hop's gain. `r` is the radius
-    /// of the circle, m.
+    /// Returns the first hop's largest SIR on a circle about Rx in this plane, divided by the hop's gain. `r` is the
+    /// radius of the circle, m.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

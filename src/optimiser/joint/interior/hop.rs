@@ -26,8 +26,8 @@ const SHORTEST: f32 = 1e-8;
 
 /// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
 ///
-/// The factor r is the required ratio of backward to forward SIR. Other values for the two directions of a hop have the
-/// same order. The *slack* of a level is its excess over the target.
+/// The factor r is the required ratio of backward to forward SIR. Other pairs of values for a hop have the same
+/// order: forward, backward. The *slack* of a level is the level minus the target.
 pub(super) type Levels = [f32; 2];
 
 /// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.

@@ -47,7 +47,8 @@ const LAST_MU: f32 = 1e-4;
 /// Factor by which the barrier weight falls once the positions have settled.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit, over the barrier weight, below which positions have settled. For more than half a Newton step.
+/// Gain below which the positions count as settled after more than half of a Newton step. The gain is the increase of
+/// the merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
 const SETTLED: f32 = 0.1;
 /// Gain below which the positions count as settled after a Newton step of any length. The gain is the increase of the
 /// merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
@@ -188,7 +189,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     least: f32,
     /// Merit at the stored positions. The current step is accepted if it does not lower the merit.
     merit: f32,
-    /// Sum of the barrier's logarithms over the hops handled so far, at the positions that are tried.
+    /// Sum of the barrier's logarithms for the hops handled so far, at the positions that are tried.
     sum: f32,
     /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions only.
     share: f32,

@@ -74,13 +74,14 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier over the slack for each direction of the hop.
+    /// Returns the Lagrange multiplier divided by the slack for each direction of the hop.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns mu over the slack for each direction of the hop: the Lagrange multipliers at the optimum.
+    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is mu, the barrier
+    /// weight, divided by the slack.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }

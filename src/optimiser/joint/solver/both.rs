@@ -527,6 +527,5 @@ const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Excess of the first target to try over the interior-point method's result, in ln(SIR). It is the method's possible
-/// error.
+/// First target to try minus the interior-point method's result, in ln(SIR). It is the possible error of this method.
 const ABOVE: f32 = 1e-4;
