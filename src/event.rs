@@ -108,9 +108,9 @@ pub enum Event {
     /// contradictory. `Relay::unfit` gives the reason.
     InterfererUnclear,
     /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator
-    /// checks its receiver. Only the leader reports the transmitter and the receiver. A relay that measures nothing
-    /// at all is reported only by itself. With four relays or fewer the faulty one cannot be identified
-    /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// should check the receiver of this node. Only the leader reports the transmitter and the receiver. A relay that
+    /// measures nothing at all is reported only by itself. With four relays or fewer the faulty relay cannot be
+    /// identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,

@@ -106,9 +106,9 @@ impl Sites {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from the distance between its Tx and Rx positions. Or the mission has no such
-    /// positions, and its distance differs from that of the positions which the relay was configured with
-    /// (`Settings::sited`).
+    /// The mission's distance differs from the distance between its Tx and Rx positions. Or the mission has no Tx and
+    /// Rx positions, and its distance differs from the distance between the positions that the relay was configured
+    /// with (`Settings::sited`).
     Distance,
     /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,

@@ -118,8 +118,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::place::Placement;
 
-    /// Returns the errors of [`Bearing::new`] compared with f64. They are those of azimuth, elevation and direction,
-    /// rad, and the relative error of the distance.
+    /// Returns the errors of [`Bearing::new`] compared with f64. These are the errors of azimuth, elevation and
+    /// direction, rad, and the relative error of the distance.
     fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {
         let bearing = Bearing::new(ahead_m, aside_m, climb_m).unwrap();
         let [x, y, h] = [ahead_m, aside_m, climb_m].map(f64::from);

@@ -534,7 +534,7 @@ pub struct Fence {
     /// x of the position that the chain has agreed on for the sender, m: -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
-    /// setpoints, they are those of its reported position.
+    /// setpoints, this is the lateral offset and altitude of its reported position.
     pub across: CrossSection,
     /// Distance along x that the upstream relay requests to stay before the fence, m, 0 to 1e5. Below the minimum
     /// separation, the downstream relay must not change its lateral offset or altitude.

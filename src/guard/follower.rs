@@ -24,7 +24,7 @@ pub(super) struct FenceFollower {
     /// request.
     requested_m: f32,
     /// Distance along x to the upstream neighbour to which this relay has agreed, m. Infinity stands for the minimum
-    /// separation, and is the value before any agreement.
+    /// separation; it is the value until this relay has agreed to a distance.
     agreed_m: f32,
     /// x of the position that the chain has agreed on for the neighbour toward Tx, m.
     target_m: f32,

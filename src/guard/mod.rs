@@ -112,7 +112,8 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last reported position before the first setpoint, which it becomes; `None` before any report.
+    /// Last position reported before the relay has a setpoint. This position becomes the first setpoint; `None` until
+    /// a position is reported.
     initial_place: Option<Placement>,
     /// True while the drone flies to this guard's setpoints.
     flown: bool,
@@ -212,8 +213,9 @@ impl Guard {
 
     /// Starts again because the line from Tx to Rx has changed. Earlier positions and messages are void.
     ///
-    /// The relay begins with the first position reported once it has stopped, after `now`, or after the start if that
-    /// is `None`. Lost relays may hover anywhere beyond this relay, as after a start.
+    /// The relay begins with the first position that is reported after `now`, once the drone has stopped. With
+    /// `None`, it begins with the first position after the start. Lost relays may hover anywhere beyond this relay,
+    /// as after a start.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
             self.started_at = self.started_at.max(now + self.own.config.lag);

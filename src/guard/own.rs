@@ -188,8 +188,8 @@ impl Own {
     }
 
     /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay has arrived
-    /// there. Before that its x is the reported x, moved toward that of `setpoint` by at most the error of the
-    /// report.
+    /// there. Before the arrival its x is the reported x, moved toward the x of `setpoint` by at most the error of
+    /// the report.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {

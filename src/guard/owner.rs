@@ -18,7 +18,8 @@ pub(super) struct FenceOwner {
     /// x of the newest fence that this relay has announced, m; infinite before the first. The neighbour downstream
     /// stays beyond it.
     fence_m: f32,
-    /// Distance along x that this relay asks to keep before its fence, m; infinite before any request.
+    /// Distance along x that this relay asks to keep before its fence, m; infinite until this relay asks for a
+    /// distance.
     requested_m: f32,
     /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed one, or a larger one
     /// requested since. Infinity stands for the minimum separation.

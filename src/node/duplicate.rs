@@ -89,14 +89,14 @@ pub(crate) struct IndexClaims {
     number: u32,
     /// Largest claim number received from another node with the same node number and epoch.
     rival: u32,
-    /// Last claim number received from another node with the same node number; 0 before any.
+    /// Last claim number received from another node with the same node number; 0 if none has been received.
     last_rival: u32,
-    /// Last contact with another node of this node number: its time, and a flag. `None` before any. The flag is true
-    /// if this relay already had a position at the first contact. `None` before any.
+    /// Last contact with another node of this node number: its time, and a flag. The flag is true if this relay
+    /// already had a position at the first contact. `None` without a contact.
     contest: Option<(Instant, bool)>,
     /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received one of its own frames; `None` before any.
+    /// Time at which this relay last received one of its own frames; `None` if none has been received.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,

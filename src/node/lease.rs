@@ -89,7 +89,8 @@ pub(crate) struct Lease {
     circulation: Circulation,
     /// Orders of the leader in the last renewal of this view.
     orders: Orders,
-    /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
+    /// Requests that the last completed renewal of this view has collected, from the last relay to this relay. `None`
+    /// until a renewal is completed.
     requests: Option<Requests>,
     /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
     departures: [Departures; DEPARTURES as usize],

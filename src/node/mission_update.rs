@@ -51,9 +51,9 @@ struct Asked {
 /// State of this relay's mission offers on one side, to the neighbour and to the ground station.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Nonce in the neighbour's last hello, 0 before any. An offer to the neighbour repeats it.
+    /// Nonce in the neighbour's last hello, 0 without a hello. An offer to the neighbour repeats this nonce.
     nonce: u16,
-    /// Time at which the neighbour's last hello was received; `None` before any.
+    /// Time at which the neighbour's last hello was received; `None` without a hello.
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
@@ -445,8 +445,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Replaces the Tx and Rx positions in use by those of the stored mission, which becomes active. Returns true if
-    /// the positions have changed, which makes all relay positions invalid.
+    /// Replaces the Tx and Rx positions in use by the positions of the stored mission, which becomes active. Returns
+    /// true if the positions have changed, which makes all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();

@@ -87,7 +87,7 @@ pub(crate) struct Reporting {
     position: Option<(Instant, Placement)>,
     /// Control state of the drone, from 1; 0 without an autopilot.
     control: u16,
-    /// Last measured interference, W; 0 before any.
+    /// Last measured interference, W; 0 without a measurement.
     power_w: f32,
     /// Time of the state in the last own entry.
     reported: Instant,
@@ -451,8 +451,9 @@ impl Reporting {
         true
     }
 
-    /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
-    /// else the oldest one, is dropped. Returns true if the entry begins an alarm.
+    /// Stores an entry if it is newer than the stored entry of the same relay. If the store is full, the oldest entry
+    /// that was already sent is dropped; if none was sent, the oldest entry. Returns true if the entry begins an
+    /// alarm.
     fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
         let mut stored = Stored {
             entry,
@@ -619,7 +620,8 @@ const fn from_end(member: &Member, side: Side) -> u16 {
 
 /// Returns the assumed bytes that a relay sends in a period. `distance` is its distance from the station, in numbers.
 ///
-/// These are its own entry, and those of the relays four, eight and so on numbers farther from the station.
+/// These bytes are the relay's own entry, and the entries of the relays that are 4, 8, 12 and so on numbers farther
+/// from the station.
 const fn load(member: &Member, distance: u16) -> u32 {
     let behind = member.all.saturating_sub(distance) / CANDIDATES;
     SHARE * (behind as u32 + 2)
@@ -632,7 +634,8 @@ const fn all_loads(member: &Member) -> u32 {
     SHARE * (2 * all + fours * (2 * fours).saturating_sub(2) + rest * fours)
 }
 
-/// Returns the time between two reports of a relay. On wires it is that of the relay nearest to the station, which has the most to send.
+/// Returns the time between two reports of a relay. On wires the result is the time of the relay nearest to the
+/// station, because this relay has the most to send.
 fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     let bytes = match member.settings.wiring {
         Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve

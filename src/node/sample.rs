@@ -39,8 +39,8 @@ pub enum Sample {
     /// [`Listen`](crate::sensing::Listen). It excludes the signals of the chain, and includes the receiver's noise,
     /// which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
-        /// Position of the drone at the measurement. Each coordinate differs from that of Tx by at most 100 times the
-        /// distance from Tx to Rx.
+        /// Position of the drone at the measurement. Each coordinate differs from the coordinate of Tx by at most 100
+        /// times the distance from Tx to Rx.
         at: Placement,
         /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
@@ -406,7 +406,7 @@ impl Findings {
 /// Adds the power that a ground station (Tx or Rx) has measured to that station's `average`. Returns false if the
 /// power is not above the noise.
 ///
-/// `heard_w` is the measured power less the receiver noise, W; `None` if it is not above the noise.
+/// `heard_w` is the measured power minus the receiver noise, W; `None` if the power is not above the noise.
 fn take_level(
     average: &mut Average,
     now: Instant,

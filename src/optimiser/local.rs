@@ -45,7 +45,7 @@ pub enum Local {
     Fine,
     /// Search on the paper's grid of positions, with `columns` times `rows` evaluations of both hops.
     Grid {
-        /// Number of positions of the grid along x, including those of the neighbours, 2 to 255.
+        /// Number of positions of the grid along x, including the positions of the neighbours, 2 to 255.
         columns: u8,
         /// Number of altitudes (rows) in the grid of candidate positions, 2 to 255.
         rows: u8,
@@ -258,8 +258,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. An altitude
-    /// takes 24 evaluations, for traffic in both directions 194.
+    /// Continues the search by at most `budget` evaluations of both hops, plus the evaluations of one altitude. One
+    /// altitude takes 24 evaluations, or 194 for traffic in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -438,8 +438,8 @@ mod tests {
     use crate::place::Placement;
 
     /// Returns a search by a relay between two neighbours 100 m apart, for the tests. `altitude_m` is the relay's
-    /// altitude, and `beside_m` that of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
-    /// altitudes, m.
+    /// altitude, and `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band` the
+    /// allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

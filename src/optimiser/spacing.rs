@@ -189,7 +189,7 @@ impl Hop {
 
     /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to that of Rx. The result is rounded
+    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to the x of Rx. The result is rounded
     /// toward the sender, so it meets the target as an f32. Constant work; with noise at most 96 evaluations of the
     /// hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {

@@ -512,8 +512,8 @@ impl Track {
         at: None,
     };
 
-    /// Updates the track with a source found from measurements with the mean time `at`. `half_life` is that of the
-    /// measurements' weight.
+    /// Updates the interferer's track with a position found from measurements with the mean time `at`. `half_life` is
+    /// the half-life of the measurements' weight.
     pub(crate) fn update(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]

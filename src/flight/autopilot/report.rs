@@ -309,8 +309,8 @@ pub enum AutopilotEvent {
     /// Report of the autopilot that the drone is outside of the autopilot's fence.
     FenceBreached,
     /// Drone so far from the line Tx to Rx that it has no position in the mission's coordinates. Check that the
-    /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
-    /// s in the air.
+    /// configured positions of Tx and Rx belong to this flight. This event is reported once on the ground and at most
+    /// once in 10 s in the air.
     OffLine(OffLine),
     /// The link accepted an operator's command that reports the lost relays of one side as landed. The command came over MAVLink.
     /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.

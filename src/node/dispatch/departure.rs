@@ -76,7 +76,7 @@ pub(crate) struct Leaving {
     free: bool,
     /// Time of the first order to leave since the request; `None` before.
     ordered_at: Option<Instant>,
-    /// Last reported position of the drone; `None` before any.
+    /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
     /// Position to arrive at; `None` before the first agreement, and while the setpoint moves.
     goal: Option<Placement>,

@@ -90,7 +90,7 @@ pub(crate) struct Liveness {
     lost: bool,
     /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.
     was_received: bool,
-    /// Number of the last heartbeat request to the neighbour, 0 before any.
+    /// Number of the last heartbeat request to the neighbour, 0 if none was sent.
     request_number: u16,
     /// Times of the last heartbeat requests, latest first.
     request_times: [Instant; REMEMBERED_REQUESTS],

@@ -75,7 +75,8 @@ pub(crate) struct Neighbour {
     /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
     /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` before any.
+    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` if there was no
+    /// such frame.
     unselected_at: Option<Instant>,
     /// Nodes on this side of the relay from which it has recently received frames.
     pub(super) hearing: Hearing,
@@ -744,9 +745,9 @@ impl Neighbour {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
-    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers. `None` if no
-    /// heartbeat is pending.
+    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is the number
+    /// of this relay's request to the neighbour. The second number is the number of the neighbour's request that the
+    /// heartbeat answers. `None` if no heartbeat is pending.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

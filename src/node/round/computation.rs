@@ -210,8 +210,8 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if no target is feasible
-    /// at those of the joint method.
+    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if
+    /// no target is feasible at the lateral offsets and altitudes of the joint method.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
@@ -451,7 +451,7 @@ impl LeaderTask {
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true if the configured altitudes are used because those of the joint method failed.
+    /// true if the configured altitudes are used because the altitudes of the joint method failed.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,

@@ -183,8 +183,8 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received pass message by its `number`. `same` is true if its content equals that of the current
-    /// pass.
+    /// Classifies a received pass message by its `number`. `same` is true if the message has the same content as the
+    /// current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones; it requests a new view.
@@ -213,7 +213,7 @@ impl RoundState {
         }
     }
 
-    /// Returns true if `number` is that of the current pass, and its result has not arrived yet.
+    /// Returns true if `number` is the number of the current pass, and the result of this pass has not arrived yet.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }

@@ -125,13 +125,13 @@ impl ViewChange {
         self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
-    /// Returns the last view proposal that this relay has voted on; `None` before any.
+    /// Returns the last view proposal that this relay has voted on; `None` if there is none.
     pub(crate) const fn proposed(&self) -> Option<Proposed> {
         self.proposed
     }
 
-    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` before any. Ranks
-    /// count from 1 at the leader.
+    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` without a proposal.
+    /// Ranks count from 1 at the leader.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))

@@ -31,8 +31,8 @@ pub(crate) struct Outlook {
 impl Outlook {
     /// Returns the slack of a chain whose last relay is at `at`, m, and its derivatives.
     ///
-    /// The slack is `reach_m`, the maximum length of the last hop, less that hop's length. Rx is at x = `distance_m`;
-    /// an x beyond Rx counts as the x of Rx.
+    /// The slack is `reach_m`, the maximum length of the last hop, minus the length of this hop. Rx is at x =
+    /// `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -70,9 +70,9 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (chain's slack) of a hop's receiver to that of the hop's sender. Returns the receiver's policy: its move
-    /// in two coordinates, within [`low`, `high`], m, relative to its present position. The third coordinate, `axis`, then follows from the
-    /// hop's maximum length.
+    /// Converts the value function (chain's slack) of a hop's receiver to the value function of the hop's sender.
+    /// Returns the receiver's policy: its move in two coordinates, within [`low`, `high`], m, relative to its present
+    /// position. The third coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -153,8 +153,8 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 
 /// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
 ///
-/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on that of
-/// the sending relay, the next one toward Tx.
+/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the
+/// move of the sending relay, the next relay toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,

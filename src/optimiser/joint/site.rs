@@ -72,7 +72,7 @@ impl<'a> Site<'a> {
     /// Returns the position of largest x that meets `target` with the lateral offset and altitude `wanted`.
     ///
     /// The sender is at x = `from_m`. If the hop cannot reach `wanted`, the closest lateral offset and altitude that
-    /// it can reach are used. `None` if no hop meets the target. The x is at most that of Rx.
+    /// it can reach are used. `None` if no hop meets the target. The x is at most the x of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -521,8 +521,9 @@ impl Site<'_> {
 
     /// Computes the policy (the move) of the relay at `to`, and the value function of its sender at `from`.
     ///
-    /// `outlook` is the value function of the relay, and becomes that of the sender. The move is limited to `trust`
-    /// times the relay's distance from the interferer. Work: some 400 multiplications and two square roots.
+    /// `outlook` is the value function of the relay, and becomes the value function of the sender. The move is
+    /// limited to `trust` times the relay's distance from the interferer. Work: some 400 multiplications and two
+    /// square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,

@@ -84,8 +84,8 @@ pub enum EdgeCoordinate {
     Upward = 6,
 }
 
-/// Edge of the box in which a relay may be. On it the coordinate `free` varies within `room`, m, and the other two
-/// are those of `through`.
+/// Edge of the box in which a relay may be. On this edge the coordinate `free` varies within `room`, m. The other two
+/// coordinates are constant, as in the point `through`.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,
@@ -374,8 +374,8 @@ struct Face {
 }
 
 impl Face {
-    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane. The result is its x
-    /// less that of Rx, m. `r` is the radius of the circle, m.
+    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane. The result is the x of
+    /// this point minus the x of Rx, m. `r` is the radius of the circle, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);

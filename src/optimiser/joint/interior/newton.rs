@@ -26,7 +26,7 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest pivot that counts as positive, relative to the diagonal element before any elimination.
+/// Smallest pivot that counts as positive, divided by the diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
 /// Curvature of a coordinate whose two limits are equal. It is so large that the Newton step does not move it.
@@ -101,8 +101,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of that relay, and on
-    /// return those of the node at `spot`, where `hop` ends.
+    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of this relay; on return
+    /// `self` has the rows of the node at `spot`, where `hop` ends.
     ///
     /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
     /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.

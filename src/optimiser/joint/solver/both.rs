@@ -330,7 +330,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, has the description of chain 1, of which it only uses `along`: the x are those of Algorithm 1.
+    /// altitude, has the description of chain 1. Chain 0 uses only `along` of this description: the x come from
+    /// Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
@@ -358,7 +359,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Chooses the positions at which the interior-point method starts, and starts it. The lateral offsets and
-    /// altitudes are the stored ones. Each x is that of Algorithm 1, or evenly spaced. The first `done` relays have
+    /// altitudes are the stored ones. The x come from Algorithm 1, or are evenly spaced. The first `done` relays have
     /// their positions already.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
@@ -521,8 +522,8 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
     [a / radius, b / radius]
 }
 
-/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
-/// meets at the last run's lateral offsets and altitudes, less the target of that run.
+/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is a difference: the target that
+/// Algorithm 1 meets at the last run's lateral offsets and altitudes, minus the target of the last run.
 const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;

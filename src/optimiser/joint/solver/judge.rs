@@ -376,8 +376,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they are those of a new
-    /// initial chain, else the stored ones.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they come from a new initial
+    /// chain, otherwise from the stored chain.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,
