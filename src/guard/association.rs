@@ -158,8 +158,9 @@ impl Association {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
-    /// Returns a new association (session) in place of this one, which this relay has left. It includes a leave
-    /// notice if the neighbour has sent its number for the old association, because the neighbour then relies on it.
+    /// Returns a new association (session) in place of the old one, which this relay has left. If the neighbour has
+    /// sent its number for the old association, it still relies on the old association. The new association then
+    /// includes a leave notice.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,

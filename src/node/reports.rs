@@ -93,7 +93,7 @@ pub(crate) struct Reporting {
     reported: Instant,
     stored: Vec<Stored, STORED>,
     watched: [Watched; 2],
-    /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
+    /// Time of the last call of `handle_timeout`. Timers that were due at that time are left out of the next timeout.
     checked: Instant,
 }
 
@@ -140,7 +140,7 @@ struct Watched {
     unconfirmed: u8,
     /// Node to which a handshake is due that requests a reply.
     to_greet: Option<NonZeroU16>,
-    /// Time of the next report, at least `free`.
+    /// Time at which the next report must be sent; not earlier than `free`.
     due: Instant,
     /// Time from which the share of the channel allows a report.
     free: Instant,

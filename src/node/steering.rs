@@ -53,7 +53,8 @@ impl Way {
         motion: None,
     };
 
-    /// Moves the place to fly to by the steps that are due toward the position `agreed`, and returns it.
+    /// Advances the position to fly to at `now`, and returns it; `None` without an agreed position. If the agreed
+    /// position `agreed` has changed, the position to fly to moves there in small steps within the time `span`.
     fn advance(
         &mut self,
         now: Instant,

@@ -295,8 +295,9 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns the altitude at the fraction `part`, 0 to 1, of the range that the current round tries, m. It is
-    /// at most the highest altitude of that range, in spite of rounding.
+    /// Returns an altitude in the range that the current round tries, m. `part` is the altitude's place in this
+    /// range: 0 is the lowest altitude, 1 the highest. The result never exceeds the highest altitude, in spite of
+    /// rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }

@@ -53,7 +53,7 @@ fn nearest_on(outline: &[[f64; 2]], at: [f64; 2]) -> Option<[f64; 2]> {
     on_edge.min_by(|a, b| far(a).total_cmp(&far(b)))
 }
 
-/// Returns true if the polygon winds around `at`. Not the method of the planner.
+/// Returns true if the polygon contains `at`, by its winding number. The planner uses another method.
 fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
     let angle = |i: usize| {
         let [x, y] = outline[i % outline.len()];

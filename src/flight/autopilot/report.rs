@@ -225,7 +225,7 @@ impl Report {
         None
     }
 
-    /// Sets the numbers to send to the operator; `None` for unknown ones. They are the SIR, dB, and the relay's position.
+    /// Sets the numbers to send to the operator: the SIR, dB, and the relay's position. `None` for an unknown number.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -292,7 +292,7 @@ pub enum AutopilotEvent {
     Found(Kind),
     /// The autopilot has restarted.
     Restarted,
-    /// The control state has changed to this one: see [`State`].
+    /// New control state of the drone: see [`State`].
     State(State),
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.

@@ -613,8 +613,8 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, the relays
-    /// that count as members of such a view must not be more than its number of relays.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. No such view may
+    /// have more member relays than its number of relays.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {

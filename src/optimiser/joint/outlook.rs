@@ -24,7 +24,8 @@ pub(crate) struct Outlook {
     /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of their computed moves that this relay
     /// and the relays toward Rx make.
     pub(crate) linear: f32,
-    /// Coefficient b of that gain, m.
+    /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of the moves, as for
+    /// `linear`.
     pub(crate) square: f32,
 }
 
