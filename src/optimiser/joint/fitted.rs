@@ -168,8 +168,8 @@ enum Work {
     /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
     /// the next node to process: 1 for the first relay, N + 1 for Rx.
     Pass(u16),
-    /// Backward pass, from the last relay to the first: moves each relay as the best combination requires. The fields
-    /// are the next relay to move, and the index of its move in [`MOVES`].
+    /// Backward pass, from the last relay to the first: moves each relay as the best combination of moves requires.
+    /// The fields are the next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
     /// Summation of the hop times of the best chain, and search for its worst SIR. The field is the next node.
     Sum(u16),
@@ -182,10 +182,10 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. In the end their first two values are replaced by the sums of the hop times up to
-    /// each relay, toward Rx and back.
+    /// Positions of the best chain. At the end of the search the x and y of each relay are replaced by two sums of
+    /// hop times, from Tx up to this relay: toward Rx, and back.
     best_places: [Triple; RELAYS],
-    /// Best state of the previous relay for each of a relay's five states: three bits per choice.
+    /// Best state of the previous relay for each of a relay's five states: three bits per state.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
@@ -199,9 +199,9 @@ pub(super) struct Fitted<const RELAYS: usize> {
     time: f32,
     /// Total hop time of the chain before the current round of passes.
     before: f32,
-    /// Total hop time of the best chain found; 0 before the first.
+    /// Total hop time of the best chain found; 0 until a chain is found.
     best: f32,
-    /// Sums of the hop times of the solved chain, toward Rx and back.
+    /// Sum of all hop times of the solved chain, toward Rx and back to Tx.
     sums: [f32; 2],
     worst: f32,
 }
@@ -317,7 +317,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index` moved by `by` along the current coordinate. The node stays within its
+    /// Returns the position of node `index`, moved along the current coordinate by `by`. The node stays within its
     /// limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
@@ -465,8 +465,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns two bounds of slots of hop `hop`, as shares of the frame. They are the end of its slot toward Rx, and
-    /// the begin of its slot back. For hop 0 these are 0 and 1; `hop` is at most N + 1.
+    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are shares of the
+    /// frame, 0 to 1. For hop 0 these are 0 and 1; `hop` is at most N + 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
