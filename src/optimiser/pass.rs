@@ -27,8 +27,7 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only for data in both
-/// directions.
+/// Maximum number of positions that the last relay tries to receive Rx well enough, with data in both directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of points of an interference field that one call evaluates. One target may need more.
@@ -75,8 +74,8 @@ pub struct Link<'a> {
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
     /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// x that this relay takes for every target that its hop meets there, m. Only for fitted slots (time slots as long
-    /// as each hop needs); else `None`.
+    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets at this x. `None` unless
+    /// the mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
@@ -95,11 +94,11 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends to `reaches` this relay's reaches for those `targets` that have none in the list yet.
+    /// Appends to `reaches` this relay's reaches for all `targets` whose reach is not in the list yet.
     ///
-    /// `targets` rises, and entry i of each list belongs to target i. `from` has the reaches of the previous relay of
-    /// the pass, m. The list ends before the first target that cannot be met. Work for each target: one computation
-    /// of a hop; in an interference field, up to three for each point of the field.
+    /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
+    /// previous relay of the pass, m. The list ends before the first target that cannot be met. Work for each target:
+    /// one computation of a hop; in an interference field, up to three for each point of the field.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -143,7 +142,8 @@ impl<'a> Link<'a> {
     }
 
     /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
-    /// computes 16 of them, or in an interference field as many as take 128 evaluations of its points, at least one.
+    /// computes 16 reaches. In an interference field it computes as many reaches as take 128 evaluations of the
+    /// field's points, but at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -158,8 +158,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. It must
-    /// meet it in both directions, and two relays must be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
+    /// meet `target` in both directions, and two relays must be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -229,8 +229,8 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay for which its own x can be smallest. The hop's receiver is at x from `low` to
-    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop with which the x of this relay, its sender, is smallest. The hop's receiver is at x from `low`
+    /// to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -314,8 +314,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to this relay, and `slack`
-    /// returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if it would receive Rx too weakly there.
+    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to
+    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach`
+    /// if its SIR from Rx would be too low at `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -346,12 +347,11 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the relay before this one on the pass must take to meet `target`. This relay is at x =
-    /// `place`.
+    /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the relay before it on the pass. `None` if that relay has no such position. The
-    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two reaches,
-    /// in an interference field by three for each of its points.
+    /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
+    /// position. The search assumes that its possible positions are an interval, although there may be holes. Bounded
+    /// by two reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -430,10 +430,11 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
-    /// goes on.
+    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this
+    /// target. `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m. It is 0 or more if the chain meets the target.
+    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
+    /// target.
     pub slacks: PerTarget,
 }
 
@@ -468,9 +469,9 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest one that is met (slack of 0 or more); 0 if none is. If every relay
-/// has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some may
-/// be missed, and the highest one still counts.
+/// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
+/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different
+/// altitudes, a lower target may be missed; it counts all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -548,13 +549,13 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         self.closes() && (self.plainly().closes() || self.place(0).is_some())
     }
 
-    /// Returns true if the reaches of a pass end within the last hop.
+    /// Returns true if the chain meets its target with every relay at its reach: the last hop is short enough.
     pub(crate) fn closes(&self) -> bool {
         self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
     }
 
     /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
-    /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
+    /// belongs to no relay. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -584,7 +585,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 
     /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
-    /// to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
+    /// to no relay. With index 0 the result is `Some` if all relays can take their positions, else `None`.
     pub(crate) fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
@@ -606,11 +607,13 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes the position of every relay, from the last one of the pass back. The last one is at x = `place`, m.
+    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
+    /// x = `place`, m.
     ///
-    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
-    /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
-    /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
+    /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. `visit` returns
+    /// the reach of this previous relay, m; for the index `None` it returns the x at which the pass starts. The
+    /// result of `settle` is the x at which the pass starts. It is `None` if some relay cannot take its required
+    /// position, or if `visit` returns `None`.
     pub(crate) fn settle(
         &self,
         place: f32,

@@ -82,8 +82,8 @@ fn best_of(two: &Two, low: f32, high: f32) -> Found {
 
 /// Returns the optimal position of a relay with `profile` between Tx and Rx; `None` without a field.
 ///
-/// Within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops per field point; not for a relay's main
-/// loop.
+/// The SIR is within 1e-5 of the best SIR, relative. Work: at most 260 evaluations of both hops per field point; not
+/// for a relay's main loop.
 pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     let field = mission.heard()?;
     let two = Two::new(mission, profile);
@@ -113,8 +113,8 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
 }
 
 /// Returns both extrema of the first hop's mean SIR along x, ascending, m. Upsilon = E[1/I] is linear in [`low`,
-/// `high`]: for Upsilon = a + b x they are the roots of b x^2 + 2 a x - b h^2 = 0, with the altitude h. `high` twice
-/// if Upsilon is constant.
+/// `high`]: for Upsilon = a + b x the extrema are the roots of b x^2 + 2 a x - b h^2 = 0, with the altitude h. If
+/// Upsilon is constant, both results are `high`.
 fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
     let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
     let b = (at_high - at_low) / (high - low);
@@ -134,7 +134,7 @@ fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] 
 /// a field.
 ///
 /// It only evaluates positions where the second hop's mean SIR is one of its targets, so it may miss the optimum of a
-/// field that changes much between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// field that changes much between two of these positions. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two::new(mission, profile);
