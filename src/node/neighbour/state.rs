@@ -546,20 +546,20 @@ impl Neighbour {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that a view proposal was granted, on the side to which it was forwarded. If the chain `ends` here,
-    /// this side has no neighbour in the view.
+    /// Records that a view proposal was granted, on the side to which it was forwarded. If `ends` is true, the chain
+    /// ends at this relay, and this side has no neighbour in the view.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is a membership
-/// of the chain.
+/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is the agreed
+/// list of the chain's members.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view (agreed members of the chain).
     in_view: u16,
-    /// Neighbour at the last decision on a view proposal, granted or refused.
+    /// Neighbour at the last decision on a view proposal, whether the proposal was granted or refused.
     counted: u16,
     /// Node from which the last view proposal was received; 0 if this relay made it.
     proposer: u16,
@@ -681,7 +681,8 @@ impl Neighbour {
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` relays away. `taken` is true if it is the selected neighbour.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if this node is the selected
+    /// neighbour.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -705,21 +706,21 @@ impl Neighbour {
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Records a report of the node `distance` relays away: `received` is true if it receives this relay. Returns
-    /// true at exactly [`NOT_RECEIVED`] reports in a row that it does not.
+    /// Records a report of the node `distance` relays away: `received` is true if the node receives this relay.
+    /// Returns true, once, when [`NOT_RECEIVED`] reports in a row state that the node does not receive this relay.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
     /// Returns true if the mission mismatch of the node `distance` relays away must be reported now.
     ///
-    /// It is reported at most once a minute for each node.
+    /// The mismatch is reported at most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.mismatches.should_report(distance, now)
     }
 
-    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true at exactly
-    /// [`FORGED`] of them in a row.
+    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true, once,
+    /// when [`FORGED`] such handshakes were received in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
@@ -732,15 +733,16 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// Records the number of a heartbeat request of the neighbour, 0 for none. The next heartbeat answers it.
+    /// Records the number of a heartbeat request of the neighbour, 0 for none. The next heartbeat answers this
+    /// request.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;
         }
     }
 
-    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if it is
-    /// too old.
+    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if the
+    /// request is too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }

@@ -101,8 +101,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
-    /// first and after the last of those relays the altitude is constant if `level` is true. Otherwise it falls to the
+    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. If `level` is
+    /// true, the altitude is constant before the first and after the last of these relays. Otherwise it falls to the
     /// band's lowest altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
@@ -255,9 +255,10 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
+    /// First derivatives of the chain's slack with respect to the x, y and h of the segment's last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack with respect to the coordinates of the segment's last relay, 1/m. The
+    /// order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

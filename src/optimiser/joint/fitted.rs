@@ -26,11 +26,13 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions per relay that a pass combines: the current one and two on either side.
+/// Number of positions of each relay that a pass of the solver combines: the current position, and two positions on
+/// either side.
 const STATES: usize = 5;
-/// Moves of a relay that a pass tries, in units of the current step width. The first one is preferred among equals.
+/// Moves of a relay that a pass of the solver tries, in units of the current step width. Of equally good moves the
+/// first in this list is preferred.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits in which a relay's choice among the states of the relay before it is stored.
+/// Number of bits to store one choice among the five states of the previous relay.
 const BITS: usize = 3;
 
 /// Step width at which the search from one initial chain ends, in units of D.
@@ -60,13 +62,14 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Number of the initial chain that starts from the best one along the line. Used only if relays may leave the common
-/// altitude.
+/// Number of the initial chain that starts from the best chain along the line. This chain is used only if relays may
+/// leave the common altitude.
 const BEST: u8 = 8;
 /// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as two fractions. The first is of the largest lateral
-/// offset away from the interferer, the second of the altitude range above the common altitude.
+/// Lateral offset and altitude of further initial chains, as two fractions. The first number is a fraction of the
+/// largest lateral offset away from the interferer. The second number is a fraction of the altitude range above the
+/// common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
@@ -94,7 +97,8 @@ pub struct SlotShares {
     pub bits_per_hz: f32,
 }
 
-/// Position that is tried for a node, and the inverse interference there; 1 at Tx and Rx.
+/// Position that is tried for a node, and the inverse interference at this position. The inverse interference is 1 at
+/// Tx and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -138,8 +142,8 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times for one bit to Rx and for r bits back. Infinite if two relays are too close or in the wrong
-    /// order.
+    /// Returns the times for one bit to Rx and for r bits back. Both are infinite if two relays are too close or in
+    /// the wrong order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);

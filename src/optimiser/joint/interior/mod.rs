@@ -59,7 +59,7 @@ const ITERATIONS: u8 = 60;
 
 /// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened after an attempt that lowers the merit, the function that is maximised.
+/// Factor by which a Newton step is shortened if it lowers the merit, the function that is maximised.
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
