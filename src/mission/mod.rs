@@ -449,21 +449,21 @@ impl Mission {
         })
     }
 
-    /// Creates a mission in a `const`; an invalid parameter fails the build. Otherwise as [`Mission::try_new`].
+    /// Creates a mission in a `const`; an invalid parameter fails the build. In all other respects it is
+    /// [`Mission::try_new`].
     ///
-    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant; [`Channel::new`](crate::Channel::new), which
-    /// takes the losses as factors, 10^(dB / 10), can:
+    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant;
+    /// [`Channel::new`](crate::Channel::new), which takes the losses as factors, 10^(dB / 10), can:
     ///
     /// ```
-    /// use uav_relay::channel::AirGround;
-    /// use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+    /// use uav_relay::channel::AirGround; use uav_relay::{Band, Channel, Interference, Interferer, Mission,
+    /// MissionConfig, Profile};
     ///
-    /// // 0.1 dB and 21 dB.
-    /// const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
+    /// // 0.1 dB and 21 dB. const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los)
+    /// {
     ///     Ok(channel) => channel,
     ///     Err(_) => panic!("the channel is out of range"),
-    /// };
-    /// const MISSION: Mission = Mission::new(MissionConfig {
+    /// }; const MISSION: Mission = Mission::new(MissionConfig {
     ///     relays: 5,
     ///     distance_m: 1_000.0,
     ///     min_separation_m: 4.0,
@@ -478,8 +478,7 @@ impl Mission {
     ///     rx_power_w: 80.0,
     ///     fitted_gap: 0.0,
     ///     tolerance: 1e-4,
-    /// });
-    /// assert_eq!(MISSION.relays(), 5);
+    /// }); assert_eq!(MISSION.relays(), 5);
     /// ```
     ///
     /// A value out of range fails the build:
@@ -512,8 +511,8 @@ impl Mission {
     /// ```
     ///
     /// # Panics
-    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at run time
-    /// use [`Mission::try_new`].
+    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at
+    /// run time use [`Mission::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
@@ -540,8 +539,8 @@ impl Mission {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in an interference field. For an unknown interferer it returns a substitute far
-    /// away, with equal interference everywhere.
+    /// Returns the interferer; `None` in an interference field. For an unknown interferer the result is a substitute
+    /// far away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -615,7 +614,8 @@ impl Mission {
         }
     }
 
-    /// Returns the relay whose position is computed after that of relay `index`; `None` after the last one.
+    /// Returns the relay whose position is computed after the position of relay `index`; `None` if relay `index` is
+    /// the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -732,7 +732,7 @@ impl Mission {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Returns the number of relays whose positions are computed after that of relay `index`.
+    /// Returns the number of relays whose positions are computed after the position of relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -740,7 +740,8 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their minimum separation.
+    /// Returns the largest x of relay `index`, m, at which the relays between it and Rx still have room for their
+    /// minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -775,11 +776,11 @@ impl Mission {
 }
 
 /// Factor on the gain of the first or last hop that makes it half as long as the other hops. In the best chain all
-/// hops have the same SIR, which is gain over squared length.
+/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if its position is known; `None` for an unknown one or a field.
+    /// Returns the interferer if its position is known; `None` for an unknown interferer or a field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -790,8 +791,8 @@ impl Mission {
     /// Returns the mission with another `interference`.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` has a flag for the first hop and one for the last: true to place the relays so that this hop is half
-    /// as long as the others.
+    /// `halved` has a flag for the first hop and a flag for the last hop. If a flag is true, the relays are placed so
+    /// that this hop is half as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -833,8 +834,8 @@ pub(super) const FAR: Interferer = Interferer {
 const FAR_AWAY: f64 = 1e-14;
 
 /// Returns three gains, for an unknown interferer, with which hops of equal length are best. They are the gain of the
-/// first hop, and the gains per watt of the other hops and of the last hop. With relays of `power_w`, W, every hop of
-/// length d has the SIR (`distance_m` / d)^2.
+/// first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the transmit power of the
+/// relays, W. With these gains every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;
