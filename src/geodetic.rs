@@ -5,7 +5,7 @@
 
 /// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
-/// A step of 1 in `lat_e7` is 1.1 cm on the ground, a step of 1 in `lon_e7` at most that.
+/// A step of 1 in `lat_e7` is 1.1 cm on the ground, a step of 1 in `lon_e7` at most 1.1 cm.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geodetic {

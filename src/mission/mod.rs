@@ -53,15 +53,16 @@ pub struct MissionConfig {
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 is one
-    /// direction only, as in the paper; above 0 the worse of the SIR and the backward SIR / r counts,
-    /// once the interference is known.
+    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 means
+    /// one direction only, as in the paper. Above 0, the worse of two SIRs counts, once the interference is known:
+    /// the forward SIR, and the backward SIR divided by r.
     pub reverse: f32,
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
     /// 0.
     pub rx_power_w: f32,
-    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, the joint method maximises the data rate of slots
-    /// as long as each hop needs, whose spectral efficiency is log2(1 + SINR / gap).
+    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, each time slot is as long as its
+    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is log2(1 + SINR /
+    /// gap).
     pub fitted_gap: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
