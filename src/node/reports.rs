@@ -344,9 +344,10 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 60 s after the last request, and forgets destinations.
+    /// Ends the reports 60 s after the last request for them, and drops silent destinations.
     ///
-    /// A destination is forgotten if it has sent no request for 25 s, or as a relay nothing at all for 2.5 s.
+    /// A destination is dropped if it has sent no request for 25 s. A destination that is a relay is also dropped if
+    /// it has sent no frame for 2.5 s.
     fn expire(&mut self, now: Instant, member: &Member) {
         let is_unheard =
             now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
