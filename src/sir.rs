@@ -35,9 +35,9 @@ use crate::root::{PowerRatio, Real, bisected, sqrt};
 
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
-/// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
-/// interferer at (X, Y) it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). For interference that
-/// the mission gives as a distribution along x, it is Upsilon(x) / `Upsilon_max`, with noise.
+/// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of
+/// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu
+/// s). In an interference field the factor is Upsilon(x) / `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -117,8 +117,8 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. It is the paper's `SIR_{N+1}`:
-/// [`Mission::receiver_gain`] over the squared distance from the relay to Rx.
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. This is `SIR_{N+1}` of the paper:
+/// [`Mission::receiver_gain`] divided by the squared distance from the relay to Rx.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
@@ -131,7 +131,8 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K over the squared length of the hop.
+/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K divided by the squared length of the
+/// hop.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"
@@ -231,7 +232,7 @@ pub struct Slope<T> {
     pub a: T,
     /// Squared distance of the line from Tx, m^2.
     pub b: T,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2.
     pub noise: T,
     /// Number of bisection steps for each extremum.
     pub halvings: u8,

@@ -27,8 +27,7 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only for data in both
-/// directions.
+/// Maximum number of positions that the last relay tries to receive Rx well enough, with data in both directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of points of an interference field that one call evaluates. One target may need more.
@@ -75,8 +74,8 @@ pub struct Link<'a> {
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
     /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// x that this relay takes for every target that its hop meets there, m. Only for fitted slots (time slots as long
-    /// as each hop needs); else `None`.
+    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets at this x. `None` unless
+    /// the mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
@@ -95,11 +94,11 @@ pub fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends to `reaches` this relay's reaches for those `targets` that have none in the list yet.
+    /// Appends to `reaches` this relay's reaches for all `targets` whose reach is not in the list yet.
     ///
-    /// `targets` rises, and entry i of each list belongs to target i. `from` has the reaches of the previous relay of
-    /// the pass, m. The list ends before the first target that cannot be met. Work for each target: one computation
-    /// of a hop; in an interference field, up to three for each point of the field.
+    /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
+    /// previous relay of the pass, m. The list ends before the first target that cannot be met. Work for each target:
+    /// one computation of a hop; in an interference field, up to three for each point of the field.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -143,7 +142,8 @@ impl<'a> Link<'a> {
     }
 
     /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
-    /// computes 16 of them, or in an interference field as many as take 128 evaluations of its points, at least one.
+    /// computes 16 reaches. In an interference field it computes as many reaches as take 128 evaluations of the
+    /// field's points, but at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -158,8 +158,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. It must
-    /// meet it in both directions, and two relays must be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
+    /// meet `target` in both directions, and two relays must be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -229,8 +229,8 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay for which its own x can be smallest. The hop's receiver is at x from `low` to
-    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop with which the x of this relay, its sender, is smallest. The hop's receiver is at x from `low`
+    /// to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -253,9 +253,10 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// `reach` is this relay's reach, and `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere.
-    /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at the
-    /// x that maximises it.
+    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if Rx is out of reach from
+    /// everywhere. For a pass toward Rx the slack is `reach` plus the maximum length of the last hop, minus D. For a
+    /// pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x is chosen so that
+    /// the slack is largest.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -313,8 +314,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to this relay, and `slack`
-    /// returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if it would receive Rx too weakly there.
+    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to
+    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach`
+    /// if its SIR from Rx would be too low at `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -345,12 +347,11 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the relay before this one on the pass must take to meet `target`. This relay is at x =
-    /// `place`.
+    /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the relay before it on the pass. `None` if that relay has no such position. The
-    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two reaches,
-    /// in an interference field by three for each of its points.
+    /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
+    /// position. The search assumes that its possible positions are an interval, although there may be holes. Bounded
+    /// by two reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -413,8 +414,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are that
-/// relay's reaches, and `from` those of the relay before it on the pass, m.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the
+/// reaches of this last relay, and `from` the reaches of the relay before it on the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -429,10 +430,11 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
-    /// goes on.
+    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this
+    /// target. `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m. It is 0 or more if the chain meets the target.
+    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
+    /// target.
     pub slacks: PerTarget,
 }
 
@@ -467,9 +469,9 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest one that is met (slack of 0 or more); 0 if none is. If every relay
-/// has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some may
-/// be missed, and the highest one still counts.
+/// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
+/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different
+/// altitudes, a lower target may be missed; it counts all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -529,7 +531,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 
     /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
-    /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
+    /// belongs to no relay. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -581,7 +583,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes the position of every relay, from the last one of the pass back. The last one is at x = `place`, m.
+    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
+    /// x = `place`, m.
     ///
     /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
     /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
