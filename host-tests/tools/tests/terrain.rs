@@ -792,6 +792,84 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     assert!(!Path::new(&path("three.toml")).exists());
 }
 
+/// Checks that a plan says without `--out`, too, whether its relays can fly it.
+#[test]
+fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let of = |more: &str| run(&format!("--scenario {EXAMPLE} --altitude terrain {more}"));
+    let (status, table, line) = of("--uavs 3");
+    let blocked =
+        "at the positions on which 3 relays would agree, hop 4 (relay 3 to Rx) is blocked";
+    assert!(
+        status == Some(1) && line.contains(blocked) && line.contains("give another --uavs"),
+        "{line}"
+    );
+    assert!(table.contains("simulated flight: worst hop "), "{table}");
+    let (status, json, _) = of("--uavs 3 --json");
+    let report: Value = serde_json::from_str(&json).unwrap();
+    assert!(status == Some(1) && report["error"].as_str().unwrap().starts_with(blocked));
+    assert_eq!(report["flight"]["relays"].as_array().unwrap().len(), 3);
+    let (status, _, line) = of("--uavs 3 --allow-blocked");
+    assert_eq!((status, line.as_str()), (Some(0), ""));
+    // The same flight as with a file.
+    let [(status, json, _), (_, written, _)] =
+        [String::new(), format!(" --out {}", path("four.toml"))]
+            .map(|out| of(&format!("--uavs 4 --json{out}")));
+    let [alone, written] =
+        [json, written].map(|json| -> Value { serde_json::from_str(&json).unwrap() });
+    assert_eq!(status, Some(0));
+    assert!(alone["flight"].is_object() && alone == written, "{alone}");
+    // Relays that compute with one hypothetical interferer fly to other positions than those of the plan.
+    let text = std::fs::read_to_string(EXAMPLE).unwrap();
+    let hills = std::path::absolute("../../examples/hills.tif").unwrap();
+    let text = text.replace("hills.tif", hills.to_str().unwrap());
+    let text = text
+        .replace("\naltitude_m = 60.0", "\naltitude_m = 150.0")
+        .replace("max_m = 120.0", "max_m = 300.0");
+    let (sections, _) = text.split_once("[[interferer]]").unwrap();
+    let interferer = |places: &[[f64; 2]]| {
+        let each = places
+            .iter()
+            .map(|[x, y]| format!("[[interferer]]\npower_w = 2.0\nx_m = {x}\ny_m = {y}\n"));
+        format!("{sections}{}", each.collect::<String>())
+    };
+    std::fs::write(
+        path("two.toml"),
+        interferer(&[[500.0, 900.0], [4500.0, 900.0]]),
+    )
+    .unwrap();
+    let (_, json, line) = run(&format!(
+        "--scenario {} --uavs 4 --altitude given --allow-blocked --json",
+        path("two.toml")
+    ));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let x = |at: &Value| at["x_m"].as_f64().unwrap();
+    let places = report["relays"].as_array().unwrap().iter();
+    let flown = report["flight"]["relays"].as_array().unwrap().iter();
+    let off_m = places
+        .zip(flown)
+        .map(|(plan, flown)| (x(plan) - x(flown)).abs());
+    assert!(off_m.fold(0.0, f64::max) > 1.0, "{json} {line}");
+    // An area has no position with which relays could compute.
+    let area = "[[interferer]]\npower_w = 2.0\narea = { circle = [2000, 1500, 200] }\n";
+    std::fs::write(path("area.toml"), format!("{sections}{area}")).unwrap();
+    let area = format!(
+        "--scenario {} --uavs 4 --altitude terrain",
+        path("area.toml")
+    );
+    let why = "relays compute with one position of an interferer, and this scenario has an interferer.area";
+    let (status, table, line) = run(&area);
+    assert!(
+        status == Some(0)
+            && table.contains(&format!("flight over the terrain not simulated: {why}")),
+        "{table} {line}"
+    );
+    let (_, json, _) = run(&format!("{area} --json"));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    assert!(report["flight_not_simulated"] == why && report["flight"].is_null());
+}
+
 #[test]
 fn wrong_elevation_files_and_options_are_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -294,6 +294,12 @@ impl Flight {
         }
     }
 
+    /// Returns the reason why the flight was not simulated; `None` if it was.
+    pub fn unknown(&self) -> Option<String> {
+        (self.relays.len() > usize::from(MOST_RELAYS))
+            .then(|| format!("more than {MOST_RELAYS} relays"))
+    }
+
     /// Returns the lines about the loss of one relay that name a problem.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         self.without.iter().filter_map(|without| {
@@ -316,11 +322,10 @@ impl Flight {
 impl fmt::Display for Flight {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sir_db = self.terrain_sir_db;
-        let what = if self.relays.len() > usize::from(MOST_RELAYS) {
-            "flight (not simulated: too many relays)"
-        } else {
-            "simulated flight"
-        };
+        let what = self.unknown().map_or_else(
+            || "simulated flight".to_owned(),
+            |why| format!("flight (not simulated: {why})"),
+        );
         write!(f, "{what}: worst hop {sir_db:.3} dB with terrain")?;
         if let (Some(loss_db), Some(off_m)) = (self.loss_db, self.off_m) {
             let than = if loss_db < 0.0 { "more" } else { "less" };
