@@ -675,6 +675,24 @@ fn a_bundle_is_written_whole_or_not_at_all() {
     }
     let high = scenario().replace("altitude_m = 20.0", "altitude_m = 980.0");
     refused(&high, "", "FENCE_ALT_MAX would be");
+    // Companions would fly to other positions than those that are checked here.
+    refused(
+        &scenario(),
+        "--tolerance 0.05",
+        "--tolerance = 0.05: allowed with --bundle: 0.0001",
+    );
+    let mut planned = Command::new(plan());
+    let files_of = ["scenario.toml", "plan.toml"].map(|name| files.text(name));
+    files.write("scenario.toml", &scenario());
+    planned.args(["--uavs", "3", "--tolerance", "0.05", "--scenario"]);
+    let made = planned.args([&files_of[0], "--out", &files_of[1]]).output();
+    assert!(made.unwrap().status.success());
+    let planned = std::fs::read_to_string(&files_of[1]).unwrap();
+    refused(
+        &planned,
+        "",
+        "scenario.toml: plan.tolerance = 0.05: allowed",
+    );
     let unsited = scenario().replace("[site]", "[geometry.site]");
     refused(&unsited, "", "site");
     let left: Vec<_> = std::fs::read_dir(files.path(""))

@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::{Args, Parser, ValueEnum};
 use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
-use uav_relay_scenario::deployment::{Deployment, NETWORK, Network};
+use uav_relay_scenario::deployment::{COMPANION_TOLERANCE, Deployment, NETWORK, Network};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command;
 use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
@@ -167,7 +167,7 @@ impl<'a> Asked<'a> {
             }
             (tolerance, plan) => tolerance
                 .or(plan.map(|plan| plan.tolerance))
-                .unwrap_or(1e-4),
+                .unwrap_or(COMPANION_TOLERANCE),
         };
         for (option, given) in [
             ("--rounds", options.rounds.is_some()),
@@ -384,8 +384,21 @@ impl<'a> Asked<'a> {
             let probe_after = block::silence(self.probe_after_ms)[0];
             command::carries(baud, ChannelLoad::of_radios(self.uavs), probe_after)?;
         }
-        // The tolerance of a companion.
-        let flight = Flight::new(&self.scenario, self.uavs, 1e-4, self.network)
+        // The relays have to fly to the positions that are checked here.
+        if self.tolerance.total_cmp(&COMPANION_TOLERANCE).is_ne() {
+            let (from, remedy) = match self.scenario.plan {
+                Some(_) => (
+                    format!("{name}: plan.tolerance"),
+                    "run `cargo plan --out` again without --tolerance",
+                ),
+                None => ("--tolerance".to_owned(), "leave it out"),
+            };
+            return Err(format!(
+                "{from} = {:?}: allowed with --bundle: {COMPANION_TOLERANCE:?}, with which companions compute their positions; {remedy}",
+                self.tolerance
+            ));
+        }
+        let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
             .map_err(|error| format!("{name}: {error}"))?;
         let flight = match self.method {
             Method::Joint => flight.by(uav_relay::Method::Joint),
