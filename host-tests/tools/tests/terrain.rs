@@ -680,6 +680,34 @@ fn the_error_of_the_heights_is_a_margin() {
                 .iter()
                 .all(|relay| relay.above_ground_m >= 37.99)
     );
+    // In its room a relay is neither too low, with the error of the heights, nor too high.
+    let own = with_altitudes(&unsure, &raised, &careful, 1e-4).unwrap();
+    let flown = flown(&own, 4, PlannedMethod::Align, 1e-4).unwrap();
+    let how = (PlannedMethod::Align, 1e-4);
+    let flight = Flight::new(&own, &raised, &flown.plan, how, true).unwrap();
+    let ground = raised.ground(&own).unwrap();
+    let (mut rooms, mut highest_m) = (0, 0.0_f64);
+    for relay in flight.relays.iter().filter(|relay| relay.room_m.is_some()) {
+        let [from, to] = relay.room_m.unwrap();
+        for step in 0..=50 {
+            let x_m = (from + (to - from) * f64::from(step) / 50.0) as f32;
+            let place = Placement::on_line(x_m, relay.altitude_m);
+            let node = ground.relay(place).unwrap();
+            let above_m = node.amsl_m - ground.height_m(node.x_m, 0.0).unwrap();
+            let lowest_m = node.amsl_m - ground.highest_m(node, 1.0).unwrap();
+            assert!(
+                above_m < 120.1 && lowest_m > 29.9,
+                "{relay:?} {x_m} {above_m} {lowest_m}"
+            );
+            highest_m = highest_m.max(above_m);
+        }
+        rooms += 1;
+    }
+    assert!(
+        rooms > 0 && highest_m > 119.0,
+        "{highest_m} {:?}",
+        flight.relays
+    );
     let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
     let text = text.replace("mast_m = 5\n", "mast_m = 5\nerror_m = 101\n");
     std::fs::write(folder.path().join("wrong.toml"), text).unwrap();
