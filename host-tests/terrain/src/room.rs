@@ -34,9 +34,9 @@ struct Stretch {
 struct Ridge {
     step_m: f64,
     /// Highest ground within the position error, raised by the error of the heights, m above the datum.
-    heights_m: Vec<f64>,
-    /// Lowest ground below the relays, which are up to `aside` beside the line, m above the datum.
-    lowest_m: Vec<f64>,
+    highest: Vec<f64>,
+    /// Lowest ground below the relays, which are up to `off_m` beside the line, m above the datum.
+    lowest: Vec<f64>,
 }
 
 impl Ridge {
@@ -52,12 +52,12 @@ impl Ridge {
             let each = each.map(|y_m| Ok(ground.height_m(x_m, y_m)? - datum(x_m)?));
             each.collect::<Result<Vec<f64>, String>>()
         };
-        let (mut heights_m, mut lowest_m) = (Vec::new(), Vec::new());
+        let (mut highest, mut lowest) = (Vec::new(), Vec::new());
         for step in 0..=steps {
             let x_m = f64::from(step) * step_m;
             let all = heights(x_m, off_m + error_m)?;
-            heights_m.push(all.into_iter().fold(f64::NEG_INFINITY, f64::max) + ground.raise_m(x_m));
-            lowest_m.push(
+            highest.push(all.into_iter().fold(f64::NEG_INFINITY, f64::max) + ground.raise_m(x_m));
+            lowest.push(
                 heights(x_m, off_m)?
                     .into_iter()
                     .fold(f64::INFINITY, f64::min),
@@ -66,14 +66,14 @@ impl Ridge {
         Ok((
             Self {
                 step_m,
-                heights_m,
-                lowest_m,
+                highest,
+                lowest,
             },
             [tx.amsl_m - datum(0.0)?, rx.amsl_m - datum(length)?],
         ))
     }
 
-    /// Returns x and height of the points of `heights_m` from `from_m` to `to_m`.
+    /// Returns x and height of the points of `heights_m`, at equal steps, from `from_m` to `to_m`.
     fn between(
         &self,
         heights_m: &[f64],
@@ -94,7 +94,7 @@ impl Ridge {
     /// Returns true if `share` of the first Fresnel zone of every hop between the two intervals is free.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
-        self.between(&self.heights_m, [a, d]).all(|[x, height]| {
+        self.between(&self.highest, [a, d]).all(|[x, height]| {
             let (before, after) = (x - a, d - x);
             let bulge = before * after / (2.0 * EARTH_M);
             let zone = (wavelength_m * before * after / (d - a)).max(0.0).sqrt();
@@ -170,8 +170,8 @@ pub fn rooms(
     // The least height counts within the position error, the greatest one above the ground straight below.
     let is_in_band = |node: &Stretch, strip: [f64; 2], inner: [f64; 2]| {
         let h = node.h_m + error;
-        let mut highest = ridge.between(&ridge.heights_m, strip);
-        let mut lowest = ridge.between(&ridge.lowest_m, inner);
+        let mut highest = ridge.between(&ridge.highest, strip);
+        let mut lowest = ridge.between(&ridge.lowest, inner);
         highest.all(|[_, ground]| h - ground >= least - 0.01)
             && lowest.all(|[_, ground]| h - ground <= most + 0.01)
     };

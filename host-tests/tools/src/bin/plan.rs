@@ -23,7 +23,7 @@ use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
 use uav_relay_tools::plan::rate::{Rate, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
 use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M, chart};
-use uav_relay_tools::plan::terrain_flight::{self, Flight};
+use uav_relay_tools::plan::terrain_flight::{self, Flight, no_fly_warnings};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
 
@@ -697,7 +697,8 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
 /// Returns the reason why the plan cannot be flown for the no-fly areas; `None` if it can.
 fn no_fly(options: &Options, scenario: &Scenario, plan: &Plan) -> Option<String> {
     let chain: Vec<_> = plan.places.iter().map(|(place, _)| *place).collect();
-    area::problem(&scenario.no_fly, &chain, options.area.allow_crossing)
+    let is_free = options.altitude == Altitude::Free;
+    area::problem(scenario, &chain, is_free, options.area.allow_crossing)
 }
 
 fn joined(lines: [Option<String>; 2]) -> Option<String> {
@@ -965,6 +966,12 @@ fn write_out(
             "--out {}: not written: {line}",
             file.display()
         )));
+    }
+    if terrain.is_none() {
+        let lines = no_fly_warnings(scenario, relays, (method, options.tolerance));
+        for line in lines.map_err(failed)? {
+            command::print_line(&format!("warning: {line}"));
+        }
     }
     let text = match &options.scenario {
         Some(scenario) => std::fs::read_to_string(scenario)
