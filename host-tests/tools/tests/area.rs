@@ -799,6 +799,25 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
                 == 5,
         "{table}"
     );
+    // So far away, the measurements do not determine the location: JSON has no infinite numbers.
+    let far = text.replace(
+        "rectangle = [[200.0, 150.0], [900.0, 700.0]]",
+        "circle = [500, 2e6, 300]",
+    );
+    std::fs::write(folder.path().join("far.toml"), far).unwrap();
+    let far = ["--scenario", "far.toml", "--uavs", "3"];
+    let (_, report) = json(folder.path(), &far);
+    let locating = &report["locating"];
+    assert!(
+        locating["located"] == 0.0 && !locating.to_string().contains("null"),
+        "{locating}"
+    );
+    for key in ["error_m", "worst_error_m"] {
+        assert!(locating.get(key).is_none(), "{locating}");
+    }
+    let table = String::from_utf8(cargo_plan(folder.path(), &far).stdout).unwrap();
+    let part = "error (standard deviation) not limited in the median, not limited at x = ";
+    assert!(table.contains(part), "{table}");
     std::fs::write(
         folder.path().join("deaf.toml"),
         text.replace("[listen]\nrelative_error = 0.03\n", ""),

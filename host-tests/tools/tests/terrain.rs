@@ -926,6 +926,11 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         "above_ground_max_m = 20.0",
     );
     write("deep.toml", "amsl_m = 500.0", "amsl_m = 400.0");
+    write(
+        "narrow.toml",
+        "above_ground_max_m = 120.0",
+        "above_ground_max_m = 30.1\nerror_m = 50.0",
+    );
     let hills = "../../examples/hills.tif";
     let scenario = format!("--scenario {EXAMPLE}");
     let of = |name: &str| format!("--scenario {}", path(name));
@@ -978,6 +983,30 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
             "{arguments}: {status:?} {line}"
         );
     }
+    let narrow = format!(
+        "--uavs 3 --altitude terrain {} --dem {hills}",
+        of("narrow.toml")
+    );
+    let (status, _, line) = run(&narrow);
+    for part in [
+        "no positions over the terrain for 3 relays: allowed are positions at least 30 m (terrain.above_ground_m)",
+        " and at most 30.1 m (terrain.above_ground_max_m), 5 m apart (geometry.min_separation_m); the lowest ground is at x = ",
+        "above the line between the sites, with terrain.error_m = 50",
+    ] {
+        assert!(status == Some(1) && line.contains(part), "{line}");
+    }
+    let banded = text
+        .replace("above_ground_max_m = 120.0\n", "")
+        .replace("altitude_max_m = 160.0", "altitude_max_m = 21.0")
+        .replace("\naltitude_m = 60.0", "\naltitude_m = 20.5");
+    std::fs::write(folder.path().join("banded.toml"), banded).unwrap();
+    let banded = format!(
+        "--uavs 40 --altitude terrain {} --dem {hills}",
+        of("banded.toml")
+    );
+    let (status, _, line) = run(&banded);
+    let part = "above the highest ground, and at an altitude of 20 to 21 m (geometry.altitude_min_m and altitude_max_m), 5 m apart";
+    assert!(status == Some(1) && line.contains(part), "{line}");
     let (status, _, line) = run(&format!("--target-sir 3 {scenario} --altitude terrain"));
     assert!(
         status == Some(2) && line.contains("--altitude terrain: needs --uavs N"),
