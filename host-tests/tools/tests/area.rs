@@ -991,6 +991,18 @@ fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let part = "without relay 2: relay 1 is ";
     assert!(planned.status.success() && said.contains(part), "{said}");
     assert!(said.contains(" m inside no_fly[0] (0 to 60 m)"), "{said}");
+    // Areas are not skipped silently.
+    let text = std::fs::read_to_string(folder.join("flight.toml")).unwrap();
+    let (before, after) = text.split_once("[[interferer]]").unwrap();
+    let (_, relays) = after.split_once("[[relay]]").unwrap();
+    let unknown = format!("{before}[listen]\n[[relay]]{relays}");
+    std::fs::write(folder.join("unknown.toml"), unknown).unwrap();
+    let (succeeds, said) = provision(folder, "unknown.toml --force");
+    let part = "unknown.toml: no-fly areas not checked: the relays' positions are not known before the flight";
+    assert!(succeeds && said.contains(part), "{said}");
+    let (succeeds, said) = provision(folder, "flight.toml --force --method adjust");
+    let part = "no-fly areas not checked: the method adjust changes altitudes in flight";
+    assert!(succeeds && said.contains(part), "{said}");
 }
 
 #[test]

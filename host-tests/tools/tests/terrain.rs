@@ -218,6 +218,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
     let folder = tempfile::tempdir().unwrap();
     let count = std::env::var("COUNT").map_or(8, |text| text.parse().unwrap());
     let (mut losses, mut clear, mut rooms_m, mut warned) = (Vec::new(), 0_u64, Vec::new(), 0);
+    let (mut confined, mut low_ways) = (0, 0);
     for seed in 1..=count {
         let rng = &mut rng(seed);
         let scenario = scene(folder.path(), rng, "");
@@ -239,6 +240,41 @@ fn relays_fly_over_the_terrain_by_themselves() {
         let flight = flight.compared(&known, best.terrain_sir_db);
         losses.push(flight.loss_db.unwrap());
         warned += flight.warnings().count();
+        for relay in &flight.relays {
+            let part = format!("relay {} has no room: ", relay.index);
+            let is_warned = flight.warnings().any(|line| line.starts_with(&part));
+            assert_eq!(is_warned, relay.room_m.is_none(), "seed {seed}: {relay:?}");
+            confined += u32::from(is_warned);
+        }
+        // Warnings of ways: the height above the ground, found again along the level way.
+        for line in flight.without.iter().filter_map(|one| one.problem.as_ref()) {
+            for part in line
+                .split("; ")
+                .filter(|part| part.contains(" on its way from x = "))
+            {
+                let words: Vec<&str> = part.split(' ').collect();
+                let number = |after: &str| -> f64 {
+                    let at = words.windows(2).position(|two| two[0] == after).unwrap();
+                    words[at + 1].parse().unwrap()
+                };
+                let altitude_m = flight.relays[number("relay") as usize - 1].altitude_m;
+                let x_m: f64 = words
+                    .iter()
+                    .skip_while(|word| **word != "ground")
+                    .nth(4)
+                    .unwrap()
+                    .parse()
+                    .unwrap();
+                let place = Placement::on_line(x_m as f32, altitude_m);
+                let above = elevation.ground(&own).unwrap().relay(place).unwrap().amsl_m
+                    - elevation.ground(&own).unwrap().height_m(x_m, 0.0).unwrap();
+                assert!(
+                    number("is") < 30.0 && (above - number("is")).abs() < 0.5,
+                    "{part}: {above}"
+                );
+                low_ways += 1;
+            }
+        }
         match &flight.problem {
             Some(problem) => println!("seed {seed}, {relays} relays: {problem}"),
             None => clear += 1,
@@ -316,6 +352,8 @@ fn relays_fly_over_the_terrain_by_themselves() {
         rooms_m.len(),
         at(&rooms_m, 0.5)
     );
+    println!("{confined} relays without a room, {low_ways} low ways");
+    assert!(count < 8 || confined > 0 && low_ways > 0);
     assert!(2 * clear > count, "{clear}");
 }
 

@@ -202,6 +202,9 @@ pub struct Flight {
     pub off_m: Option<f64>,
     /// Positions of the relays.
     pub relays: Vec<FlownRelay>,
+    /// Position error of a relay, m.
+    #[serde(skip)]
+    position_error_m: f64,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
     /// Reason why the relays cannot fly there: a blocked hop, a relay too low or too high.
@@ -246,6 +249,7 @@ impl Flight {
             terrain_sir_db: report.terrain_sir_db,
             loss_db: None,
             off_m: None,
+            position_error_m: elevation.position_error_m(),
             relays: (1..)
                 .zip(&places)
                 .zip(rooms)
@@ -281,12 +285,20 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns the lines about the loss of one relay that name a problem.
+    /// Returns the lines about relays without a room, and about the loss of one relay that name a problem.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        self.without.iter().filter_map(|without| {
+        let error_m = self.position_error_m;
+        let confined = self.relays.iter().filter(|relay| relay.room_m.is_none());
+        let confined = confined.map(move |relay| {
+            format!(
+                "relay {} has no room: one of its hops gets worse, blocked or grazing, within the position error of {error_m} m (companion.position_error_m)",
+                relay.index
+            )
+        });
+        confined.chain(self.without.iter().filter_map(|without| {
             let problem = without.problem.as_ref()?;
             Some(format!("without relay {}: {problem}", without.lost))
-        })
+        }))
     }
 
     /// Returns the text about the room of relay `index`; empty if it is unknown.
