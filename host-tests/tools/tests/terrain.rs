@@ -822,6 +822,12 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
         page.contains("room over the terrain: x ") && page.contains(blocked),
         "{page}"
     );
+    // The mission's band is no room over the terrain, and is not called one.
+    assert!(
+        page.contains("altitude 20.0 to 160.0 m above the line between the sites; neither the ground nor no-fly areas are in them")
+            && !page.contains("box:"),
+        "{page}"
+    );
     // The terrain is not below this scenario's own altitudes.
     let low = std::fs::read_to_string(&plan).unwrap();
     let low = low.split("\n[[relay]]").next().unwrap();
