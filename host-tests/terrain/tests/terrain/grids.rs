@@ -289,7 +289,7 @@ fn holes_and_uncovered_places_are_named() {
     );
 }
 
-/// Returns the model of Zurich (25 m) that the package `geotiff` ships for its own tests, if Cargo has ever unpacked it.
+/// Returns the model of Zurich (25 m) that the package `geotiff` ships, if Cargo has unpacked it.
 fn zurich() -> Option<Vec<u8>> {
     let cargo = std::env::var("CARGO_HOME").map(PathBuf::from);
     let cargo =

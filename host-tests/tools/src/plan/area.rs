@@ -312,9 +312,9 @@ fn inside(area: &NoFly, index: u16, [x, y, h]: Point) -> Option<String> {
     ))
 }
 
-/// Returns a line for each relay that flies into a no-fly area from one of `from` to its position in `to`.
+/// Returns a line for each relay that flies through a no-fly area, or into it.
 ///
-/// Both are positions of the relays `indices`.
+/// The relays `indices` fly from their positions `from` to those in `to`.
 pub(super) fn entered(
     no_fly: &[NoFly],
     indices: &[u16],

@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the line about a search without positions: the limits with their keys, and the lowest ground.
+    /// Returns the error of a search without positions: the limits with their keys, the lowest ground.
     fn nowhere(&self, scenario: &Scenario) -> String {
         let [least_m, most_m] = self.clearance_m;
         let relays = self.scene.relays.len();

@@ -474,7 +474,7 @@ impl Loss {
     }
 }
 
-/// Returns the terrain below the others after a loss in a chain at `places`, and the no-fly areas there.
+/// Returns terrain and no-fly areas below the others, after a loss in a chain at `places`.
 fn without(
     scenario: &Scenario,
     elevation: &Elevation,
