@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::{Parser, ValueEnum as _};
 use serde_json::json;
 use uav_relay::{Channel, Instant, Interference, Placement, Profile};
-use uav_relay_scenario::deployment::Deployment;
+use uav_relay_scenario::deployment::{COMPANION_TOLERANCE, Deployment};
 use uav_relay_scenario::endpoint::FORM;
 use uav_relay_scenario::mission;
 use uav_relay_scenario::{PlannedPlace, Scenario, TerrainSpec};
@@ -16,8 +16,6 @@ use uav_relay_scenario::{PlannedPlace, Scenario, TerrainSpec};
 use crate::log::Log;
 use crate::mission::Method;
 use crate::site::degrees;
-
-const TOLERANCE: f64 = 1e-4;
 
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
@@ -321,7 +319,7 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
 /// long as its hop needs.
 fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), String> {
     let error = |refusal: mission::Refusal| refusal.to_string();
-    let (mission, _) = mission::mission(scenario, 1, TOLERANCE).map_err(error)?;
+    let (mission, _) = mission::mission(scenario, 1, COMPANION_TOLERANCE).map_err(error)?;
     let mission = mission::with_access(scenario, &mission).map_err(error)?;
     let gap = mission.fitted_gap();
     given.value("--fitted-gap", (gap > 0.0).then_some(gap));
@@ -335,7 +333,7 @@ fn mission_options(
 ) -> Result<FileOnlySettings, String> {
     // The mission is built for one relay, because the number of relays is in another section or on the command line.
     let (mission, profiles) =
-        mission::mission(scenario, 1, TOLERANCE).map_err(|error| error.to_string())?;
+        mission::mission(scenario, 1, COMPANION_TOLERANCE).map_err(|error| error.to_string())?;
     let config = mission.config();
     if let Some(line) = &scenario.line {
         let [tx, rx] = line.sites;
@@ -379,7 +377,7 @@ fn mission_options(
     let profiles = if scenario.relays.is_empty() {
         profiles
     } else {
-        let (_, all) = mission::mission(&without_separation(scenario), 1_000, TOLERANCE)
+        let (_, all) = mission::mission(&without_separation(scenario), 1_000, COMPANION_TOLERANCE)
             .map_err(|error| error.to_string())?;
         all
     };

@@ -4,6 +4,8 @@ use clap::{Args, ValueEnum};
 use uav_relay::channel::AirGround;
 use uav_relay::mission::MissionError;
 use uav_relay::{Adjust, Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+use uav_relay_scenario::deployment::COMPANION_TOLERANCE;
+use uav_relay_scenario::number::narrow;
 
 use crate::command::{named, number};
 
@@ -159,7 +161,7 @@ impl MissionOptions {
             reverse: self.reverse,
             rx_power_w: self.rx_power.unwrap_or(self.tx_power),
             fitted_gap: self.fitted_gap,
-            tolerance: 1e-4,
+            tolerance: narrow(COMPANION_TOLERANCE),
         })
     }
 }

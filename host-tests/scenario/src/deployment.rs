@@ -14,6 +14,9 @@ use crate::error::{Problem, ScenarioError};
 /// Default network number of all tools. Relays ignore frames with another network number.
 pub const NETWORK: u16 = 1;
 
+/// Relative tolerance on the SIR with which companions compute. No option or key changes it.
+pub const COMPANION_TOLERANCE: f64 = 1e-4;
+
 /// Settings of the programs in a scenario file: `[network]`, `[companion]` and `[ground]`. For a missing value,
 /// `None`, the program uses its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]

@@ -154,10 +154,7 @@ impl<'a> Ground<'a> {
     /// # Errors
     /// A line that names the position, if it is too far from the line.
     pub fn relay(&self, place: Placement) -> Result<Node, String> {
-        let point = self
-            .axis
-            .point(place)
-            .ok_or_else(|| format!("{place:?} is too far from the line"))?;
+        let point = self.axis.point(place).ok_or_else(|| self.too_far(place))?;
         Ok(Node {
             x_m: place.x_m.into(),
             y_m: place.y_m.into(),
@@ -176,9 +173,20 @@ impl<'a> Ground<'a> {
             y_m: y_m as f32,
             altitude_m: 0.0,
         };
-        self.axis
-            .point(place)
-            .ok_or_else(|| format!("x = {x_m:.1} m, y = {y_m:.1} m is too far from the line"))
+        self.axis.point(place).ok_or_else(|| self.too_far(place))
+    }
+
+    fn too_far(&self, place: Placement) -> String {
+        let around_m = Axis::AROUND_M;
+        format!(
+            "x = {:.1} m, y = {:.1} m, altitude {:.1} m is too far from the line from Tx to Rx; allowed: x from {:.0} to {:.0} m, y and altitude from {:.0} to {around_m:.0} m",
+            place.x_m,
+            place.y_m,
+            place.altitude_m,
+            -around_m,
+            self.axis.distance_m() + f64::from(around_m),
+            -around_m
+        )
     }
 
     /// Returns the height of the ground above the mean sea level, m.

@@ -30,44 +30,62 @@ struct Stretch {
     h_m: f64,
 }
 
-/// Highest ground within the position error along the line, at equal steps, m above the datum.
+/// Ground along the line, at equal steps.
 struct Ridge {
     step_m: f64,
-    heights_m: Vec<f64>,
+    /// Highest ground within the position error, raised by the error of the heights, m above the datum.
+    highest: Vec<f64>,
+    /// Lowest ground below the relays, which are up to `off_m` beside the line, m above the datum.
+    lowest: Vec<f64>,
 }
 
 impl Ridge {
-    fn new(ground: &Ground<'_>, error_m: f64) -> Result<(Self, [f64; 2]), String> {
+    /// Samples the ground. The relays are up to `off_m` beside the line, with an error of `error_m`.
+    fn new(ground: &Ground<'_>, [off_m, error_m]: [f64; 2]) -> Result<(Self, [f64; 2]), String> {
         let [tx, rx] = ground.ends;
         let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
         let length = rx.x_m;
         let (step_m, steps) = steps(length, ground.step_m());
-        let (aside_m, asides) = steps_of(2.0 * error_m, ground.step_m());
-        let heights_m = (0..=steps).map(|step| {
+        let heights = |x_m: f64, wide_m: f64| {
+            let (aside_m, asides) = steps_of(2.0 * wide_m, ground.step_m());
+            let each = (0..=asides).map(|aside| f64::from(aside) * aside_m - wide_m);
+            let each = each.map(|y_m| Ok(ground.height_m(x_m, y_m)? - datum(x_m)?));
+            each.collect::<Result<Vec<f64>, String>>()
+        };
+        let (mut highest, mut lowest) = (Vec::new(), Vec::new());
+        for step in 0..=steps {
             let x_m = f64::from(step) * step_m;
-            let mut highest = f64::NEG_INFINITY;
-            for aside in 0..=asides {
-                let y_m = f64::from(aside) * aside_m - error_m;
-                highest = highest.max(ground.height_m(x_m, y_m)?);
-            }
-            Ok(highest + ground.raise_m(x_m) - datum(x_m)?)
-        });
-        let heights_m = heights_m.collect::<Result<_, String>>()?;
+            let all = heights(x_m, off_m + error_m)?;
+            highest.push(all.into_iter().fold(f64::NEG_INFINITY, f64::max) + ground.raise_m(x_m));
+            lowest.push(
+                heights(x_m, off_m)?
+                    .into_iter()
+                    .fold(f64::INFINITY, f64::min),
+            );
+        }
         Ok((
-            Self { step_m, heights_m },
+            Self {
+                step_m,
+                highest,
+                lowest,
+            },
             [tx.amsl_m - datum(0.0)?, rx.amsl_m - datum(length)?],
         ))
     }
 
-    /// Returns x and height of the points from `from_m` to `to_m`.
-    fn between(&self, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+    /// Returns x and height of the points of `heights_m`, at equal steps, from `from_m` to `to_m`.
+    fn between(
+        &self,
+        heights_m: &[f64],
+        [from_m, to_m]: [f64; 2],
+    ) -> impl Iterator<Item = [f64; 2]> {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "an index"
         )]
         let first = (from_m / self.step_m).ceil().max(0.0) as usize;
-        let points = self.heights_m.iter().enumerate().skip(first);
+        let points = heights_m.iter().enumerate().skip(first);
         points
             .map(|(at, height)| [at as f64 * self.step_m, *height])
             .take_while(move |[x_m, _]| *x_m <= to_m)
@@ -76,7 +94,7 @@ impl Ridge {
     /// Returns true if `share` of the first Fresnel zone of every hop between the two intervals is free.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
-        self.between([a, d]).all(|[x, height]| {
+        self.between(&self.highest, [a, d]).all(|[x, height]| {
             let (before, after) = (x - a, d - x);
             let bulge = before * after / (2.0 * EARTH_M);
             let zone = (wavelength_m * before * after / (d - a)).max(0.0).sqrt();
@@ -123,7 +141,7 @@ pub fn rooms(
 ) -> Result<Vec<Option<[f64; 2]>>, String> {
     let error = limits.position_error_m;
     let aside = places.iter().map(|place| f64::from(place.y_m).abs());
-    let (ridge, ends) = Ridge::new(ground, error + aside.fold(0.0, f64::max))?;
+    let (ridge, ends) = Ridge::new(ground, [aside.fold(0.0, f64::max), error])?;
     let end_m = ground.ends[1].x_m;
     let relay = |place: &Placement| {
         let x_m = f64::from(place.x_m);
@@ -149,11 +167,13 @@ pub fn rooms(
         ends.is_some_and(|(from, to)| ridge.is_free([*from, *to], share(hop), limits.wavelength_m))
     };
     let [least, most] = limits.above_ground_m;
-    let is_in_band = |node: &Stretch, strip: [f64; 2]| {
-        let h = node.h_m;
-        ridge
-            .between(strip)
-            .all(|[_, ground]| (least - 0.01..=most + 0.01).contains(&(h + error - ground)))
+    // The least height counts within the position error, the greatest one above the ground straight below.
+    let is_in_band = |node: &Stretch, strip: [f64; 2], inner: [f64; 2]| {
+        let h = node.h_m + error;
+        let mut highest = ridge.between(&ridge.highest, strip);
+        let mut lowest = ridge.between(&ridge.lowest, inner);
+        highest.all(|[_, ground]| h - ground >= least - 0.01)
+            && lowest.all(|[_, ground]| h - ground <= most + 0.01)
     };
     let is_in: Vec<bool> = (0..places.len())
         .map(|relay| holds(&nodes, relay) && holds(&nodes, relay + 1))
@@ -168,13 +188,15 @@ pub fn rooms(
                     continue;
                 };
                 let mut next = now;
-                let strip = if side == 0 {
+                // One point farther, so that the ground at the edge is between two points.
+                let (strip, inward_m) = if side == 0 {
                     next.x_m[0] -= ridge.step_m;
-                    [next.x_m[0], now.x_m[0]]
+                    ([next.x_m[0] - ridge.step_m, now.x_m[0]], error)
                 } else {
                     next.x_m[1] += ridge.step_m;
-                    [now.x_m[1], next.x_m[1]]
+                    ([now.x_m[1], next.x_m[1] + ridge.step_m], -error)
                 };
+                let inner = strip.map(|x_m| x_m + inward_m);
                 let is_apart = next.x_m[0] >= before.x_m[1] + limits.apart_m
                     && next.x_m[1] <= after.x_m[0] - limits.apart_m;
                 let set = |nodes: &mut Vec<Stretch>, to: Stretch| {
@@ -184,7 +206,7 @@ pub fn rooms(
                 };
                 set(&mut nodes, next);
                 *grows = is_apart
-                    && is_in_band(&next, strip)
+                    && is_in_band(&next, strip, inner)
                     && holds(&nodes, relay)
                     && holds(&nodes, relay + 1);
                 if !*grows {

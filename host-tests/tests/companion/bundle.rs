@@ -13,7 +13,7 @@ use crate::binary::{companion, ground, plan, provision};
 use crate::chain::{Chain, QUICK, simulated};
 use crate::files::Files;
 use crate::medium::{Medium, Noise, QUIET};
-use crate::peer::{Peer, RX, ReceivedMessage, distance_to_m};
+use crate::peer::{Peer, RX, ReceivedMessage, apart_m, distance_to_m, on_earth};
 use crate::process::{Relay, bits};
 
 /// Text in the udev rules of a new bundle.
@@ -248,6 +248,40 @@ fn a_bundle_is_green_and_its_relays_agree() {
         "has version 1 of an earlier flight",
     ] {
         assert!(reds.iter().any(|it| it.contains(part)), "{part}: {reds:#?}");
+    }
+}
+
+/// Checks that the drone of every folder flies to the place on its page.
+#[test]
+fn every_folder_of_a_bundle_flies() {
+    let mut bench = Bench::new();
+    let mut relays = [1, 2, 3].map(|index| bench.companion(index, ""));
+    for (relay, drone) in relays.iter_mut().zip(&mut bench.drones) {
+        relay.wait_for("autopilot: on the ground, or not armed");
+        relay.wait_for("converged: ");
+        drone.takes_off();
+    }
+    for (index, (relay, drone)) in (1..).zip(relays.iter_mut().zip(&mut bench.drones)) {
+        relay.line("autopilot: ready");
+        // A PX4 accepts the mode only while targets are streamed.
+        if index != 2 {
+            drone.receive(ReceivedMessage::is_target);
+        }
+        drone.order("mode companion");
+        relay.line("autopilot: setpoint control engaged");
+    }
+    for (index, (relay, drone)) in (1..).zip(relays.iter_mut().zip(&bench.drones)) {
+        relay.line("arrived: ");
+        let config = bench.path(&format!("relay{index}/drone.toml"));
+        let plan = Scenario::load(&config).unwrap().plan.unwrap();
+        let place = &plan.places[index - 1];
+        let page = bench.path(&format!("relay{index}/page.txt"));
+        let page = std::fs::read_to_string(page).unwrap();
+        let line = format!("place: x {:.1} m, y 0.0 m, altitude 20.0 m", place.x_m);
+        assert!(page.contains(&line), "{line}: {page}");
+        let goal = on_earth(place.x_m, place.altitude_m);
+        let is_there = |heard: &ReceivedMessage| heard.is_any() && apart_m(heard.own(), goal) < 1.0;
+        assert_eq!(drone.receive(is_there).mode(), "companion");
     }
 }
 
@@ -675,6 +709,24 @@ fn a_bundle_is_written_whole_or_not_at_all() {
     }
     let high = scenario().replace("altitude_m = 20.0", "altitude_m = 980.0");
     refused(&high, "", "FENCE_ALT_MAX would be");
+    // Companions would fly to other positions than those that are checked here.
+    refused(
+        &scenario(),
+        "--tolerance 0.05",
+        "--tolerance = 0.05: allowed with --bundle: 0.0001",
+    );
+    let mut planned = Command::new(plan());
+    let files_of = ["scenario.toml", "plan.toml"].map(|name| files.text(name));
+    files.write("scenario.toml", &scenario());
+    planned.args(["--uavs", "3", "--tolerance", "0.05", "--scenario"]);
+    let made = planned.args([&files_of[0], "--out", &files_of[1]]).output();
+    assert!(made.unwrap().status.success());
+    let planned = std::fs::read_to_string(&files_of[1]).unwrap();
+    refused(
+        &planned,
+        "",
+        "scenario.toml: plan.tolerance = 0.05: allowed",
+    );
     let unsited = scenario().replace("[site]", "[geometry.site]");
     refused(&unsited, "", "site");
     let left: Vec<_> = std::fs::read_dir(files.path(""))

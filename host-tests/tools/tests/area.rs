@@ -799,6 +799,25 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
                 == 5,
         "{table}"
     );
+    // So far away, the measurements do not determine the location: JSON has no infinite numbers.
+    let far = text.replace(
+        "rectangle = [[200.0, 150.0], [900.0, 700.0]]",
+        "circle = [500, 2e6, 300]",
+    );
+    std::fs::write(folder.path().join("far.toml"), far).unwrap();
+    let far = ["--scenario", "far.toml", "--uavs", "3"];
+    let (_, report) = json(folder.path(), &far);
+    let locating = &report["locating"];
+    assert!(
+        locating["located"] == 0.0 && !locating.to_string().contains("null"),
+        "{locating}"
+    );
+    for key in ["error_m", "worst_error_m"] {
+        assert!(locating.get(key).is_none(), "{locating}");
+    }
+    let table = String::from_utf8(cargo_plan(folder.path(), &far).stdout).unwrap();
+    let part = "error (standard deviation) not limited in the median, not limited at x = ";
+    assert!(table.contains(part), "{table}");
     std::fs::write(
         folder.path().join("deaf.toml"),
         text.replace("[listen]\nrelative_error = 0.03\n", ""),
@@ -866,16 +885,16 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     let sir = moved["sir"].as_f64().unwrap();
     assert!(sir < best * 0.9999 && sir > 0.6 * best, "{sir} {best}");
     assert!(one_side["sir"].as_f64().unwrap() < sir);
-    let zones = Scenario::load(&folder.join("flight.toml")).unwrap().no_fly;
+    let zones = Scenario::load(&folder.join("flight.toml")).unwrap();
     let chain = [own - 70.0, own + 60.0].map(|x_m| Placement::on_line(x_m as f32, 60.0));
-    let line = area::problem(&zones, &chain, false).unwrap();
+    let line = area::problem(&zones, &chain, false, false).unwrap();
     for part in [
         "the way between relay 1 and relay 2 crosses no_fly[0] (0 to 10000 m) for 110.0 m",
         "--allow-crossing",
     ] {
         assert!(line.contains(part), "{line}");
     }
-    assert_eq!(area::problem(&zones, &chain, true), None);
+    assert_eq!(area::problem(&zones, &chain, false, true), None);
     // Relays that compute their own positions would be inside.
     let out = cargo_plan(
         folder,
@@ -911,6 +930,79 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         assert_eq!(status, 0, "{around}");
         assert!(around["sir"].as_f64().unwrap() > 0.5 * best, "{around}");
     }
+}
+
+/// Checks no-fly areas on the ways that relays with their own altitudes fly, and after each loss.
+#[test]
+fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let write = |more: &str| std::fs::write(folder.join("flight.toml"), format!("{FLAT}{more}"));
+    let own = "[[relay]]\nindex = 1\naltitude_m = 40\n[[relay]]\nindex = 2\naltitude_m = 120\n";
+    write(own).unwrap();
+    let base = ["--scenario", "flight.toml", "--uavs", "3"];
+    let (_, free) = json(folder, &base);
+    let x = |relay: usize| free["relays"][relay]["x_m"].as_f64().unwrap();
+    // The straight line from 40 m to 120 m passes above the area. Relay 1 flies through it at 40 m.
+    let zone = |from: f64, to: f64, highest_m: f64| {
+        format!(
+            "{own}[[no_fly]]\narea = {{ rectangle = [[{from}, -30], [{to}, 30]] }}\nhighest_m = {highest_m}\n"
+        )
+    };
+    let middle = 0.5 * (x(0) + x(1));
+    write(&zone(middle, middle + 20.0, 60.0)).unwrap();
+    let scenario = Scenario::load(&folder.join("flight.toml")).unwrap();
+    let chain = [(x(0), 40.0), (x(1), 120.0)].map(|(x_m, h)| Placement::on_line(x_m as f32, h));
+    let line = area::problem(&scenario, &chain, false, false).unwrap();
+    let part = "the way between relay 1 and relay 2 crosses no_fly[0] (0 to 60 m) for 20.0 m from the altitude 40.0 m";
+    assert!(line.contains(part), "{line}");
+    // With free altitudes relay 1 keeps its own, and so does relay 2.
+    assert!(
+        area::problem(&scenario, &chain, true, false)
+            .unwrap()
+            .contains(part)
+    );
+    let free_ones = Scenario {
+        relays: std::collections::BTreeMap::new(),
+        ..scenario
+    };
+    assert_eq!(area::problem(&free_ones, &chain, true, false), None);
+    // The planner searches for positions without such a way.
+    let (status, around) = json(folder, &base);
+    let at = |relay: usize| around["relays"][relay]["x_m"].as_f64().unwrap();
+    assert_eq!(status, 0, "{around}");
+    assert!(at(0) >= middle + 19.9 || at(1) <= middle + 0.1, "{around}");
+    // Without relay 2, relay 1 flies 14.8 m: through an area, or into it.
+    write(&zone(x(0) + 3.0, x(0) + 10.0, 60.0)).unwrap();
+    let out = ["--allow-crossing", "--out", "out.toml", "--force"];
+    let planned = cargo_plan(folder, &[base.as_slice(), &out].concat());
+    let said = String::from_utf8_lossy(&planned.stderr);
+    let part = "warning: without relay 2: relay 1 on its way from x = ";
+    assert!(planned.status.success() && said.contains(part), "{said}");
+    assert!(
+        said.contains(" m crosses no_fly[0] (0 to 60 m) for 7.0 m"),
+        "{said}"
+    );
+    let (succeeds, said) = provision(folder, "out.toml");
+    assert!(succeeds && said.contains(part), "{said}");
+    write(&zone(x(0) + 8.0, x(0) + 60.0, 60.0)).unwrap();
+    let planned = cargo_plan(folder, &[base.as_slice(), &out].concat());
+    let said = String::from_utf8_lossy(&planned.stderr);
+    let part = "without relay 2: relay 1 is ";
+    assert!(planned.status.success() && said.contains(part), "{said}");
+    assert!(said.contains(" m inside no_fly[0] (0 to 60 m)"), "{said}");
+    // Areas are not skipped silently.
+    let text = std::fs::read_to_string(folder.join("flight.toml")).unwrap();
+    let (before, after) = text.split_once("[[interferer]]").unwrap();
+    let (_, relays) = after.split_once("[[relay]]").unwrap();
+    let unknown = format!("{before}[listen]\n[[relay]]{relays}");
+    std::fs::write(folder.join("unknown.toml"), unknown).unwrap();
+    let (succeeds, said) = provision(folder, "unknown.toml --force");
+    let part = "unknown.toml: no-fly areas not checked: the relays' positions are not known before the flight";
+    assert!(succeeds && said.contains(part), "{said}");
+    let (succeeds, said) = provision(folder, "flight.toml --force --method adjust");
+    let part = "no-fly areas not checked: the method adjust changes altitudes in flight";
+    assert!(succeeds && said.contains(part), "{said}");
 }
 
 #[test]

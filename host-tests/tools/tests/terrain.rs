@@ -218,6 +218,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
     let folder = tempfile::tempdir().unwrap();
     let count = std::env::var("COUNT").map_or(8, |text| text.parse().unwrap());
     let (mut losses, mut clear, mut rooms_m, mut warned) = (Vec::new(), 0_u64, Vec::new(), 0);
+    let (mut confined, mut low_ways) = (0, 0);
     for seed in 1..=count {
         let rng = &mut rng(seed);
         let scenario = scene(folder.path(), rng, "");
@@ -239,6 +240,41 @@ fn relays_fly_over_the_terrain_by_themselves() {
         let flight = flight.compared(&known, best.terrain_sir_db);
         losses.push(flight.loss_db.unwrap());
         warned += flight.warnings().count();
+        for relay in &flight.relays {
+            let part = format!("relay {} has no room: ", relay.index);
+            let is_warned = flight.warnings().any(|line| line.starts_with(&part));
+            assert_eq!(is_warned, relay.room_m.is_none(), "seed {seed}: {relay:?}");
+            confined += u32::from(is_warned);
+        }
+        // Warnings of ways: the height above the ground, found again along the level way.
+        for line in flight.without.iter().filter_map(|one| one.problem.as_ref()) {
+            for part in line
+                .split("; ")
+                .filter(|part| part.contains(" on its way from x = "))
+            {
+                let words: Vec<&str> = part.split(' ').collect();
+                let number = |after: &str| -> f64 {
+                    let at = words.windows(2).position(|two| two[0] == after).unwrap();
+                    words[at + 1].parse().unwrap()
+                };
+                let altitude_m = flight.relays[number("relay") as usize - 1].altitude_m;
+                let x_m: f64 = words
+                    .iter()
+                    .skip_while(|word| **word != "ground")
+                    .nth(4)
+                    .unwrap()
+                    .parse()
+                    .unwrap();
+                let place = Placement::on_line(x_m as f32, altitude_m);
+                let above = elevation.ground(&own).unwrap().relay(place).unwrap().amsl_m
+                    - elevation.ground(&own).unwrap().height_m(x_m, 0.0).unwrap();
+                assert!(
+                    number("is") < 30.0 && (above - number("is")).abs() < 0.5,
+                    "{part}: {above}"
+                );
+                low_ways += 1;
+            }
+        }
         match &flight.problem {
             Some(problem) => println!("seed {seed}, {relays} relays: {problem}"),
             None => clear += 1,
@@ -316,6 +352,8 @@ fn relays_fly_over_the_terrain_by_themselves() {
         rooms_m.len(),
         at(&rooms_m, 0.5)
     );
+    println!("{confined} relays without a room, {low_ways} low ways");
+    assert!(count < 8 || confined > 0 && low_ways > 0);
     assert!(2 * clear > count, "{clear}");
 }
 
@@ -680,6 +718,34 @@ fn the_error_of_the_heights_is_a_margin() {
                 .iter()
                 .all(|relay| relay.above_ground_m >= 37.99)
     );
+    // In its room a relay is neither too low, with the error of the heights, nor too high.
+    let own = with_altitudes(&unsure, &raised, &careful, 1e-4).unwrap();
+    let flown = flown(&own, 4, PlannedMethod::Align, 1e-4).unwrap();
+    let how = (PlannedMethod::Align, 1e-4);
+    let flight = Flight::new(&own, &raised, &flown.plan, how, true).unwrap();
+    let ground = raised.ground(&own).unwrap();
+    let (mut rooms, mut highest_m) = (0, 0.0_f64);
+    for relay in flight.relays.iter().filter(|relay| relay.room_m.is_some()) {
+        let [from, to] = relay.room_m.unwrap();
+        for step in 0..=50 {
+            let x_m = (from + (to - from) * f64::from(step) / 50.0) as f32;
+            let place = Placement::on_line(x_m, relay.altitude_m);
+            let node = ground.relay(place).unwrap();
+            let above_m = node.amsl_m - ground.height_m(node.x_m, 0.0).unwrap();
+            let lowest_m = node.amsl_m - ground.highest_m(node, 1.0).unwrap();
+            assert!(
+                above_m < 120.1 && lowest_m > 29.9,
+                "{relay:?} {x_m} {above_m} {lowest_m}"
+            );
+            highest_m = highest_m.max(above_m);
+        }
+        rooms += 1;
+    }
+    assert!(
+        rooms > 0 && highest_m > 119.0,
+        "{highest_m} {:?}",
+        flight.relays
+    );
     let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
     let text = text.replace("mast_m = 5\n", "mast_m = 5\nerror_m = 101\n");
     std::fs::write(folder.path().join("wrong.toml"), text).unwrap();
@@ -756,6 +822,12 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
         page.contains("room over the terrain: x ") && page.contains(blocked),
         "{page}"
     );
+    // The mission's band is no room over the terrain, and is not called one.
+    assert!(
+        page.contains("altitude 20.0 to 160.0 m above the line between the sites; neither the ground nor no-fly areas are in them")
+            && !page.contains("box:"),
+        "{page}"
+    );
     // The terrain is not below this scenario's own altitudes.
     let low = std::fs::read_to_string(&plan).unwrap();
     let low = low.split("\n[[relay]]").next().unwrap();
@@ -792,6 +864,84 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     assert!(!Path::new(&path("three.toml")).exists());
 }
 
+/// Checks that a plan says without `--out`, too, whether its relays can fly it.
+#[test]
+fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let of = |more: &str| run(&format!("--scenario {EXAMPLE} --altitude terrain {more}"));
+    let (status, table, line) = of("--uavs 3");
+    let blocked =
+        "at the positions on which 3 relays would agree, hop 4 (relay 3 to Rx) is blocked";
+    assert!(
+        status == Some(1) && line.contains(blocked) && line.contains("give another --uavs"),
+        "{line}"
+    );
+    assert!(table.contains("simulated flight: worst hop "), "{table}");
+    let (status, json, _) = of("--uavs 3 --json");
+    let report: Value = serde_json::from_str(&json).unwrap();
+    assert!(status == Some(1) && report["error"].as_str().unwrap().starts_with(blocked));
+    assert_eq!(report["flight"]["relays"].as_array().unwrap().len(), 3);
+    let (status, _, line) = of("--uavs 3 --allow-blocked");
+    assert_eq!((status, line.as_str()), (Some(0), ""));
+    // The same flight as with a file.
+    let [(status, json, _), (_, written, _)] =
+        [String::new(), format!(" --out {}", path("four.toml"))]
+            .map(|out| of(&format!("--uavs 4 --json{out}")));
+    let [alone, written] =
+        [json, written].map(|json| -> Value { serde_json::from_str(&json).unwrap() });
+    assert_eq!(status, Some(0));
+    assert!(alone["flight"].is_object() && alone == written, "{alone}");
+    // Relays that compute with one hypothetical interferer fly to other positions than those of the plan.
+    let text = std::fs::read_to_string(EXAMPLE).unwrap();
+    let hills = std::path::absolute("../../examples/hills.tif").unwrap();
+    let text = text.replace("hills.tif", hills.to_str().unwrap());
+    let text = text
+        .replace("\naltitude_m = 60.0", "\naltitude_m = 150.0")
+        .replace("max_m = 120.0", "max_m = 300.0");
+    let (sections, _) = text.split_once("[[interferer]]").unwrap();
+    let interferer = |places: &[[f64; 2]]| {
+        let each = places
+            .iter()
+            .map(|[x, y]| format!("[[interferer]]\npower_w = 2.0\nx_m = {x}\ny_m = {y}\n"));
+        format!("{sections}{}", each.collect::<String>())
+    };
+    std::fs::write(
+        path("two.toml"),
+        interferer(&[[500.0, 900.0], [4500.0, 900.0]]),
+    )
+    .unwrap();
+    let (_, json, line) = run(&format!(
+        "--scenario {} --uavs 4 --altitude given --allow-blocked --json",
+        path("two.toml")
+    ));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let x = |at: &Value| at["x_m"].as_f64().unwrap();
+    let places = report["relays"].as_array().unwrap().iter();
+    let flown = report["flight"]["relays"].as_array().unwrap().iter();
+    let off_m = places
+        .zip(flown)
+        .map(|(plan, flown)| (x(plan) - x(flown)).abs());
+    assert!(off_m.fold(0.0, f64::max) > 1.0, "{json} {line}");
+    // An area has no position with which relays could compute.
+    let area = "[[interferer]]\npower_w = 2.0\narea = { circle = [2000, 1500, 200] }\n";
+    std::fs::write(path("area.toml"), format!("{sections}{area}")).unwrap();
+    let area = format!(
+        "--scenario {} --uavs 4 --altitude terrain",
+        path("area.toml")
+    );
+    let why = "relays compute with one position of an interferer, and this scenario has an interferer.area";
+    let (status, table, line) = run(&area);
+    assert!(
+        status == Some(0)
+            && table.contains(&format!("flight over the terrain not simulated: {why}")),
+        "{table} {line}"
+    );
+    let (_, json, _) = run(&format!("{area} --json"));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    assert!(report["flight_not_simulated"] == why && report["flight"].is_null());
+}
+
 #[test]
 fn wrong_elevation_files_and_options_are_named_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -820,6 +970,11 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         "above_ground_max_m = 20.0",
     );
     write("deep.toml", "amsl_m = 500.0", "amsl_m = 400.0");
+    write(
+        "narrow.toml",
+        "above_ground_max_m = 120.0",
+        "above_ground_max_m = 30.1\nerror_m = 50.0",
+    );
     let hills = "../../examples/hills.tif";
     let scenario = format!("--scenario {EXAMPLE}");
     let of = |name: &str| format!("--scenario {}", path(name));
@@ -872,6 +1027,30 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
             "{arguments}: {status:?} {line}"
         );
     }
+    let narrow = format!(
+        "--uavs 3 --altitude terrain {} --dem {hills}",
+        of("narrow.toml")
+    );
+    let (status, _, line) = run(&narrow);
+    for part in [
+        "no positions over the terrain for 3 relays: allowed are positions at least 30 m (terrain.above_ground_m)",
+        " and at most 30.1 m (terrain.above_ground_max_m), 5 m apart (geometry.min_separation_m); the lowest ground is at x = ",
+        "above the line between the sites, with terrain.error_m = 50",
+    ] {
+        assert!(status == Some(1) && line.contains(part), "{line}");
+    }
+    let banded = text
+        .replace("above_ground_max_m = 120.0\n", "")
+        .replace("altitude_max_m = 160.0", "altitude_max_m = 21.0")
+        .replace("\naltitude_m = 60.0", "\naltitude_m = 20.5");
+    std::fs::write(folder.path().join("banded.toml"), banded).unwrap();
+    let banded = format!(
+        "--uavs 40 --altitude terrain {} --dem {hills}",
+        of("banded.toml")
+    );
+    let (status, _, line) = run(&banded);
+    let part = "above the highest ground, and at an altitude of 20 to 21 m (geometry.altitude_min_m and altitude_max_m), 5 m apart";
+    assert!(status == Some(1) && line.contains(part), "{line}");
     let (status, _, line) = run(&format!("--target-sir 3 {scenario} --altitude terrain"));
     assert!(
         status == Some(2) && line.contains("--altitude terrain: needs --uavs N"),

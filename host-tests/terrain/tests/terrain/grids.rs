@@ -1,5 +1,7 @@
 //! Heights from elevation files, and the errors of files that cannot be used.
 
+use std::path::PathBuf;
+
 use rand::RngExt as _;
 use uav_relay_terrain::grid::Terrain;
 
@@ -285,4 +287,89 @@ fn holes_and_uncovered_places_are_named() {
         line.contains("(easting 462") && line.contains("in UTM zone 32N)"),
         "{line}"
     );
+}
+
+/// Returns the model of Zurich (25 m) that the package `geotiff` ships, if Cargo has unpacked it.
+fn zurich() -> Option<Vec<u8>> {
+    let cargo = std::env::var("CARGO_HOME").map(PathBuf::from);
+    let cargo =
+        cargo.or_else(|_| std::env::var("HOME").map(|home| PathBuf::from(home).join(".cargo")));
+    let registries = std::fs::read_dir(cargo.ok()?.join("registry/src")).ok()?;
+    let file = "geotiff-0.1.0/resources/zh_dem_25.tif";
+    registries
+        .flatten()
+        .find_map(|registry| std::fs::read(registry.path().join(file)).ok())
+}
+
+/// Returns latitude and longitude of a point in UTM zone 32, near the equator, degrees.
+fn geographic(east: f64, north: f64) -> [f64; 2] {
+    let [mut lat, mut lon] = [2.0, 9.0];
+    for _ in 0..30 {
+        let (y, x, _) = utm::to_utm_wgs84(lat, lon, 32);
+        lat += (north - y) / 111_000.0;
+        lon += (east - x) / 111_000.0;
+    }
+    [lat, lon]
+}
+
+/// Checks a real elevation model, if it is there. Its file names no coordinate system, so the test adds one.
+#[test]
+fn a_real_elevation_model_is_read() {
+    let Some(original) = zurich() else {
+        println!("not tested: Cargo has not unpacked the package geotiff 0.1.0");
+        return;
+    };
+    let folder = folder();
+    let file = folder.path().join("zurich.tif");
+    std::fs::write(&file, &original).unwrap();
+    let line = Terrain::load(&[&file]).err().unwrap();
+    assert!(line.contains("zurich.tif: "), "{line}");
+    println!("without a coordinate system: {line}");
+    // A new directory at the end, with the keys of UTM zone 32 and cells with corners.
+    let keys: [u16; 12] = [1, 1, 0, 2, 1025, 0, 1, 1, 3072, 0, 1, 32632];
+    let mut bytes = original.clone();
+    let u32_at = |at: usize| u32::from_le_bytes(original[at..at + 4].try_into().unwrap());
+    let first = u32_at(4) as usize;
+    let count = usize::from(u16::from_le_bytes([original[first], original[first + 1]]));
+    let mut entries: Vec<[u8; 12]> = (0..count)
+        .map(|entry| first + 2 + 12 * entry)
+        .map(|at| original[at..at + 12].try_into().unwrap())
+        .collect();
+    let keys_at = bytes.len() as u32;
+    bytes.extend(keys.iter().flat_map(|key| key.to_le_bytes()));
+    let mut entry = [0; 12];
+    entry[..2].copy_from_slice(&34_735_u16.to_le_bytes());
+    entry[2..4].copy_from_slice(&3_u16.to_le_bytes());
+    entry[4..8].copy_from_slice(&12_u32.to_le_bytes());
+    entry[8..].copy_from_slice(&keys_at.to_le_bytes());
+    entries.insert(count - 1, entry);
+    let directory = bytes.len() as u32;
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    bytes.extend(entries.concat());
+    bytes.extend([0; 4]);
+    bytes[4..8].copy_from_slice(&directory.to_le_bytes());
+    std::fs::write(&file, bytes).unwrap();
+    let terrain = Terrain::load(&[&file]).unwrap();
+    let (mut lowest, mut highest) = (f64::INFINITY, 0.0_f64);
+    for seed in seeds(500) {
+        let rng = &mut rng(seed);
+        let (column, row) = (
+            rng.random_range(1..398_usize),
+            rng.random_range(1..365_usize),
+        );
+        // Its 37 strips follow each other.
+        let at = 556 + 2 * (399 * row + column);
+        let height = f64::from(u16::from_le_bytes([original[at], original[at + 1]]));
+        let east = 677_562.5 + 25.0 * (column as f64 + 0.5);
+        let north = 253_012.5 - 25.0 * (row as f64 + 0.5);
+        let [lat, lon] = geographic(east, north);
+        let own = terrain.height_m(lat, lon).unwrap();
+        assert!(
+            (own - height).abs() < 0.05,
+            "{column} {row}: {own} {height}"
+        );
+        (lowest, highest) = (lowest.min(height), highest.max(height));
+    }
+    println!("heights from {lowest} to {highest} m");
+    assert!(lowest > 380.0 && highest < 900.0 && highest > 600.0);
 }

@@ -84,6 +84,14 @@ fn hops_are_clear_grazing_or_blocked_by_the_wall() {
     let sites = [site(47.05, 8.01, 500.0), site(47.05, 8.09, 502.0)];
     let axis = Axis::try_new(sites[0], sites[1]).unwrap();
     let ground = Ground::new(&terrain, axis, sites, 10.0).unwrap();
+    let far = Placement::on_line(1e6, 60.0);
+    let line = ground.relay(far).unwrap_err();
+    assert!(
+        line.starts_with("x = 1000000.0 m, y = 0.0 m, altitude 60.0 m is too far")
+            && line.contains("allowed: x from -5000 to ")
+            && line.ends_with("y and altitude from -5000 to 5000 m"),
+        "{line}"
+    );
     close(ground.ends[0].amsl_m, 510.0, 0.01);
     // The site is given 2 m too high: the antenna is above the ground.
     close(ground.ends[1].amsl_m, 510.0, 0.01);

@@ -16,14 +16,14 @@ use uav_relay_tools::plan;
 use uav_relay_tools::plan::area::{self, AreaReport, Criterion};
 use uav_relay_tools::plan::area_map::{self, Shown};
 use uav_relay_tools::plan::carried::Carried;
-use uav_relay_tools::plan::flown::{flown, planned, with_altitudes, with_files, with_plan};
+use uav_relay_tools::plan::flown::{Flown, flown, planned, with_altitudes, with_files, with_plan};
 use uav_relay_tools::plan::locating::Locating;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
 use uav_relay_tools::plan::rate::{Rate, Rates};
 use uav_relay_tools::plan::report::{PlanReport, RateReport};
 use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M, chart};
-use uav_relay_tools::plan::terrain_flight::{self, Flight};
+use uav_relay_tools::plan::terrain_flight::{self, Flight, no_fly_warnings};
 use uav_relay_tools::plan::{NoPlan, Number, Plan, PlanRequest, Unit, Why};
 use uav_relay_tools::provision::block::probe_after_ms;
 
@@ -69,51 +69,14 @@ fn run(options: &Options) -> Result<(), Failure> {
             number,
             rates,
         }) => {
-            let uavs = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
-            if let Some(line) = mission::undescribed_relay_error(&scenario, uavs) {
-                return Err(Failure::input(format!("{}: {line}", options.file())));
-            }
-            if let Some(file) = &options.svg {
-                command::write(file, &svg::draw(&picture(&plan, &scenario)))?;
-            }
-            let (terrain, error) =
-                terrain(options, &scenario, elevation.as_ref(), (&plan, number))?;
-            let error = joined([error, no_fly(options, &scenario, &plan)]);
-            let locating = over_area(options, &scenario, &plan)?;
-            write_map(options, &scenario, &plan, terrain.as_ref())?;
-            let (next, flight) = match error {
-                Some(_) => Default::default(),
-                None => write_out(
-                    options,
-                    &scenario,
-                    (&plan, number),
-                    radio.as_ref(),
-                    elevation.as_ref().zip(terrain.as_ref()),
-                )?,
-            };
-            let rates = rates.map(listed);
-            let known = elevation.as_ref().zip(terrain.as_ref());
-            let known = known.filter(|_| options.altitude == Altitude::Terrain);
-            let over_terrain = known.map(|known| compared(&scenario, &ask, known));
-            let report = PlanReport::new(&plan, number, options.unit())
-                .with_way_back(&scenario, &plan)
-                .with_rates(rates)
-                .in_noise(&scenario.noise)
-                .above(terrain, error);
-            show(
+            let planned = (&plan, number, rates.map(listed));
+            report(
                 options,
-                &PlanReport {
-                    over_terrain,
-                    flight,
-                    locating,
-                    area: AreaReport::new(&scenario, &ask, &plan, options.area.quantile),
-                    ..report
-                },
-            )?;
-            if !options.json {
-                command::print(&next);
-            }
-            Ok(())
+                &scenario,
+                &ask,
+                planned,
+                (elevation.as_ref(), radio.as_ref()),
+            )
         }
         Ok(Planned {
             plan: None, rates, ..
@@ -135,6 +98,61 @@ fn run(options: &Options) -> Result<(), Failure> {
             &PlanReport::unmet(&why, best_sir, number, options.unit()).in_noise(&scenario.noise),
         ),
     }
+}
+
+/// Writes the files of a plan, and prints its report.
+fn report(
+    options: &Options,
+    scenario: &Scenario,
+    ask: &PlanRequest,
+    (plan, number, rates): (&Plan, Number, Option<RateReport>),
+    (elevation, radio): (Option<&Elevation>, Option<&Radio>),
+) -> Result<(), Failure> {
+    let uavs = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+    if let Some(line) = mission::undescribed_relay_error(scenario, uavs) {
+        return Err(Failure::input(format!("{}: {line}", options.file())));
+    }
+    if let Some(file) = &options.svg {
+        command::write(file, &svg::draw(&picture(plan, scenario)))?;
+    }
+    let (terrain, error) = terrain(options, scenario, elevation, (plan, number))?;
+    let error = joined([error, no_fly(options, scenario, plan)]);
+    let locating = over_area(options, scenario, plan)?;
+    write_map(options, scenario, plan, terrain.as_ref())?;
+    let known = elevation.zip(terrain.as_ref());
+    let Flying {
+        next,
+        flight,
+        unknown,
+        problem,
+    } = match (&error, &options.out) {
+        (Some(_), _) => Flying::default(),
+        (None, Some(file)) => write_out(options, file, scenario, (plan, number), radio, known)?,
+        (None, None) => flying(options, scenario, plan, known),
+    };
+    let error = error.or(problem);
+    let known = known.filter(|_| options.altitude == Altitude::Terrain);
+    let over_terrain = known.map(|known| compared(scenario, ask, known));
+    let report = PlanReport::new(plan, number, options.unit())
+        .with_way_back(scenario, plan)
+        .with_rates(rates)
+        .in_noise(&scenario.noise)
+        .above(terrain, error);
+    show(
+        options,
+        &PlanReport {
+            over_terrain,
+            flight,
+            flight_not_simulated: unknown,
+            locating,
+            area: AreaReport::new(scenario, ask, plan, options.area.quantile),
+            ..report
+        },
+    )?;
+    if !options.json {
+        command::print(&next);
+    }
+    Ok(())
 }
 
 /// Finds the plan by the method that the options and the scenario need.
@@ -577,6 +595,16 @@ enum Altitude {
     Terrain,
 }
 
+impl Altitude {
+    /// Returns the method by which relays in flight choose such positions.
+    const fn method(self) -> PlannedMethod {
+        match self {
+            Self::Given | Self::Terrain => PlannedMethod::Align,
+            Self::Free => PlannedMethod::Joint,
+        }
+    }
+}
+
 impl Options {
     fn file(&self) -> String {
         self.scenario.as_ref().map_or_else(
@@ -669,7 +697,8 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
 /// Returns the reason why the plan cannot be flown for the no-fly areas; `None` if it can.
 fn no_fly(options: &Options, scenario: &Scenario, plan: &Plan) -> Option<String> {
     let chain: Vec<_> = plan.places.iter().map(|(place, _)| *place).collect();
-    area::problem(&scenario.no_fly, &chain, options.area.allow_crossing)
+    let is_free = options.altitude == Altitude::Free;
+    area::problem(scenario, &chain, is_free, options.area.allow_crossing)
 }
 
 fn joined(lines: [Option<String>; 2]) -> Option<String> {
@@ -766,35 +795,145 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Positions on which the relays of a plan agree in flight.
+struct InFlight {
+    /// Scenario with an altitude of each relay, if the altitudes were chosen for the terrain.
+    own: Option<Scenario>,
+    flown: Flown,
+    flight: Option<Flight>,
+    /// Reason why the relays cannot fly to these positions.
+    problem: Option<String>,
+}
+
+impl InFlight {
+    /// Simulates the flight of the relays of `plan`, if there is any terrain.
+    fn new(
+        options: &Options,
+        scenario: &Scenario,
+        plan: &Plan,
+        terrain: Option<(&Elevation, &TerrainReport)>,
+    ) -> Result<Self, NoPlan> {
+        let method = options.altitude.method();
+        let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
+        let chosen = terrain.filter(|_| options.altitude == Altitude::Terrain);
+        let own = chosen.map(|(elevation, _)| {
+            terrain_flight::with_altitudes(scenario, elevation, plan, options.tolerance)
+        });
+        let own = own.transpose()?;
+        let scenario = own.as_ref().unwrap_or(scenario);
+        let flown = flown(scenario, relays, method, options.tolerance)?;
+        let flight = terrain.map(|(elevation, report)| {
+            let how = (method, options.tolerance);
+            let allow_blocked = options.terrain.allow_blocked;
+            let flight = Flight::new(scenario, elevation, &flown.plan, how, allow_blocked)?;
+            Ok::<_, NoPlan>(match &own {
+                Some(_) => flight.compared(plan, report.terrain_sir_db),
+                None => flight,
+            })
+        });
+        let flight = flight.transpose()?;
+        let blocked = flight.as_ref().and_then(|flight| flight.problem.clone());
+        let blocked = blocked.map(|line| match own {
+            Some(_) => format!("{line}; relays choose x without the terrain: give another --uavs, or a larger terrain.above_ground_max_m"),
+            None => line,
+        });
+        let problem = joined([blocked, no_fly(options, scenario, &flown.plan)]);
+        let problem = problem
+            .map(|line| format!("at the positions on which {relays} relays would agree, {line}"));
+        Ok(Self {
+            own,
+            flown,
+            flight,
+            problem,
+        })
+    }
+}
+
+/// Report of the flight of a plan's relays.
+#[derive(Default)]
+struct Flying {
+    /// Text that tells the user the next command; empty without `--out`.
+    next: String,
+    flight: Option<Flight>,
+    /// Reason why the flight over the terrain was not simulated.
+    unknown: Option<String>,
+    /// Reason why the relays cannot fly over the terrain.
+    problem: Option<String>,
+}
+
+/// Returns the flight of a plan over the terrain without `--out`; nothing without terrain.
+fn flying(
+    options: &Options,
+    scenario: &Scenario,
+    plan: &Plan,
+    terrain: Option<(&Elevation, &TerrainReport)>,
+) -> Flying {
+    let Some(_) = terrain else {
+        return Flying::default();
+    };
+    let is_field = matches!(scenario.interference, Interference::Field(_));
+    let unknown = if options.x_m.is_some() {
+        Some("relays compute x themselves, without --x-m")
+    } else if is_field && options.altitude == Altitude::Free {
+        Some("in a [field] relays stay at geometry.altitude_m, also with --altitude free")
+    } else if scenario.areas.is_empty() {
+        None
+    } else {
+        Some(
+            "relays compute with one position of an interferer, and this scenario has an interferer.area",
+        )
+    };
+    if let Some(why) = unknown {
+        return Flying {
+            unknown: Some(why.to_owned()),
+            ..Flying::default()
+        };
+    }
+    match InFlight::new(options, scenario, plan, terrain) {
+        Ok(InFlight {
+            flight, problem, ..
+        }) => Flying {
+            unknown: flight.as_ref().and_then(Flight::unknown),
+            flight,
+            problem,
+            ..Flying::default()
+        },
+        Err(none) => Flying {
+            problem: Some(format!("in flight: {}", said(none, options))),
+            ..Flying::default()
+        },
+    }
+}
+
+fn said(none: NoPlan, options: &Options) -> String {
+    match none {
+        NoPlan::Wrong(line) => line,
+        NoPlan::Unmet(why, _) => why.say(options.unit()),
+    }
+}
+
 /// Writes the file of `--out`: the scenario with the positions that its relays will choose.
-///
-/// Returns the text that tells the user the next command, empty without `--out`, and the flight over the terrain, if it is known.
 fn write_out(
     options: &Options,
+    file: &Path,
     scenario: &Scenario,
     (plan, number): (&Plan, Number),
     radio: Option<&Radio>,
     terrain: Option<(&Elevation, &TerrainReport)>,
-) -> Result<(String, Option<Flight>), Failure> {
-    let Some(file) = &options.out else {
-        return Ok(Default::default());
-    };
-    let method = match options.altitude {
-        Altitude::Given | Altitude::Terrain => PlannedMethod::Align,
-        Altitude::Free => PlannedMethod::Joint,
-    };
+) -> Result<Flying, Failure> {
+    let method = options.altitude.method();
     let failed = |none| match none {
         NoPlan::Wrong(why) => Failure::input(why),
-        NoPlan::Unmet(why, _) => Failure::unmet(why.say(options.unit())),
+        NoPlan::Unmet(..) => Failure::unmet(said(none, options)),
     };
     let relays = u16::try_from(plan.places.len()).unwrap_or(u16::MAX);
-    let own = terrain.filter(|_| options.altitude == Altitude::Terrain);
-    let own = own.map(|(elevation, _)| {
-        terrain_flight::with_altitudes(scenario, elevation, plan, options.tolerance)
-    });
-    let own = own.transpose().map_err(failed)?;
+    let InFlight {
+        own,
+        flown,
+        flight,
+        problem,
+    } = InFlight::new(options, scenario, plan, terrain).map_err(failed)?;
     let scenario = own.as_ref().unwrap_or(scenario);
-    let flown = flown(scenario, relays, method, options.tolerance).map_err(failed)?;
     let sections = sections(options, relays)?;
     let sir = db(flown.plan.sir());
     if flown.is_poor() {
@@ -822,26 +961,17 @@ fn write_out(
             )));
         }
     }
-    let flight = terrain.map(|(elevation, report)| {
-        let how = (method, options.tolerance);
-        let allow_blocked = options.terrain.allow_blocked;
-        let flight = Flight::new(scenario, elevation, &flown.plan, how, allow_blocked)?;
-        Ok(match &own {
-            Some(_) => flight.compared(plan, report.terrain_sir_db),
-            None => flight,
-        })
-    });
-    let flight = flight.transpose().map_err(failed)?;
-    let blocked = flight.as_ref().and_then(|flight| flight.problem.clone());
-    let blocked = blocked.map(|line| match own {
-        Some(_) => format!("{line}; relays choose x without the terrain: give another --uavs, or a larger terrain.above_ground_max_m"),
-        None => line,
-    });
-    if let Some(line) = joined([blocked, no_fly(options, scenario, &flown.plan)]) {
+    if let Some(line) = problem {
         return Err(Failure::unmet(format!(
-            "--out {}: not written: at the positions on which {relays} relays would agree, {line}",
+            "--out {}: not written: {line}",
             file.display()
         )));
+    }
+    if terrain.is_none() {
+        let lines = no_fly_warnings(scenario, relays, (method, options.tolerance));
+        for line in lines.map_err(failed)? {
+            command::print_line(&format!("warning: {line}"));
+        }
     }
     let text = match &options.scenario {
         Some(scenario) => std::fs::read_to_string(scenario)
@@ -869,7 +999,12 @@ fn write_out(
         "{file}: the scenario and its plan were written: {relays} relays that agree on positions with {sir:.3} dB; {}",
         next(&file, &sections)
     );
-    Ok((text, flight))
+    Ok(Flying {
+        next: text,
+        unknown: flight.as_ref().and_then(Flight::unknown),
+        flight,
+        problem: None,
+    })
 }
 
 /// Loads the scenario file's sections about the network and the companion computers.

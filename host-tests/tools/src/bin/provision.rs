@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::{Args, Parser, ValueEnum};
 use uav_relay::{Adjust, ChannelLoad, Duration, Local, Measure};
-use uav_relay_scenario::deployment::{Deployment, NETWORK, Network};
+use uav_relay_scenario::deployment::{COMPANION_TOLERANCE, Deployment, NETWORK, Network};
 use uav_relay_scenario::{Interference, PlannedMethod, Scenario, key, mission};
 use uav_relay_sim::command;
 use uav_relay_sim::command::{Failure, MOST_BAUD, number, whole};
@@ -15,7 +15,7 @@ use uav_relay_tools::plan;
 use uav_relay_tools::plan::area;
 use uav_relay_tools::plan::flown::{Flown, flown, is_current, with_plan};
 use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M};
-use uav_relay_tools::plan::terrain_flight::Flight as Simulated;
+use uav_relay_tools::plan::terrain_flight::{Flight as Simulated, no_fly_warnings};
 use uav_relay_tools::plan::{NoPlan, Unit};
 use uav_relay_tools::provision::block::Flight;
 use uav_relay_tools::provision::bundle::{Bundle, FILL_IN};
@@ -167,7 +167,7 @@ impl<'a> Asked<'a> {
             }
             (tolerance, plan) => tolerance
                 .or(plan.map(|plan| plan.tolerance))
-                .unwrap_or(1e-4),
+                .unwrap_or(COMPANION_TOLERANCE),
         };
         for (option, given) in [
             ("--rounds", options.rounds.is_some()),
@@ -269,11 +269,12 @@ impl<'a> Asked<'a> {
         if let Some(plan) = &self.scenario.plan {
             is_current(plan, &flown).map_err(|why| format!("{}: {why}", self.name))?;
         }
-        let chain: Vec<_> = flown.plan.places.iter().map(|(place, _)| *place).collect();
-        if let Some(line) = area::problem(&self.scenario.no_fly, &chain, true) {
+        let chain = flown.plan.chain();
+        let is_free = method == PlannedMethod::Joint;
+        if let Some(line) = area::problem(&self.scenario, &chain, is_free, true) {
             return Err(format!("{}: {line}", self.name));
         }
-        if let Some(line) = area::problem(&self.scenario.no_fly, &chain, false) {
+        if let Some(line) = area::problem(&self.scenario, &chain, is_free, false) {
             command::print_line(&format!("{}: warning: {line}", self.name));
         }
         if flown.is_poor() {
@@ -286,35 +287,35 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
-    /// Simulates the flight over the terrain of the scenario; `None` without terrain or known positions.
+    /// Simulates the flight over terrain and no-fly areas. Returns it if there is terrain, and the positions are known.
     ///
     /// # Errors
     /// A hop that is blocked, a relay too low or too high, or elevation files that cannot be used.
     fn over_terrain(&self, flown: Option<&Flown>) -> Result<Option<Simulated>, String> {
         let named = |line: String| format!("{}: {line}", self.name);
+        let failed = |none| match none {
+            NoPlan::Wrong(line) => named(line),
+            NoPlan::Unmet(why, _) => named(why.say(Unit::Decibels)),
+        };
+        let warn = |line: String| command::print_line(&named(format!("warning: {line}")));
         let error_m = self.deployment.companion.position_error_m;
         let error_m = error_m.map_or(POSITION_ERROR_M, f64::from);
-        if self.scenario.terrain.is_none() {
-            let line = "--allow-blocked: is only for a scenario with a [terrain]";
-            return if self.options.allow_blocked {
-                Err(line.to_owned())
-            } else {
-                Ok(None)
-            };
+        if self.scenario.terrain.is_none() && self.options.allow_blocked {
+            return Err("--allow-blocked: is only for a scenario with a [terrain]".to_owned());
         }
         let method = match self.method {
             Method::Align => PlannedMethod::Align,
             Method::Joint => PlannedMethod::Joint,
             Method::Adjust => {
-                return Ok(self.without_terrain("the method adjust changes altitudes in flight"));
+                return Ok(self.unchecked("the method adjust changes altitudes in flight"));
             }
         };
         let Some(flown) = flown else {
-            return Ok(
-                self.without_terrain("the relays' positions are not known before the flight")
-            );
+            return Ok(self.unchecked("the relays' positions are not known before the flight"));
         };
         let Some(elevation) = Elevation::load(&self.scenario, &[], error_m).map_err(named)? else {
+            let lines = no_fly_warnings(&self.scenario, self.uavs, (method, self.tolerance));
+            lines.map_err(failed)?.into_iter().for_each(warn);
             return Ok(None);
         };
         let how = (method, self.tolerance);
@@ -325,21 +326,25 @@ impl<'a> Asked<'a> {
             how,
             self.options.allow_blocked,
         );
-        let flight = flight.map_err(|none| match none {
-            NoPlan::Wrong(line) => named(line),
-            NoPlan::Unmet(why, _) => named(why.say(Unit::Decibels)),
-        })?;
+        let flight = flight.map_err(failed)?;
         if let Some(line) = &flight.problem {
             return Err(named(line.clone()));
         }
-        for line in flight.warnings() {
-            command::print_line(&format!("{}: warning: {line}", self.name));
-        }
+        flight.warnings().for_each(warn);
         Ok(Some(flight))
     }
 
-    fn without_terrain(&self, why: &str) -> Option<Simulated> {
-        command::print_line(&format!("{}: terrain not checked: {why}", self.name));
+    /// Prints that terrain and no-fly areas of the scenario are not checked, and why.
+    fn unchecked(&self, why: &str) -> Option<Simulated> {
+        let has_terrain = self.scenario.terrain.is_some();
+        for (what, is_there) in [
+            ("terrain", has_terrain),
+            ("no-fly areas", !self.scenario.no_fly.is_empty()),
+        ] {
+            if is_there {
+                command::print_line(&format!("{}: {what} not checked: {why}", self.name));
+            }
+        }
         None
     }
 
@@ -384,8 +389,21 @@ impl<'a> Asked<'a> {
             let probe_after = block::silence(self.probe_after_ms)[0];
             command::carries(baud, ChannelLoad::of_radios(self.uavs), probe_after)?;
         }
-        // The tolerance of a companion.
-        let flight = Flight::new(&self.scenario, self.uavs, 1e-4, self.network)
+        // The relays have to fly to the positions that are checked here.
+        if self.tolerance.total_cmp(&COMPANION_TOLERANCE).is_ne() {
+            let (from, remedy) = match self.scenario.plan {
+                Some(_) => (
+                    format!("{name}: plan.tolerance"),
+                    "run `cargo plan --out` again without --tolerance",
+                ),
+                None => ("--tolerance".to_owned(), "leave it out"),
+            };
+            return Err(format!(
+                "{from} = {:?}: allowed with --bundle: {COMPANION_TOLERANCE:?}, with which companions compute their positions; {remedy}",
+                self.tolerance
+            ));
+        }
+        let flight = Flight::new(&self.scenario, self.uavs, self.tolerance, self.network)
             .map_err(|error| format!("{name}: {error}"))?;
         let flight = match self.method {
             Method::Joint => flight.by(uav_relay::Method::Joint),

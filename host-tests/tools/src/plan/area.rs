@@ -80,7 +80,9 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Res
         // Without areas the plan that ignores the no-fly areas is best, if it can be flown.
         let blind = super::plan(&anywhere(scenario), ask)?;
         let is_field = matches!(scenario.interference, Interference::Field(_));
-        if is_field || problem(&scenario.no_fly, &blind.chain(), criterion.allow_crossing).is_none()
+        let allow_crossing = criterion.allow_crossing;
+        if is_field
+            || problem(scenario, &blind.chain(), ask.free_altitude, allow_crossing).is_none()
         {
             return Ok(blind);
         }
@@ -232,41 +234,112 @@ fn places_of(plan: &Plan) -> Vec<Place> {
     plan.chain().into_iter().map(Place::from).collect()
 }
 
+/// Position x, y and altitude, m.
+type Point = [f64; 3];
+
+/// Returns the ways of two neighbours that close the gap between their positions.
+///
+/// A relay flies straight to its new position. One that `keeps` its altitude, as with Algorithm 1, flies level.
+pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
+    let at = |place: Point, altitude_m: f64| [place[0], place[1], altitude_m];
+    [
+        [from, if keeps[0] { at(to, from[2]) } else { to }],
+        [if keeps[1] { at(from, to[2]) } else { from }, to],
+    ]
+}
+
+fn point(at: &Placement) -> Point {
+    [at.x_m, at.y_m, at.altitude_m].map(f64::from)
+}
+
+fn range(area: &NoFly) -> String {
+    let [low, high] = [area.altitudes_m.start(), area.altitudes_m.end()];
+    format!("{} ({low} to {high} m)", area.key)
+}
+
 /// Returns the reason why relays cannot be at these positions; `None` if they can.
 ///
-/// Ways between neighbours that cross a no-fly area are no reason if `allow_crossing`.
-pub fn problem(no_fly: &[NoFly], chain: &[Placement], allow_crossing: bool) -> Option<String> {
+/// Relays choose their altitudes in flight if `is_free`, apart from those with an altitude of the scenario. Ways between neighbours that
+/// cross a no-fly area are no reason if `allow_crossing`.
+pub fn problem(
+    scenario: &Scenario,
+    chain: &[Placement],
+    is_free: bool,
+    allow_crossing: bool,
+) -> Option<String> {
     let mut lines = Vec::new();
-    let points: Vec<[f64; 3]> = chain
-        .iter()
-        .map(|at| [at.x_m, at.y_m, at.altitude_m].map(f64::from))
-        .collect();
-    for area in no_fly {
-        let range = format!(
-            "{} ({} to {} m)",
-            area.key,
-            area.altitudes_m.start(),
-            area.altitudes_m.end()
+    let points: Vec<Point> = chain.iter().map(point).collect();
+    for area in &scenario.no_fly {
+        let range = range(area);
+        lines.extend(
+            (1..)
+                .zip(&points)
+                .filter_map(|(index, at)| inside(area, index, *at)),
         );
-        for (index, [x, y, h]) in (1..).zip(&points) {
-            if let Some(depth_m) = area
-                .depth_m([*x, *y], *h)
-                .filter(|depth| *depth > ROUNDING_M)
-            {
-                lines.push(format!("relay {index} is {depth_m:.1} m inside {range}"));
+        let neighbours = points.iter().zip(points.iter().skip(1));
+        for (index, (from, to)) in (1..).zip(neighbours).filter(|_| !allow_crossing) {
+            let keeps = [index, index + 1].map(|index| keeps(scenario, index, is_free));
+            let each = ways([*from, *to], keeps).map(|way| (area.crossing_m(way), way[0][2]));
+            let [mut worst, other] = each;
+            if other.0 > worst.0 {
+                worst = other;
             }
-        }
-        for (index, (from, to)) in (1..).zip(points.iter().zip(points.iter().skip(1))) {
-            let crossing_m = area.crossing_m([*from, *to]);
-            if crossing_m > ROUNDING_M && !allow_crossing {
+            let (crossing_m, altitude_m) = worst;
+            if crossing_m > ROUNDING_M {
+                let level = keeps.contains(&true) && (from[2] - to[2]).abs() > ROUNDING_M;
+                let level = level.then(|| format!(" from the altitude {altitude_m:.1} m"));
                 lines.push(format!(
-                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m, and relays that close a gap fly there; `cargo plan --allow-crossing` accepts it",
-                    index + 1
+                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m{}, and relays that close a gap fly there; `cargo plan --allow-crossing` accepts it",
+                    index + 1,
+                    level.unwrap_or_default()
                 ));
             }
         }
     }
     (!lines.is_empty()).then(|| lines.join("; "))
+}
+
+/// Returns true if relay `index` flies at one altitude.
+fn keeps(scenario: &Scenario, index: u16, is_free: bool) -> bool {
+    let own = scenario.relays.get(&index);
+    !is_free || own.is_some_and(|own| own.altitude_m.is_some())
+}
+
+fn inside(area: &NoFly, index: u16, [x, y, h]: Point) -> Option<String> {
+    let depth_m = area.depth_m([x, y], h);
+    let depth_m = depth_m.filter(|depth| *depth > ROUNDING_M)?;
+    Some(format!(
+        "relay {index} is {depth_m:.1} m inside {}",
+        range(area)
+    ))
+}
+
+/// Returns a line for each relay that flies through a no-fly area, or into it.
+///
+/// The relays `indices` fly from their positions `from` to those in `to`.
+pub(super) fn entered(
+    no_fly: &[NoFly],
+    indices: &[u16],
+    [from, to]: [&[Placement]; 2],
+) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (index, (from, to)) in indices.iter().zip(from.iter().zip(to)) {
+        for area in no_fly {
+            let way = [from, to].map(point);
+            let crossing_m = area.crossing_m(way);
+            if let Some(line) = inside(area, *index, way[1]) {
+                lines.push(line);
+            } else if crossing_m > ROUNDING_M {
+                lines.push(format!(
+                    "relay {index} on its way from x = {:.0} m to {:.0} m crosses {} for {crossing_m:.1} m",
+                    from.x_m,
+                    to.x_m,
+                    range(area)
+                ));
+            }
+        }
+    }
+    lines
 }
 
 /// Possible position of a node, with the interference plus noise there, W.
@@ -373,9 +446,18 @@ impl<'a> Search<'a> {
     /// Returns the factor on the SIR of a hop between two relays for the no-fly areas on the way.
     fn preference(&self, node: usize, from: Spot, to: Spot) -> f64 {
         let is_inner = node > 1 && node <= self.scene.relays.len() && !self.allow_crossing;
-        let way = [from, to].map(|spot| [spot.at.x, spot.at.y, spot.at.h]);
+        let keeps = |relay: usize| {
+            let own = self.scene.relays.get(relay);
+            !self.is_free || own.is_some_and(|own| own.holds)
+        };
+        let keeps = [node.saturating_sub(2), node.saturating_sub(1)].map(keeps);
+        let ways = ways(
+            [from, to].map(|spot| [spot.at.x, spot.at.y, spot.at.h]),
+            keeps,
+        );
         let mut areas = self.no_fly.iter();
-        if is_inner && areas.any(|area| area.crossing_m(way) > 0.0) {
+        let is_crossed = |area: &NoFly| ways.iter().any(|way| area.crossing_m(*way) > 0.0);
+        if is_inner && areas.any(is_crossed) {
             CROSSING
         } else {
             1.0

@@ -51,8 +51,9 @@ pub struct Search {
     /// Absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
-    /// Standard deviation of the location by the Cramer-Rao bound, m.
-    pub error_m: f64,
+    /// Standard deviation of the location by the Cramer-Rao bound, m; absent if it is infinite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_m: Option<f64>,
 }
 
 /// Report of the places of an area from which relays can locate the interferer.
@@ -62,10 +63,14 @@ pub struct Locating {
     ///
     /// The error is then at most a tenth of its distance from the line.
     pub located: f64,
-    /// Median over the area of the standard deviation of the location, m.
-    pub error_m: f64,
-    /// Largest standard deviation of the location, m.
-    pub worst_error_m: f64,
+    /// Median over the area of the standard deviation of the location, m; absent if it is infinite.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_m: Option<f64>,
+    /// Largest standard deviation of the location, m; absent if it is infinite.
+    ///
+    /// It is infinite where the measurements do not determine the location.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_error_m: Option<f64>,
     /// Position [x, y] of the interferer with the largest error, m.
     pub worst_at: [f64; 2],
     /// Simulated searches at some positions.
@@ -114,17 +119,27 @@ impl Locating {
         let some = cells.iter().skip(stride / 2).step_by(stride);
         let some: Vec<&Cell> = some.collect();
         let searches = some.into_par_iter().map(|cell| {
-            let failed = |error| format!("the relays of a simulated search do not fly: {error:?}");
-            search(scenario, relays, cell).map_err(failed)
+            search(scenario, relays, cell).map_err(|error| failed(relays, cell.at, &error))
         });
         Ok(Some(Self {
             located: located as f64 / cells.len() as f64,
-            error_m: quantile(&mut errors, 0.5),
-            worst_error_m: error(worst),
+            error_m: finite(quantile(&mut errors, 0.5)),
+            worst_error_m: finite(error(worst)),
             worst_at: worst.at,
             searches: searches.collect::<Result<_, String>>()?,
         }))
     }
+}
+
+/// Returns an error of the location, m; `None` if it is infinite, because JSON has no infinite number.
+fn finite(error_m: f64) -> Option<f64> {
+    error_m.is_finite().then_some(error_m)
+}
+
+fn failed(relays: u16, [x_m, y_m]: [f64; 2], error: &FigureError) -> String {
+    format!(
+        "interferer[0].area: the search of {relays} relays with the interferer at x = {x_m:.1} m, y = {y_m:.1} m cannot be simulated: {error}"
+    )
 }
 
 /// Returns true if the relays locate an interferer in the middle of the cell.
@@ -235,7 +250,7 @@ fn search(scenario: &Scenario, relays: u16, cell: &Cell) -> Result<Search, Figur
         estimate_s: None,
         placed_s: None,
         off_m: None,
-        error_m: cell.error_m.unwrap_or(f64::INFINITY),
+        error_m: cell.error_m.and_then(finite),
     };
     for now in &outcome.snapshots {
         let seconds = now.at.as_micros() as f64 * 1e-6;
@@ -257,12 +272,17 @@ fn search(scenario: &Scenario, relays: u16, cell: &Cell) -> Result<Search, Figur
 impl fmt::Display for Locating {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y] = self.worst_at;
+        let metres = |error: Option<f64>| {
+            error.map_or("not limited".to_owned(), |error_m| {
+                format!("{error_m:.1} m")
+            })
+        };
         writeln!(
             f,
-            "listening: from {:.1} % of the area the relays locate the interferer within a tenth of its distance from the line; error (standard deviation) {:.1} m in the median, {:.1} m at x = {x:.1} m, y = {y:.1} m",
+            "listening: from {:.1} % of the area the relays locate the interferer within a tenth of its distance from the line; error (standard deviation) {} in the median, {} at x = {x:.1} m, y = {y:.1} m",
             100.0 * self.located,
-            self.error_m,
-            self.worst_error_m
+            metres(self.error_m),
+            metres(self.worst_error_m)
         )?;
         let seconds = |time: Option<f64>| {
             time.map_or("never".to_owned(), |time| format!("after {time:.0} s"))
@@ -280,5 +300,20 @@ impl fmt::Display for Locating {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_search_that_cannot_be_simulated_is_named_with_its_place() {
+        let line = failed(3, [10.0, -20.0], &FigureError::Unsettled("the chain"));
+        let part = "of 3 relays with the interferer at x = 10.0 m, y = -20.0 m cannot be simulated: the chain has not settled";
+        assert!(
+            line.starts_with("interferer[0].area: ") && line.contains(part),
+            "{line}"
+        );
     }
 }

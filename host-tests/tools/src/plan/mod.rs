@@ -248,7 +248,8 @@ impl Plan {
         self.back.map_or(there, |back| back.worst_both)
     }
 
-    fn chain(&self) -> Vec<Placement> {
+    /// Returns the positions of the relays, in order from Tx.
+    pub fn chain(&self) -> Vec<Placement> {
         self.places.iter().map(|(place, _)| *place).collect()
     }
 

@@ -171,6 +171,32 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// Returns the error of a search without positions: the limits with their keys, the lowest ground.
+    fn nowhere(&self, scenario: &Scenario) -> String {
+        let [least_m, most_m] = self.clearance_m;
+        let relays = self.scene.relays.len();
+        let most = if most_m.is_finite() {
+            format!(" and at most {most_m} m (terrain.above_ground_max_m)")
+        } else {
+            let band = self.scene.band;
+            format!(
+                ", and at an altitude of {} to {} m (geometry.altitude_min_m and altitude_max_m)",
+                band.least_m, band.most_m
+            )
+        };
+        let heights = self.line.iter().enumerate().filter_map(|(at, height_m)| {
+            let x_m = at as f64 * self.step_m;
+            Some([x_m, height_m - self.datum_m(x_m).ok()?])
+        });
+        let lowest = heights.min_by(|a, b| a[1].total_cmp(&b[1]));
+        let [x_m, height_m] = lowest.unwrap_or_default();
+        format!(
+            "no positions over the terrain for {relays} relays: allowed are positions at least {least_m} m (terrain.above_ground_m) above the highest ground{most}, {} m apart (geometry.min_separation_m); the lowest ground is at x = {x_m:.0} m, {height_m:.1} m above the line between the sites, with terrain.error_m = {}",
+            scenario.min_separation_m,
+            scenario.terrain.as_ref().map_or(0.0, |spec| spec.error_m)
+        )
+    }
+
     /// Returns the lowest and highest altitude of a relay at `x_m`; `None` if there is none.
     fn band_m(&self, x_m: f64) -> Result<Option<[f64; 2]>, String> {
         let datum = self.datum_m(x_m)?;
@@ -606,8 +632,7 @@ pub fn best(
         found = search.best(&grid, floor).or(found);
     }
     let Some((mut chain, mut sir)) = found else {
-        let why = "no positions over the terrain are high enough and far enough apart: check terrain.above_ground_m, terrain.above_ground_max_m and the band of altitudes";
-        return Err(NoPlan::Unmet(Why::Plain(why.to_owned()), None));
+        return Err(NoPlan::Unmet(Why::Plain(search.nowhere(scenario)), None));
     };
     if scene.distance_m / search.ground.step_m() > POINTS {
         search =

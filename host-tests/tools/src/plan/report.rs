@@ -372,9 +372,12 @@ pub struct PlanReport {
     /// Gain of positions that are chosen for the terrain; absent for other positions.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub over_terrain: Option<OverTerrain>,
-    /// Simulated flight over the terrain, with the loss of each relay; only with `--out`.
+    /// Flight over the terrain, with the loss of each relay; absent without elevation files.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flight: Option<Flight>,
+    /// Reason why the flight over the terrain was not simulated; absent if it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flight_not_simulated: Option<String>,
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
@@ -442,6 +445,7 @@ impl PlanReport {
             terrain: None,
             over_terrain: None,
             flight: None,
+            flight_not_simulated: None,
             area: None,
             locating: None,
             room: !plan.mission.config().lateral.is_single(),
@@ -573,6 +577,8 @@ impl PlanReport {
         }
         if let Some(flight) = &self.flight {
             _ = writeln!(text, "{flight}");
+        } else if let Some(why) = &self.flight_not_simulated {
+            _ = writeln!(text, "flight over the terrain not simulated: {why}");
         }
         let not_modelled = self
             .terrain

@@ -18,6 +18,7 @@ use uav_relay_terrain::diffraction::LIGHT_M_S;
 use uav_relay_terrain::profile::Ground;
 use uav_relay_terrain::room::{Limits, rooms};
 
+use super::area::entered;
 use super::flown::{alone, shortest};
 use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
@@ -183,7 +184,7 @@ pub struct Without {
     /// SIR of the worst hop with terrain, dB; absent if the others find no positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_sir_db: Option<f64>,
-    /// Blocked hops, relays too low, and ways too low; absent if there are none.
+    /// Blocked hops, relays and ways too low or in a no-fly area; absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
@@ -201,6 +202,9 @@ pub struct Flight {
     pub off_m: Option<f64>,
     /// Positions of the relays.
     pub relays: Vec<FlownRelay>,
+    /// Position error of a relay, m.
+    #[serde(skip)]
+    position_error_m: f64,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
     /// Reason why the relays cannot fly there: a blocked hop, a relay too low or too high.
@@ -223,19 +227,11 @@ impl Flight {
         allow_blocked: bool,
     ) -> Result<Self, NoPlan> {
         let relays = u16::try_from(flown.places.len()).unwrap_or(u16::MAX);
-        let simulates = relays <= MOST_RELAYS;
-        let setup = setup(scenario, relays, method, tolerance)?;
-        let mut places: Vec<Placement> = flown.places.iter().map(|(place, _)| *place).collect();
-        let mut agreed = None;
-        if simulates {
-            let outcome = simulated(setup.clone())?;
-            let taken = outcome.relays.iter().map(|relay| relay.setpoint);
-            places = taken
-                .collect::<Option<_>>()
-                .filter(|_| outcome.ending == Ending::Settled)
-                .ok_or_else(source::nothing)?;
-            agreed = Some(outcome.ended);
-        }
+        let (places, losses) = if relays <= MOST_RELAYS {
+            losses(scenario, relays, (method, tolerance))?
+        } else {
+            (flown.chain(), Vec::new())
+        };
         let flown = settled(scenario, relays, tolerance, &places)?;
         let report = elevation.report(scenario, &flown).map_err(NoPlan::Wrong)?;
         let ground = elevation.ground(scenario).map_err(NoPlan::Wrong)?;
@@ -246,25 +242,14 @@ impl Flight {
             wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
         };
         let rooms = rooms(&ground, &places, &report, limits).map_err(NoPlan::Wrong)?;
-        let is_lost = |lost: u16| {
-            let mut setup = setup.clone();
-            let at = agreed? + Duration::from_millis(1_000);
-            setup.kills = vec![(lost, at)];
-            Some(without(
-                scenario,
-                elevation,
-                &ground,
-                (setup, tolerance),
-                (lost, &places),
-            ))
-        };
-        let lost = if relays > 1 { 1..relays + 1 } else { 0..0 };
-        let without: Vec<Option<Result<Without, NoPlan>>> =
-            lost.into_par_iter().map(is_lost).collect();
+        let closed =
+            |loss: &Loss| without(scenario, elevation, &ground, tolerance, (loss, &places));
+        let without: Vec<Result<Without, NoPlan>> = losses.par_iter().map(closed).collect();
         Ok(Self {
             terrain_sir_db: report.terrain_sir_db,
             loss_db: None,
             off_m: None,
+            position_error_m: elevation.position_error_m(),
             relays: (1..)
                 .zip(&places)
                 .zip(rooms)
@@ -275,7 +260,7 @@ impl Flight {
                     room_m,
                 })
                 .collect(),
-            without: without.into_iter().flatten().collect::<Result<_, _>>()?,
+            without: without.into_iter().collect::<Result<_, _>>()?,
             problem: elevation.problem(&report, allow_blocked),
         })
     }
@@ -294,12 +279,26 @@ impl Flight {
         }
     }
 
-    /// Returns the lines about the loss of one relay that name a problem.
+    /// Returns the reason why the flight was not simulated; `None` if it was.
+    pub fn unknown(&self) -> Option<String> {
+        (self.relays.len() > usize::from(MOST_RELAYS))
+            .then(|| format!("more than {MOST_RELAYS} relays"))
+    }
+
+    /// Returns the lines about relays without a room, and about the loss of one relay that name a problem.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        self.without.iter().filter_map(|without| {
+        let error_m = self.position_error_m;
+        let confined = self.relays.iter().filter(|relay| relay.room_m.is_none());
+        let confined = confined.map(move |relay| {
+            format!(
+                "relay {} has no room: one of its hops gets worse, blocked or grazing, within the position error of {error_m} m (companion.position_error_m)",
+                relay.index
+            )
+        });
+        confined.chain(self.without.iter().filter_map(|without| {
             let problem = without.problem.as_ref()?;
             Some(format!("without relay {}: {problem}", without.lost))
-        })
+        }))
     }
 
     /// Returns the text about the room of relay `index`; empty if it is unknown.
@@ -316,11 +315,10 @@ impl Flight {
 impl fmt::Display for Flight {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sir_db = self.terrain_sir_db;
-        let what = if self.relays.len() > usize::from(MOST_RELAYS) {
-            "flight (not simulated: too many relays)"
-        } else {
-            "simulated flight"
-        };
+        let what = self.unknown().map_or_else(
+            || "simulated flight".to_owned(),
+            |why| format!("flight (not simulated: {why})"),
+        );
         write!(f, "{what}: worst hop {sir_db:.3} dB with terrain")?;
         if let (Some(loss_db), Some(off_m)) = (self.loss_db, self.off_m) {
             let than = if loss_db < 0.0 { "more" } else { "less" };
@@ -388,28 +386,111 @@ fn settled(
     Ok(ProfiledMission::new(scenario, relays, tolerance)?.plan(places, "", false))
 }
 
-/// Simulates the loss of relay `lost` of a chain at `places`. Returns the terrain below the others.
+/// Positions of the others after the loss of one relay, in a simulated flight.
+struct Loss {
+    lost: u16,
+    /// Numbers of the other relays.
+    left: Vec<u16>,
+    /// Positions of the other relays; `None` if they find none.
+    places: Option<Vec<Placement>>,
+}
+
+/// Simulates the flight of `relays` relays, and the loss of each of them.
+///
+/// Returns the positions before a loss, and the losses; none for a single relay.
+fn losses(
+    scenario: &Scenario,
+    relays: u16,
+    (method, tolerance): (PlannedMethod, f64),
+) -> Result<(Vec<Placement>, Vec<Loss>), NoPlan> {
+    let setup = setup(scenario, relays, method, tolerance)?;
+    let outcome = simulated(setup.clone())?;
+    let taken = outcome.relays.iter().map(|relay| relay.setpoint);
+    let places = taken
+        .collect::<Option<_>>()
+        .filter(|_| outcome.ending == Ending::Settled)
+        .ok_or_else(source::nothing)?;
+    let at = outcome.ended + Duration::from_millis(1_000);
+    let loss = |lost: u16| {
+        let mut setup = setup.clone();
+        setup.kills = vec![(lost, at)];
+        let outcome = simulated(setup)?;
+        let left: Vec<u16> = (1..=relays).filter(|index| *index != lost).collect();
+        let relays = left
+            .iter()
+            .map(|index| outcome.relays.get(usize::from(*index) - 1));
+        let places: Option<Vec<Placement>> = relays.map(|relay| relay?.setpoint).collect();
+        let is_known = matches!(outcome.ending, Ending::Settled | Ending::NoQuorum);
+        Ok(Loss {
+            lost,
+            left,
+            places: places.filter(|_| is_known),
+        })
+    };
+    let lost = if relays > 1 { 1..relays + 1 } else { 0..0 };
+    let losses: Vec<Result<Loss, NoPlan>> = lost.into_par_iter().map(loss).collect();
+    Ok((places, losses.into_iter().collect::<Result<_, _>>()?))
+}
+
+/// Reason for the user why nothing is known after the loss of a relay.
+const NOWHERE: &str = "the other relays find no positions";
+
+/// Returns a warning for each relay whose loss leads another one into a no-fly area.
+///
+/// The flight is simulated without terrain. There are no warnings without no-fly areas.
+///
+/// # Errors
+/// [`NoPlan`]: the simulated relays do not agree on positions.
+pub fn no_fly_warnings(
+    scenario: &Scenario,
+    relays: u16,
+    how: (PlannedMethod, f64),
+) -> Result<Vec<String>, NoPlan> {
+    if scenario.no_fly.is_empty() {
+        return Ok(Vec::new());
+    }
+    if relays > MOST_RELAYS {
+        return Ok(vec![format!(
+            "no-fly areas not checked after the loss of a relay: more than {MOST_RELAYS} relays are not simulated"
+        )]);
+    }
+    let (places, losses) = losses(scenario, relays, how)?;
+    let lines = losses.iter().filter_map(|loss| {
+        let problems = match &loss.places {
+            Some(to) => entered(&scenario.no_fly, &loss.left, [&loss.before(&places), to]),
+            None => vec![NOWHERE.to_owned()],
+        };
+        let problem = problems.join("; ");
+        (!problems.is_empty()).then(|| format!("without relay {}: {problem}", loss.lost))
+    });
+    Ok(lines.collect())
+}
+
+impl Loss {
+    /// Returns the positions of the others in a chain at `places`.
+    fn before(&self, places: &[Placement]) -> Vec<Placement> {
+        let left = (1..).zip(places).filter(|(index, _)| *index != self.lost);
+        left.map(|(_, place)| *place).collect()
+    }
+}
+
+/// Returns terrain and no-fly areas below the others, after a loss in a chain at `places`.
 fn without(
     scenario: &Scenario,
     elevation: &Elevation,
     ground: &Ground<'_>,
-    (setup, tolerance): (Setup, f64),
-    (lost, places): (u16, &[Placement]),
+    tolerance: f64,
+    (loss, places): (&Loss, &[Placement]),
 ) -> Result<Without, NoPlan> {
-    let outcome = simulated(setup)?;
-    let left = |index: &u16| *index != lost;
-    let relays = (1..).zip(&outcome.relays).filter(|(index, _)| left(index));
-    let after: Option<Vec<(u16, Placement)>> = relays
-        .map(|(index, relay)| Some((index, relay.setpoint?)))
-        .collect();
-    let after = after.filter(|_| matches!(outcome.ending, Ending::Settled | Ending::NoQuorum));
-    let Some(after) = after else {
+    let lost = loss.lost;
+    let Some(to) = &loss.places else {
         return Ok(Without {
             lost,
             terrain_sir_db: None,
-            problem: Some("the other relays find no positions".to_owned()),
+            problem: Some(NOWHERE.to_owned()),
         });
     };
+    let left = |index: &u16| *index != lost;
     let mut others = scenario.clone();
     others.relays = scenario
         .relays
@@ -417,17 +498,17 @@ fn without(
         .filter(|(index, _)| left(index))
         .map(|(index, own)| (index - u16::from(*index > lost), own.clone()))
         .collect();
-    let relays = u16::try_from(after.len()).unwrap_or(u16::MAX);
-    let to: Vec<Placement> = after.iter().map(|(_, place)| *place).collect();
-    let plan = settled(&others, relays, tolerance, &to)?;
+    let relays = u16::try_from(to.len()).unwrap_or(u16::MAX);
+    let plan = settled(&others, relays, tolerance, to)?;
     let mut report = elevation.report(&others, &plan).map_err(NoPlan::Wrong)?;
-    for (height, (index, _)) in report.heights.iter_mut().zip(&after) {
+    for (height, index) in report.heights.iter_mut().zip(&loss.left) {
         height.index = usize::from(*index);
     }
     let lines = [report.blocked(), elevation.problem(&report, true)];
     let mut problems: Vec<String> = lines.into_iter().flatten().collect();
-    let from = (1..).zip(places).filter(|(index, _)| left(index));
-    for ((index, from), to) in from.zip(&to) {
+    let from = loss.before(places);
+    problems.extend(entered(&scenario.no_fly, &loss.left, [&from, to]));
+    for (index, (from, to)) in loss.left.iter().zip(from.iter().zip(to)) {
         let least_m = elevation.spec.above_ground_m;
         if let Some([x_m, height_m]) = lowest(ground, *from, *to)
             .map_err(NoPlan::Wrong)?

@@ -404,7 +404,7 @@ impl Bundle<'_> {
         }
         _ = writeln!(
             page,
-            "box:   x {:.0} to {:.0} m, y {:.0} to {:.0} m, altitude {:.1} to {:.1} m",
+            "limits of the mission: x {:.0} to {:.0} m, y {:.0} to {:.0} m, altitude {:.1} to {:.1} m above the line between the sites; neither the ground nor no-fly areas are in them",
             fence.least_x_m,
             fence.most_x_m,
             fence.least_y_m,
