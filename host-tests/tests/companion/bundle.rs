@@ -630,6 +630,29 @@ fn a_relay_on_wires_is_checked() {
     }
 }
 
+/// Checks that the positions that are checked are those to which companions fly.
+#[test]
+fn a_bundle_has_the_tolerance_of_the_companions() {
+    let files = Files::new();
+    let refused = |text: &str, more: &str, part: &str| {
+        let output = bundle(&files, text, more);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success() && said.contains(part), "{said}");
+        assert!(!files.path("out").exists());
+    };
+    let part = "--tolerance = 0.05: allowed with --bundle: 0.0001";
+    refused(&scenario(), "--tolerance 0.05", part);
+    let scenario = files.write("coarse.toml", scenario());
+    let out = files.text("plan.toml");
+    let mut planned = Command::new(plan());
+    planned.args(["--uavs", "3", "--tolerance", "0.05", "--scenario"]);
+    let made = planned.args([&scenario, "--out", &out]).output().unwrap();
+    assert!(made.status.success(), "{made:?}");
+    let planned = std::fs::read_to_string(out).unwrap();
+    let part = "scenario.toml: plan.tolerance = 0.05: allowed with --bundle: 0.0001";
+    refused(&planned, "", part);
+}
+
 #[test]
 fn a_bundle_is_written_whole_or_not_at_all() {
     let files = Files::new();
@@ -709,24 +732,6 @@ fn a_bundle_is_written_whole_or_not_at_all() {
     }
     let high = scenario().replace("altitude_m = 20.0", "altitude_m = 980.0");
     refused(&high, "", "FENCE_ALT_MAX would be");
-    // Companions would fly to other positions than those that are checked here.
-    refused(
-        &scenario(),
-        "--tolerance 0.05",
-        "--tolerance = 0.05: allowed with --bundle: 0.0001",
-    );
-    let mut planned = Command::new(plan());
-    let files_of = ["scenario.toml", "plan.toml"].map(|name| files.text(name));
-    files.write("scenario.toml", &scenario());
-    planned.args(["--uavs", "3", "--tolerance", "0.05", "--scenario"]);
-    let made = planned.args([&files_of[0], "--out", &files_of[1]]).output();
-    assert!(made.unwrap().status.success());
-    let planned = std::fs::read_to_string(&files_of[1]).unwrap();
-    refused(
-        &planned,
-        "",
-        "scenario.toml: plan.tolerance = 0.05: allowed",
-    );
     let unsited = scenario().replace("[site]", "[geometry.site]");
     refused(&unsited, "", "site");
     let left: Vec<_> = std::fs::read_dir(files.path(""))
