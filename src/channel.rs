@@ -41,7 +41,7 @@ pub enum ChannelError {
     Carrier,
     /// An excess loss factor is not within 1 (0 dB) to 1e20 (200 dB).
     ExcessLoss,
-    /// The excess loss without line of sight is smaller than that with line of sight.
+    /// The excess loss without line of sight is smaller than the excess loss with line of sight.
     LossOrder,
     /// The weight of the line-of-sight path in the channel model is not within 0 to 1.
     Weight,
@@ -97,14 +97,13 @@ impl Channel {
 
     /// Creates a channel with excess losses in dB (0 to 200), as in data sheets and the paper.
     ///
-    /// It computes a power of ten and so cannot be used in a constant.
+    /// The function computes a power of ten, so it cannot be used in a constant.
     ///
     /// ```
-    /// use uav_relay::Channel;
-    /// use uav_relay::channel::AirGround;
+    /// use uav_relay::Channel; use uav_relay::channel::AirGround;
     ///
-    /// let channel = Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?;
-    /// assert!((channel.mu_nlos() / channel.mu_los() - 123.0).abs() < 0.1, "20.9 dB more");
+    /// let channel = Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?; assert!((channel.mu_nlos() / channel.mu_los()
+    /// - 123.0).abs() < 0.1, "20.9 dB more");
     /// # Ok::<(), uav_relay::channel::ChannelError>(())
     /// ```
     ///

@@ -27,16 +27,16 @@ const FRAMES: u64 = 8;
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain, as [3, 20] for 3/20. The rest is for
-/// other messages, retransmissions, and waits for a free channel.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain, as two numbers: 3 and 20 stand for
+/// 3/20. The rest is for other messages, retransmissions, and waits for a free channel.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
 /// Maximum number of relays in range at which transmissions are assumed to find the channel free.
 ///
-/// For every further nine relays, a transmission is assumed to take one frame time longer. Nine are this relay and
-/// four on either side.
+/// For every further nine relays, a transmission is assumed to take one frame time longer. The nine relays in range
+/// are this relay and four on either side.
 const NEAR: u16 = 9;
 
 /// Maximum time assumed for one transmission with its wait for the channel. The unit is the duration of a frame.
@@ -64,8 +64,8 @@ impl ChannelLoad {
 
     /// Returns the bits that the channel must be able to carry in one `probe_after`, times 1e6.
     ///
-    /// These are the bits that an idle chain sends in that time, divided by the fraction of the channel that they may
-    /// take. The result divided by a time in microseconds is a data rate in bit/s.
+    /// This is the number of bits that an idle chain sends in this time, divided by the fraction of the channel that
+    /// these bits may take. The result divided by a time in microseconds is a data rate in bit/s.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -147,7 +147,7 @@ impl ChannelLoad {
     }
 
     /// Returns the minimum `probe_after` of the relays' settings on a channel of `baud` bit/s. `dead_after` should be
-    /// three times that.
+    /// three times this value.
     pub const fn least_probe_after(self, baud: u32) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         Duration::from_micros(self.needed().div_ceil(baud))
@@ -186,7 +186,7 @@ pub struct ChannelFull {
     pub least_baud: u32,
     /// Minimum [`Settings::probe_after`](crate::Settings::probe_after) for these relays, in whole ms.
     ///
-    /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times that.
+    /// [`Settings::dead_after`](crate::Settings::dead_after) should be three times this value.
     pub least_probe_after: Duration,
     /// Maximum number of relays in range that this channel carries without a longer `probe_after`.
     pub most_in_range: u16,

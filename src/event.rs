@@ -13,9 +13,10 @@ use crate::side::Side;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Event {
-    /// `Relay::setpoint` has changed: fly there, or hold the position if there is none.
+    /// `Relay::setpoint` has changed: fly to the new setpoint, or hold the position if there is no setpoint.
     SetpointChanged,
-    /// The chain has agreed on positions. If the interference is known, also on a target SIR (`Relay::target`).
+    /// The chain has agreed on positions. If the interference is known, the chain has also agreed on a target SIR
+    /// (`Relay::target`).
     Converged,
     /// Every allowed target SIR is infeasible, and all relays keep their positions. Raised at the leader, which is
     /// relay 1, or relay N if the mission gives the interference as a distribution along x. `Relay::restart`, a new
@@ -88,8 +89,8 @@ pub enum Event {
     /// relays of the view use the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
     /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
-    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land this
-    /// part.
+    /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land the
+    /// drones of this part.
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
@@ -118,8 +119,8 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
-    /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
-    /// fly away.
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap: the
+    /// drone of this relay may fly away.
     MayLeave,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
@@ -133,8 +134,8 @@ pub enum Event {
     },
 }
 
-/// Events without a node that the firmware polls before those that concern a node. The rest, `POLLED_LAST`, come at
-/// the end.
+/// Events without a node that the firmware polls first. Then come the events that concern a node, and at the end the
+/// events in `POLLED_LAST`.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -217,8 +218,8 @@ impl NodeEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u32,
-    /// Raised events that concern a node on the upstream [0] or downstream [1] side. Bit i stands for
-    /// `NodeEvent::ALL[i]`.
+    /// Raised events that concern a node on one side: entry 0 for the upstream side, entry 1 for the downstream side.
+    /// Bit i stands for `NodeEvent::ALL[i]`.
     kinds: [u16; 2],
     nodes: [[u16; NodeEvent::ALL.len()]; 2],
 }

@@ -52,11 +52,11 @@ pub enum Method {
     /// mission gives the interference as a distribution along x (an interference field).
     #[default]
     Align,
-    /// Optimise x, y and altitude jointly, within the mission's ranges. For up to 100 relays, and not for a mission
-    /// that gives the interference as a distribution along x.
+    /// Optimise x, y and altitude jointly, within the mission's ranges. This method is for up to 100 relays, and not
+    /// for a mission that gives the interference as a distribution along x.
     Joint,
-    /// Optimise x by the paper's Algorithm 1, then move one relay after the other by Algorithm 2. Not for a mission
-    /// that gives the interference as a distribution along x.
+    /// Optimise x by the paper's Algorithm 1, then move one relay after the other by Algorithm 2. This method is not
+    /// for a mission that gives the interference as a distribution along x.
     Adjust(Adjust),
 }
 
@@ -89,7 +89,7 @@ impl Default for Adjust {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
-    /// Maximum interference power that can be received, W: 1e-30 to 1e6. Samples above it are rejected.
+    /// Maximum interference power that can be received, W: 1e-30 to 1e6. Samples with a larger power are rejected.
     pub i_max_w: f32,
     /// Number of samples to take at one position before an estimate is made from them, 100 to 1 000 000.
     pub samples: u32,
@@ -121,7 +121,7 @@ pub struct Settings {
     /// Measurement of the interference by this relay; `None` for no measurement. The measured interference replaces
     /// the distribution along x that the mission gives. Use `None` if the mission gives no such distribution.
     pub measure: Option<Measure>,
-    /// Estimation of an unknown interferer from measurements; `None` for no estimation. It has to be `None` if the
+    /// Estimation of an unknown interferer from measurements; `None` for no estimation. It must be `None` if the
     /// mission gives the interference as a distribution along x. Set it on all relays of a chain, or on none.
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
@@ -134,8 +134,8 @@ pub struct Settings {
     /// Key and epoch for signing frames. With a key the relay accepts signed frames only; without one, it accepts
     /// frames from any sender. Give the key to all relays of a network, or to none.
     pub auth: Option<Auth>,
-    /// Maximum time from one relay's `poll_transmit` to the next relay's, above 0. It applies to a message of 100
-    /// bytes (a sweep), includes the computation, and is scaled for longer messages.
+    /// Maximum time from `poll_transmit` at one relay to `poll_transmit` at the next relay; above 0. The time is for
+    /// a message of 100 bytes (a sweep), and includes the computation. For longer messages it is scaled up.
     pub hop_time: Duration,
     /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
     /// `dead_after`, and more on a channel that loses frames.
@@ -148,15 +148,16 @@ pub struct Settings {
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
     pub without_quorum: WithoutQuorum,
-    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With it the firmware
-    /// has to report the drone's position: `Relay::handle_position`.
+    /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With a guard the
+    /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves there in 32 equal steps; 0 for one step.
+    /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves to the new
+    /// position in 32 equal steps. With 0 it moves in one step.
     ///
-    /// If all drones arrive together, no hop is worse on the way than before or after ([`docs::batteries`](crate::docs::batteries)).
-    /// Choose it so that the longest way, about a spacing of the chain, takes no more than the drones' usual speed. The same for
-    /// all relays of a chain.
-    /// At most four times `dead_after`.
+    /// If all drones arrive together, no hop is worse on the way than before or after
+    /// ([`docs::batteries`](crate::docs::batteries)). Choose it so that the longest way, about a spacing of the
+    /// chain, takes no more than the drones' usual speed. Use the same value for all relays of a chain. At most four
+    /// times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
     /// True if a relay without a guard may leave the chain (`Relay::leave`). Its neighbours then fly close to the drone
@@ -164,8 +165,8 @@ pub struct Settings {
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
-    /// mission without such positions is then rejected if its distance differs from that of the surveyed positions.
-    /// Set it on all relays of a chain, or on none.
+    /// mission without such positions is then rejected if its distance differs from the distance of the surveyed
+    /// positions. Set it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
@@ -183,7 +184,8 @@ impl Default for Settings {
 impl Settings {
     /// Returns true if a relay with these settings may fly a mission with the time slots of `config`.
     ///
-    /// The slots are equal, or fitted with the method `Joint` against a known interferer.
+    /// This is so if the slots are equal. It is also so for fitted slots (as long as each hop needs), with the method
+    /// `Joint` and a known interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;
@@ -265,7 +267,7 @@ impl Settings {
             .with_probe_after(probe_after)
     }
 
-    /// Returns the settings with another `probe_after`, and with three times that as `dead_after`.
+    /// Returns the settings with another `probe_after`, and with three times this value as `dead_after`.
     #[must_use]
     pub const fn with_probe_after(self, probe_after: Duration) -> Self {
         Self {
@@ -297,9 +299,9 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` cannot be used. It is not [`Method::Align`] although the mission gives the interference as a
-    /// distribution along x, it is the joint method for more than 100 relays, or it needs a feature that the crate
-    /// was built without.
+    /// `method` cannot be used. Either the mission gives the interference as a distribution along x, and the method
+    /// is not [`Method::Align`]. Or the joint method has more than 100 relays. Or the method needs a feature that the
+    /// crate was built without.
     Method,
     /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
     /// traffic in both directions this method needs a known interferer.

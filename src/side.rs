@@ -32,8 +32,8 @@ impl Side {
         }
     }
 
-    /// Returns the side from which messages arrive that travel along the chain in the direction `heading`. Replies go
-    /// there.
+    /// Returns the side from which messages arrive that travel along the chain in the direction `heading`. Replies
+    /// are sent to this side.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

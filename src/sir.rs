@@ -93,23 +93,22 @@ impl Sender {
         }
     }
 
-    /// Returns the linear SIR at a relay at `to`, while this sender is at x = `from_m`, m. Infinite if both are at one
-    /// place.
+    /// Returns the linear SIR at a relay at `to`, while this sender is at x = `from_m`, m. The SIR is infinite if
+    /// both are at the same position.
     ///
-    /// Without noise, with the relay at (x, y, h), the interferer at (X, Y, 0), and the sender, of gain A, at (x0, y0,
-    /// h0):
+    /// Without noise, with the relay at (x, y, h), the interferer at (X, Y, 0), and the sender, of gain A, at (x0,
+    /// y0, h0):
     ///
     /// ```text
-    /// SIR = A ((X - x)^2 + (Y - y)^2 + h^2) / L^2
-    /// L^2 = (x - x0)^2 + (y - y0)^2 + (h - h0)^2
+    /// SIR = A ((X - x)^2 + (Y - y)^2 + h^2) / L^2 L^2 = (x - x0)^2 + (y - y0)^2 + (h - h0)^2
     /// ```
     ///
-    /// With y = y0 = 0 this is the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u` /
-    /// `p_MSI`)(eta / `mu_los`).
+    /// With y = y0 = 0 this is the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u`
+    /// / `p_MSI`)(eta / `mu_los`).
     ///
-    /// For interference that the mission gives as a distribution along x, the expected SIR is p Upsilon(x) / (eta L^2)
-    /// from Tx and p Upsilon(x) / (`mu_los` L^2) from a relay. L is the length of the hop, m, and p the sender's power,
-    /// W.
+    /// For interference that the mission gives as a distribution along x, the expected SIR is p Upsilon(x) / (eta
+    /// L^2) from Tx and p Upsilon(x) / (`mu_los` L^2) from a relay. L is the length of the hop, m, and p the sender's
+    /// power, W.
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.cross_section);
@@ -170,13 +169,13 @@ pub enum Extremum {
     /// First hop's SIR along x falls up to this x, m (the paper's Psi^x), and rises beyond. The interferer is ahead
     /// of Tx (X > 0).
     Valley(f32),
-    /// First hop's SIR falls up to the first x, m, rises up to the second, and falls beyond. The interferer is ahead
-    /// of Tx (X > 0), with noise.
+    /// First hop's SIR falls up to the first x, m, rises up to the second x, and falls beyond. The interferer is
+    /// ahead of Tx (X > 0), with noise.
     ValleyAndHill(f32, f32),
     /// The first hop's SIR rises along x up to this x, m, and falls beyond it. The interferer is behind Tx (X < 0).
     Hill(f32),
-    /// First hop's SIR falls with x. The interferer is at X = 0, or it is ahead of Tx and the noise exceeds the
-    /// interference.
+    /// First hop's SIR falls with x. The interferer is at X = 0, or the interferer is ahead of Tx and the noise
+    /// exceeds the interference.
     Falls,
     /// First hop's SIR is the same at every x: the interferer is at Tx, and there is no noise.
     Level,

@@ -6,7 +6,7 @@
 pub struct Stats {
     /// Frames given to the link for transmission, including retransmissions.
     pub sent: u32,
-    /// Retransmissions for want of a reply, of view proposals and of messages that travel along the chain.
+    /// Retransmissions of view proposals and of messages along the chain, because there was no reply.
     pub repeats: u32,
     /// View proposals and messages along the chain that this relay has started as the leader.
     pub passes_begun: u32,
@@ -38,10 +38,11 @@ pub struct Stats {
     pub malformed: u32,
     /// Received intact frames of another network.
     pub foreign: u32,
-    /// Received intact frames from a node that is no neighbour. On a point-to-point link also those for another node.
+    /// Received intact frames from a node that is no neighbour. On a point-to-point link also frames for another
+    /// node.
     pub misaddressed: u32,
-    /// Received messages from the wrong neighbour. They are messages along the chain from the next relay, or replies
-    /// from the previous one.
+    /// Received messages from the wrong neighbour. These are messages along the chain from the next relay, or replies
+    /// from the previous relay.
     pub misdirected: u32,
     /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
@@ -52,8 +53,8 @@ pub struct Stats {
     pub view: u32,
     /// Views (chain memberships) that this relay has accepted.
     pub views: u32,
-    /// Ignored outdated messages, for example of a pass along the chain or a view change that has ended. Also mission
-    /// offers that this relay has not requested by a recent hello.
+    /// Ignored outdated messages, for example of a pass along the chain or a view change that has ended. Mission
+    /// offers that this relay has not requested by a recent hello also count here.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or while this relay measures nothing.
     pub samples_rejected: u32,

@@ -9,14 +9,14 @@ use crate::wire::message::{Coarse, Detail, Entry};
 
 /// State that a relay has reported to the ground station through the chain.
 ///
-/// Pairs have the neighbour toward Tx first, then the one toward Rx.
+/// In a pair, the first value is for the neighbour toward Tx, the second for the neighbour toward Rx.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
     /// Number of the relay in the mission, from 1 (next to Tx) to N.
     pub relay: u16,
     /// Time at which the relay was in this state, on the station's clock.
     pub at: Instant,
-    /// Position of the drone by its autopilot; `None` if it has none.
+    /// Position of the drone by its autopilot; `None` if the autopilot has no position.
     pub position: Option<Placement>,
     /// Setpoint of the drone; `None` if the drone has none.
     pub setpoint: Option<Placement>,
@@ -24,8 +24,8 @@ pub struct Report {
     pub agreed: Option<Placement>,
     /// Phase of the relay in the agreement on positions.
     pub phase: Phase,
-    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). It permits the relay to rely on the
-    /// agreed positions.
+    /// True while the relay has a lease ([`Relay::lease`](crate::Relay::lease)). The lease permits the relay to rely
+    /// on the agreed positions.
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,

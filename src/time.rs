@@ -100,7 +100,7 @@ impl Add<Duration> for Instant {
 const DISORDER: Duration = Duration::from_millis(100);
 
 /// Maximum advance of internal time in one call, some 140 years. The limit keeps one wrong reading of the clock from
-/// taking internal time to its maximum, where no timer expires any more.
+/// taking internal time to its maximum, at which no timer would expire.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Clock that converts the caller's time to internal time, which never runs backward. The caller's time may step in
@@ -191,8 +191,8 @@ impl Jitter {
         state
     }
 
-    /// Returns `span` plus a random time of up to an eighth of it. Relays on a shared channel then do not transmit at
-    /// the same time again and again.
+    /// Returns `span` plus a random time of up to an eighth of `span`. Relays on a shared channel then do not
+    /// transmit at the same time again and again.
     #[inline(never)] // called from many places
     pub(crate) fn spread(&mut self, span: Duration) -> Duration {
         // Multiplication scales the random part, since a Cortex-M has no division of this width.

@@ -61,8 +61,9 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. Views of one number by different proposers
-    /// have different values, and so do thousands of consecutive views.
+    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. Views with the same
+    /// number and different proposers have different values. Thousands of consecutive views also have different
+    /// values.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -20,7 +20,8 @@ use crate::time::Duration;
 
 /// Pause after the autopilot's port has failed, ended or accepted nothing.
 ///
-/// It is also the minimum time between two data exchanges with the relay, unless an event requests one earlier.
+/// This is also the minimum time between two data exchanges with the relay, unless an event requests an earlier
+/// exchange.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Link to a drone's autopilot that several tasks share.
@@ -72,8 +73,8 @@ impl AsyncAutopilot {
 
     /// Waits for the next event of the autopilot link and returns it to the firmware.
     ///
-    /// Only one task may wait: a second one takes its place, and the first one is no longer woken. The future may be
-    /// dropped: an event that it has not returned is kept for the next call.
+    /// Only one task may wait: if a second task waits, it takes the place of the first task, and the first task is no
+    /// longer woken. The future may be dropped. An event that it has not returned is kept for the next call.
     ///
     /// Constant work each time it is polled.
     pub fn next_event(&self) -> impl Future<Output = AutopilotEvent> + '_ {
@@ -86,7 +87,7 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers at one.
+    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers at a setpoint.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }

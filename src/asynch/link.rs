@@ -17,15 +17,16 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Pause before a port that has failed or ended is used again, in byte times (11 ms at 115 200 baud).
+/// Pause before a port that has failed or ended is used again, in byte times (128: 11 ms at 115 200 baud).
 const PAUSE: u32 = 128;
 
 /// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
 ///
-/// One byte time is for a byte that the port may still be sending, and one for the tolerance of its clock.
+/// The first byte time is for a byte that the port may still be sending. The second byte time is for the tolerance of
+/// the port's clock.
 const PIN_HOLD: u32 = 2;
 
-/// Delimiter byte that ends every frame. Sent before a frame, it ends a previous frame that was cut short.
+/// Delimiter byte that ends every frame. If it is sent before a frame, it ends a previous frame that was cut short.
 const DELIMITER: [u8; 1] = [0];
 
 /// Link of a port: its reader and writer, the frame queue, and its driver-enable pin if it has one.
@@ -172,7 +173,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sends a frame, after a delimiter if the previous one may have been cut short. Returns true on success.
+    /// Sends a frame, after a delimiter if the previous frame may have been cut short. Returns true on success.
     async fn send(&mut self, frame: &[u8], clock: &impl Clock) -> bool {
         if self.cut && !self.write(&DELIMITER, clock).await {
             return false;
@@ -213,8 +214,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the driver-enable pin high or low, if there is one. Returns true on success and without a pin; pauses
-    /// after a failure.
+    /// Sets the driver-enable pin high or low, if there is one. Returns true on success, and if there is no pin.
+    /// After a failure it pauses and returns false.
     async fn drive(
         &mut self,
         high: bool,
@@ -264,9 +265,9 @@ fn next<'f>(
     })
 }
 
-/// Awaits `future`; returns its output, and true if the future was pending at least once. False means that it never
-/// waited. The caller must then yield to the executor, so that a port that is always ready does not block other
-/// tasks.
+/// Awaits `future`; returns its output and a flag. The flag is true if the future was pending at least once, false if
+/// it never waited. If it never waited, the caller must yield to the executor, so that a port that is always ready
+/// does not block other tasks.
 pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     let mut future = pin!(future);
     let mut waited = false;
@@ -279,7 +280,8 @@ pub(super) async fn track_pending<F: Future>(future: F) -> (F::Output, bool) {
     (output, waited)
 }
 
-/// Capacity of a frame queue, bytes: two frames of maximum length. The frame that the port is sending is not in it.
+/// Capacity of a frame queue, bytes: two frames of maximum length. The frame that the port is sending is not in the
+/// queue.
 const CAPACITY: usize = 2 * MAX_FRAME;
 
 /// Queued frames in sending order, each with its delimiter.
@@ -329,14 +331,14 @@ impl Frames {
     }
 }
 
-/// Time and timers of an executor: `embassy-time`, `rtic-monotonics`, a virtual clock. A delay alone (`embedded-hal-async`'s
-/// `DelayNs`) is not enough, because the relay needs the current time.
+/// Time and timers of an executor, for example `embassy-time`, `rtic-monotonics` or a virtual clock. A delay alone
+/// (`embedded-hal-async`'s `DelayNs`) is not enough, because the relay needs the current time.
 pub trait Clock {
     /// Returns the present time since an arbitrary start; it never decreases.
     fn now(&self) -> Instant;
 
-    /// Completes at time `at`, at once if that has passed. The future is dropped and created anew whenever another event comes
-    /// first.
+    /// Completes at time `at`; at once if `at` is in the past. If another event comes first, the future is dropped,
+    /// and a new future is created later.
     fn sleep_until(&self, at: Instant) -> impl Future<Output = ()>;
 }
 

@@ -21,7 +21,7 @@ pub struct AsyncRelay<'a> {
     runner: Cell<Option<Waker>>,
     /// Waker of the firmware's task that waits for an event of the relay.
     listener: Cell<Option<Waker>>,
-    /// Counters of the ports: [0] of the upstream or the shared port, [1] of the downstream port.
+    /// Counters of the ports: entry 0 for the upstream or the shared port, entry 1 for the downstream port.
     stats: [Cell<SerialStats>; 2],
 }
 
@@ -61,8 +61,8 @@ impl<'a> AsyncRelay<'a> {
         self.lend(|relay| look(relay))
     }
 
-    /// Completes with the next event for the firmware. Only one task can wait at a time; a second one replaces the first.
-    /// Dropping the future loses no event. Takes constant time per poll.
+    /// Completes with the next event for the firmware. Only one task can wait at a time; a second task replaces the
+    /// first. Dropping the future loses no event. Takes constant time per poll.
     pub fn next_event(&self) -> impl Future<Output = Event> + '_ {
         poll_fn(|cx| {
             let event = self.lend(Relay::poll_event).flatten();
@@ -101,8 +101,8 @@ impl<'a> AsyncRelay<'a> {
         self.changed.set(false);
     }
 
-    /// Completes once the relay has input that the task which runs its ports has not handled. If there already is
-    /// some, it completes at once.
+    /// Completes once the relay has input that the task which runs its ports has not handled. If there is such input
+    /// already, the future completes at once.
     pub(super) fn changed(&self) -> impl Future<Output = ()> + '_ {
         poll_fn(|cx| {
             store_waker(&self.runner, cx);

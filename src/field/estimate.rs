@@ -30,15 +30,15 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. With it no sum of samples or squares
+/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. In this format no sum of samples or squares
 /// overflows.
 const ONE: f32 = 2_147_483_648.0;
 
 /// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
 const FRACTION: u32 = 31;
 
-/// Smallest mean of the samples I / `I_max` for which an estimate is made. Below it the rounding would falsify the
-/// estimate.
+/// Smallest mean of the samples I / `I_max` for which an estimate is made. With a smaller mean, rounding would
+/// falsify the estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
 /// Estimator of the mean interference power at one position; samples are summed, not stored.
@@ -52,7 +52,7 @@ pub struct Estimator {
     squares: u128,
     /// Sum of the accepted samples I / `I_max`, in units of 2^-31.
     sum: u64,
-    /// Maximum interference power `I_max`, W; 0 if [`Estimator::new`] got a value out of range.
+    /// Maximum interference power `I_max`, W; 0 if the argument of [`Estimator::new`] was out of range.
     i_max_w: f32,
     accepted: u32,
     rejected: u32,
@@ -81,8 +81,8 @@ pub struct Estimate {
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// It does not make every estimate good: with 100 samples and a true alpha below 1.5, most estimates exist only
-    /// because alpha is overestimated by chance, and their Upsilon is too low.
+    /// An estimate with this minimum can still be bad: with 100 samples and a true alpha below 1.5, most estimates
+    /// exist only because alpha is overestimated by chance, and their Upsilon is too low.
     pub const MIN_SAMPLES: u32 = 100;
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.
@@ -128,7 +128,8 @@ impl Estimator {
         self.accepted
     }
 
-    /// Number of rejected samples. Many of them mean that `I_max` is too small, or that the receiver measures nothing.
+    /// Number of rejected samples. A large number means that `I_max` is too small, or that the receiver measures
+    /// nothing.
     pub const fn rejected(&self) -> u32 {
         self.rejected
     }

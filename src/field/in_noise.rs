@@ -42,8 +42,8 @@ impl Field {
 }
 
 impl InNoise<'_> {
-    /// Returns Upsilon = E[1/I] with the noise N included, 1/W: `upsilon` / (1 + N `upsilon`). It is finite, since
-    /// `upsilon` is at most 1e32 and N at most 1.
+    /// Returns Upsilon = E[1/I] with the noise N included, 1/W: `upsilon` / (1 + N `upsilon`). The result is finite,
+    /// because `upsilon` is at most 1e32 and N at most 1.
     const fn of(&self, upsilon: f32) -> f32 {
         if self.noise_w > 0.0 {
             upsilon / (1.0 + self.noise_w * upsilon)
@@ -52,7 +52,7 @@ impl InNoise<'_> {
         }
     }
 
-    /// Returns Upsilon = E[1/I] at `x_m` with the receiver noise included, 1/W. It is interpolated as in
+    /// Returns Upsilon = E[1/I] at `x_m` with the receiver noise included, 1/W. The value is interpolated as in
     /// [`Field::upsilon`].
     pub const fn upsilon(&self, x_m: f32) -> f32 {
         match self.field.around(x_m) {

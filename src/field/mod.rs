@@ -9,11 +9,11 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W. It is for interference I of 1e9 W down to 1e-32 W, beyond all that is
-/// measured.
+/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to an interference I of 1e9 W down to 1e-32 W, a wider
+/// range than all measurements.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
-/// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power there.
+/// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power at this x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FieldPoint {
@@ -31,7 +31,7 @@ pub enum FieldError {
     Points,
     /// The x of a point of the interference field, `x_m`, is not within -1e7 to 1e7 m.
     Place,
-    /// The `x_m` of a point is not larger than the `x_m` of the point before it.
+    /// The `x_m` of a point is not larger than the `x_m` of the previous point.
     Order,
     /// The `upsilon_per_w` of a point is not within 1e-9 to 1e32.
     Upsilon,
@@ -127,7 +127,7 @@ impl Field {
         }
     }
 
-    /// Returns the points of the interference field, a table of the interference over x.
+    /// Returns the points of the interference field, a table of Upsilon = E[1/I] along x.
     pub const fn points(&self) -> &'static [FieldPoint] {
         self.points
     }
@@ -223,7 +223,8 @@ impl FieldPoint {
         }
     }
 
-    /// Returns a point at `x_m`, m, of a field whose I / `i_max_w` has a Beta distribution there.
+    /// Returns a point at `x_m`, m, of a field. At this x the ratio of the interference power I to `i_max_w` has a
+    /// Beta distribution.
     ///
     /// `None` if [`beta_upsilon`](Self::beta_upsilon) is `None` for the same shapes and `i_max_w`. Constant work.
     #[expect(

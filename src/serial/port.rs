@@ -38,13 +38,14 @@ impl core::error::Error for Fault {}
 ///
 /// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA may implement it directly.
 pub trait SerialPort {
-    /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if there is none.
+    /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if no byte was
+    /// received.
     ///
     /// # Errors
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault>;
 
-    /// Takes bytes to send from the front of `bytes` (never empty), and returns their number; 0 if full.
+    /// Takes bytes to send from the front of `bytes` (never empty), and returns their number; 0 if the port is full.
     ///
     /// # Errors
     /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.
@@ -114,10 +115,10 @@ where
 
 /// Port with [`embedded_io`] traits.
 ///
-/// Its reads and writes may block, so each is only called after the port has reported that the call will not block. Its `flush`
-/// may block and is never called. So the port cannot report when the last byte has left, and a driver-enable pin uses the byte
-/// time instead. For that the port must send at once and without gaps: a UART with a FIFO or a ring buffer does, a USB adapter
-/// does not.
+/// Its `read` and `write` may block. Each is called only after the port has reported that the call will not block.
+/// Its `flush` may block and is never called. So the port cannot report when the last byte has left, and a
+/// driver-enable pin uses the byte time instead. For this the port must send at once and without gaps. A UART with a
+/// FIFO or a ring buffer does so; a USB adapter does not.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Io<S>(pub S);
 

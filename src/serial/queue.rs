@@ -184,9 +184,10 @@ impl InterruptEnd<'_> {
         }
     }
 
-    /// Passes queued bytes to `take` until it returns false or none is left; returns true if some are left.
+    /// Passes queued bytes to `take` until `take` returns false or no byte is left. Returns true if some bytes are
+    /// left.
     ///
-    /// If some are left, the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
+    /// If bytes are left, the interrupt for an empty data register must stay enabled; otherwise it must be disabled.
     pub fn send(&mut self, mut take: impl FnMut(u8) -> bool) -> bool {
         while let Some(byte) = self.outgoing.peek() {
             if !take(byte) {

@@ -63,8 +63,9 @@ impl defmt::Format for Key {
 pub struct Auth {
     /// Secret key that authenticates the frames of the network.
     pub key: Key,
-    /// Start counter of this relay, from 1, larger at every start. A number in flash that is incremented before use, or the seconds
-    /// of a clock that never runs backward. If an epoch is reused, frames recorded in it are accepted again.
+    /// Start counter of this relay, from 1, larger at every start. Use a number in flash that is incremented before
+    /// use, or the seconds of a clock that never runs backward. If an epoch is reused, frames recorded in it are
+    /// accepted again.
     pub epoch: u32,
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct Sent {
     pub(crate) len: usize,
 }
 
-/// Endpoint of one node: checks received frames, and addresses, numbers and signs those that it sends. It has the
+/// Endpoint of one node: checks received frames, and addresses, numbers and signs sent frames. The endpoint has the
 /// node number, the frame counter, and the authentication sessions.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
@@ -50,8 +50,8 @@ impl Endpoint {
         }
     }
 
-    /// Parses a frame that the deframer has decoded. Returns it if it is intact and of this network; anything else is
-    /// counted in `stats` and dropped.
+    /// Parses a frame that the deframer has decoded. Returns the frame if it is intact and of this network. Any other
+    /// frame is counted in `stats` and dropped.
     pub(crate) fn open<'a>(
         &self,
         decoded: Result<&'a [u8], DeframeError>,
@@ -96,8 +96,8 @@ impl Endpoint {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Writes `message` to node `to` into `frame`. If that node cannot verify this node's tags yet, a handshake is
-    /// written instead, and the caller sends the message later.
+    /// Encodes `message`, which goes to node `to`, into `frame`. If node `to` cannot verify this node's tags yet, a
+    /// handshake is written instead, and the caller sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,

@@ -17,7 +17,8 @@ const CHECK: usize = 4;
 /// Maximum length of a frame before COBS, bytes.
 pub const MAX_DECODED: usize = HEADER + MAX_BODY + TAG_ROOM + CHECK;
 
-/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, the delimiter another one.
+/// Maximum length of a frame on the wire, bytes. COBS adds one byte below 254 bytes, and the delimiter is another
+/// byte.
 pub const MAX_FRAME: usize = MAX_DECODED + 2;
 
 /// Header flag: an authentication tag follows the body.
@@ -39,7 +40,7 @@ pub struct Header {
     pub sender: u16,
     /// Node number of the frame's destination.
     pub destination: u16,
-    /// Number of frames that the sender sent before this one, wrapping.
+    /// Number of frames that the sender sent before this frame, wrapping.
     pub counter: u32,
 }
 
@@ -103,8 +104,8 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer `out` into which a frame's body is written. It is after the COBS code byte and the
-/// header.
+/// Returns the part of the buffer `out` into which a frame's body is written. This part begins after the COBS code
+/// byte and the header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
@@ -160,18 +161,18 @@ pub struct Opened<'a> {
     pub body: &'a [u8],
     /// Bytes that the authentication tag covers: header and body.
     pub signed: &'a [u8],
-    /// Authentication tag, not verified; `None` for a frame without one.
+    /// Authentication tag, not verified; `None` for a frame without a tag.
     pub tag: Option<[u8; TAG]>,
     /// True if the body is an authentication handshake and not a message.
     pub handshake: bool,
 }
 
-/// Parses `plain`, a frame without COBS and delimiter. It checks the CRC, but neither the tag nor the body.
+/// Parses `plain`, a frame without COBS and delimiter. The function checks the CRC, but neither the tag nor the body.
 ///
 /// The receiver checks the addresses before it decodes the body.
 ///
 /// # Errors
-/// [`FrameError`]. The CRC is checked first, so every other error is one of an intact frame.
+/// [`FrameError`]. The CRC is checked first, so every other error is about an intact frame.
 pub fn open(plain: &[u8]) -> Result<Opened<'_>, FrameError> {
     let (checked, check) = plain.split_last_chunk::<CHECK>().ok_or(FrameError::Short)?;
     let (head, rest) = checked

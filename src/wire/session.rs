@@ -32,7 +32,7 @@ use crate::time::{Duration, Instant};
 /// Actual sender of a frame that bears this relay's own node number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sender {
-    /// The relay itself: the received frame is an echo of one that it sent.
+    /// The relay itself: the received frame is an echo of a frame that this relay has sent.
     Itself,
     /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
     Unknown,
@@ -44,7 +44,7 @@ pub(crate) enum Sender {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's; false if it is the same.
+    /// True if the other node's epoch (start counter) is newer than this relay's; false if both epochs are the same.
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
@@ -53,8 +53,8 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number, to win against a later node. Of two nodes with the same
-/// node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number, so that it wins against a node that starts later. Of
+/// two nodes with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -67,8 +67,8 @@ const PEERS: usize = 8;
 /// shows that two nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
-/// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. Fewer can be
-/// delayed frames.
+/// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. A smaller number
+/// can be due to delayed frames.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -79,13 +79,13 @@ struct Peer {
     /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only until
     /// the node has proved its presence.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce. That proves that the node is present, and that both nodes
-    /// know each other's nonce.
+    /// True if the node has repeated this relay's nonce. The repetition proves that the node is present, and that
+    /// both nodes know each other's nonce.
     proven: bool,
     /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
-    /// Time of the last frame that proved the node present. A handshake with a larger nonce than all before counts,
-    /// too.
+    /// Time of the last frame that proved the node present. A handshake with a larger nonce than all earlier nonces
+    /// also counts as proof.
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
@@ -147,7 +147,8 @@ pub(crate) struct Session {
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     last_number: u32,
-    /// Claim of another node to this relay's node number, as shown by a handshake; `None` once it is read.
+    /// Claim of another node to this relay's node number, as shown by a handshake; `None` once the claim has been
+    /// read.
     rival: Option<Rival>,
     /// Number of uses of session table entries so far, wrapping. By this number the entries are ordered by their last use.
     clock: u32,
@@ -174,7 +175,8 @@ pub(crate) enum Checked {
     Unsigned,
     /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that was received before. Also one whose counter is so old that this is not known.
+    /// Authentic frame that was received before. Also a frame whose counter is so old that it is unknown if the frame
+    /// was received before.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
@@ -219,7 +221,7 @@ impl Session {
         }
     }
 
-    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, or from the last nonce if that is
+    /// Forgets all nodes, as after a restart. New nonces count up from `claim`, or from the last nonce, whichever is
     /// larger.
     pub(crate) fn restart(&mut self, claim: u32) {
         if claim > self.last_number {
@@ -229,8 +231,8 @@ impl Session {
         self.peers.clear();
     }
 
-    /// Schedules a handshake to the known node `to`, once in each lease renewal `number`. It shows this relay's
-    /// nonce, so that another node with this relay's number detects the duplicate.
+    /// Schedules a handshake to the known node `to`, once in each lease renewal `number`. The handshake contains this
+    /// relay's nonce, so that another node with this relay's number detects the duplicate.
     pub(crate) fn show(&mut self, to: u16, number: u16) {
         if self.shown == Some(number) {
             return;
@@ -269,7 +271,7 @@ impl Session {
         self.rival.take()
     }
 
-    /// Returns a node to which a handshake is due, and marks it as sent; `None` if no handshake is due.
+    /// Returns a node to which a handshake must be sent, and marks it as sent; `None` if there is none.
     pub(crate) fn take_handshake(&mut self) -> Option<u16> {
         let peer = self.peers.iter_mut().find(|peer| peer.handshake)?;
         peer.handshake = false;

@@ -33,17 +33,17 @@ pub enum UploadError {
     Version,
     /// The number of relays differs from the number in the mission loaded before flight.
     Relays,
-    /// The mission loaded before flight, or the uploaded one, has an interference field. A field is a known
+    /// The mission loaded before flight, or the uploaded mission, has an interference field. A field is a known
     /// distribution of the interference along x.
     Field,
     /// A parameter of the new mission is outside its range.
     Mission(MissionError),
-    /// The upload was made for another mission than the one loaded into this relay before flight.
+    /// The upload was made for another mission than the mission loaded into this relay before flight.
     Base,
     /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. The positions may
     /// be invalid, or have another distance than the mission.
     Line(LineError),
-    /// The relay already has the uploaded mission or a newer one.
+    /// The relay already has the uploaded mission or a newer mission.
     Old,
     /// Frames are not signed, because `Settings::auth` is not set.
     Unsigned,
@@ -78,7 +78,7 @@ impl Upload {
     /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
     /// The path-loss factor eta of links to the ground is clamped between the factors with line of sight (`mu_los`)
-    /// and without (`mu_nlos`), because rounding can have put it outside.
+    /// and without (`mu_nlos`), because rounding may have put eta outside.
     ///
     /// # Errors
     /// [`UploadError`] names the problem.
@@ -101,7 +101,7 @@ impl Upload {
     /// others.
     ///
     /// # Errors
-    /// [`UploadError::Line`] if the positions define no line, or one of another length than the mission's distance.
+    /// [`UploadError::Line`] if the positions define no line, or a line whose length is not the mission's distance.
     pub fn with_sites(self, sites: Sites) -> Result<Self, UploadError> {
         let valid = sites.are_valid().then_some(sites);
         let sites = valid.ok_or(UploadError::Line(LineError::Sites))?;

@@ -185,8 +185,8 @@ impl Carrot {
         self.is_standing
     }
 
-    /// Returns the position of the moving target at the time `ago` before its last step. It extrapolates backward by
-    /// the target's velocity.
+    /// Returns the position of the moving target at the time `ago` before its last step. The function extrapolates
+    /// backward with the target's velocity.
     fn place_before(&self, ago: Duration) -> Placement {
         let t = seconds(ago.min(LONGEST_LAG));
         let [x, y, up] = self.velocity_m_s;
@@ -309,7 +309,7 @@ const MOVING: Duration = Duration::from_millis(100);
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
-/// repetition makes it wobble.
+/// repetition makes an ArduCopter wobble.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
 /// Number of consecutive reports of another target after which the sent target counts as refused. An ArduCopter
@@ -411,7 +411,7 @@ impl Target {
         self.due = now + STANDING;
     }
 
-    /// Returns true if the target is to be sent at `now`, and schedules the next transmission.
+    /// Returns true if the target must be sent at `now`, and schedules the next transmission.
     pub(super) fn should_send(&mut self, now: Instant, kind: Kind) -> bool {
         let is_standing = self.carrot.is_standing();
         self.due = now
@@ -531,8 +531,8 @@ mod tests {
         }
     }
 
-    /// Checks that the moving target stops gently when the setpoint is withdrawn at any moment of a flight. It never
-    /// stops beyond the setpoint.
+    /// Checks that the moving target stops gently when the setpoint is withdrawn at any moment of a flight. The
+    /// target never stops beyond the setpoint.
     #[test]
     fn a_withdrawn_carrot_stops_gently_anywhere() {
         let to = Placement::on_line(60.0, 20.0);

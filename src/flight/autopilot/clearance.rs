@@ -41,9 +41,9 @@ pub(super) struct Clearance {
     /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers. A repetition of
     /// this command is answered again, without another effect.
     accepted: Option<(Address, RelayNumbers)>,
-    /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without one.
+    /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without an answer.
     answer: Option<(Address, u8)>,
-    /// Side whose lost relays the operator has reported as landed; `None` once the relay has been told.
+    /// Side whose lost relays the operator has reported as landed; `None` once the relay has been informed.
     cleared: Option<Side>,
 }
 
@@ -101,8 +101,8 @@ impl Clearance {
         Some(AutopilotEvent::LostCleared { side, relays, from })
     }
 
-    /// Returns true while an operator's command that reports landed relays is being processed. That ends when the
-    /// command is answered and the relay knows that the lost relays have landed.
+    /// Returns true while an operator's command that reports landed relays is being processed. The processing ends
+    /// when the command is answered and the relay knows that the lost relays have landed.
     pub(super) const fn is_busy(&self) -> bool {
         self.answer.is_some() || self.cleared.is_some()
     }
@@ -119,7 +119,7 @@ impl Clearance {
 }
 
 impl LostSide {
-    /// Returns true if `named` are exactly the lost relays of this side, and at least one.
+    /// Returns true if `named` are exactly the lost relays of this side, and this side has a lost relay.
     fn is_all_of(&self, named: &RelayNumbers) -> bool {
         let is_named = |node: &u16| named.contains(node);
         let is_lost = |node: &u16| *node == 0 || self.nodes.contains(node);
@@ -130,7 +130,7 @@ impl LostSide {
     }
 }
 
-/// Returns the relay number in a command's parameter; 0 for an invalid one.
+/// Returns the relay number in a command's parameter; 0 for an invalid number.
 fn number(parameter: f32) -> u16 {
     #[expect(
         clippy::cast_possible_truncation,

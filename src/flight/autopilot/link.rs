@@ -32,12 +32,13 @@ use crate::flight::mavlink::signing::Signing;
 /// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// MAVLink system number of this component until the autopilot's is known: the default of autopilots.
+/// MAVLink system number of this component until the system number of the autopilot is known. It is the default of
+/// autopilots.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Maximum time between two targets to a PX4 that counts as on time. After a longer one the PX4 may have entered its
+/// Maximum time between two targets to a PX4 that counts as on time. After a longer time the PX4 may have entered its
 /// failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
@@ -56,7 +57,7 @@ const SETTLED: Duration = Duration::from_millis(1_000);
 /// Minimum time between two reports to the operator of reasons not to control the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
-/// Time for which the guard must hold the drone back before the operator is told the reason. The guard is the
+/// Time for which the guard must hold the drone back before the reason is reported to the operator. The guard is the
 /// collision avoidance.
 const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 
@@ -95,9 +96,10 @@ pub struct Autopilot {
     located_at: Option<Instant>,
     /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Release of control that has not been reported yet, and the time to report it.
+    /// Release (end of the relay's control of the drone) that has not been reported yet, and the time to report it.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if he can.
+    /// Reason why the pilot cannot give the relay control of the drone, and the time since which this reason exists.
+    /// `None` if the pilot can give control.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
     /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
@@ -105,10 +107,10 @@ pub struct Autopilot {
     /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
     /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
-    /// because of the upstream neighbour, the second because of the downstream one.
+    /// because of the upstream neighbour, the second because of the downstream neighbour.
     hold: [Option<HoldReason>; 2],
     /// Newest reasons why the guard (collision avoidance) holds the drone back, and since when. The first is because
-    /// of the upstream neighbour, the second because of the downstream one.
+    /// of the upstream neighbour, the second because of the downstream neighbour.
     newest_hold: ([Option<HoldReason>; 2], Instant),
     /// True from the acceptance of a new view (set of relays) until its relays have agreed on positions.
     is_new_view: bool,
@@ -345,7 +347,7 @@ impl Autopilot {
     /// Reports to the operator why the guard (collision avoidance) holds the relay back, for each side.
     ///
     /// Reasons are sent while the relay controls the drone or in [`State::Standby`], once they have lasted for 3 s.
-    /// Shorter ones are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
+    /// Shorter holds are normal while the relays agree on new positions. Equal lines are at least 10 s apart.
     pub fn handle_hold(&mut self, now: Instant, reasons: [Option<HoldReason>; 2]) {
         let now = self.clock.advance(now);
         if self.newest_hold.0 != reasons {
@@ -555,7 +557,7 @@ impl Autopilot {
     }
 
     /// Returns the time at which the present reason not to control the drone must be reported. `None` once it has
-    /// been.
+    /// been reported.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -624,7 +626,7 @@ impl Autopilot {
         Some(frame)
     }
 
-    /// Returns the frame with the next target if one is due.
+    /// Returns the frame with the next target for the autopilot; `None` if no target must be sent now.
     fn next_target(&mut self, now: Instant) -> Option<FrameBytes> {
         let kind = self.vehicle.kind()?;
         let is_overdue = |target: Target| now.since(target.due) > OVERDUE;
@@ -711,7 +713,7 @@ impl Autopilot {
     }
 
     /// Returns the newest measured position of the drone, with its time, for `Relay::handle_position`. `None` if
-    /// there is no new one since the last call.
+    /// there is no new position since the last call.
     pub fn poll_position(&mut self) -> Option<Position> {
         let position = self.position.take()?;
         let at = self.clock.external(position.at);
@@ -727,8 +729,8 @@ impl Autopilot {
     }
 
     /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. The caller gives them to
-    /// `Relay::handle_sample`. The measurement is the newest one that was taken in the air. `None` if there is no new
-    /// one since the last call, or without the feature `sensing`.
+    /// `Relay::handle_sample`. The result is the newest measurement that was taken in the air. `None` if there is no
+    /// new measurement since the last call, or without the feature `sensing`.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
     }
@@ -797,7 +799,9 @@ impl Autopilot {
 }
 
 impl Autopilot {
-    /// Exchanges data with the relay of the same drone and handles the link's timeouts. Data go in both directions.
+    /// Exchanges data with the relay of the same drone, in both directions, and handles the link's timeouts.
+    ///
+    /// In this documentation the *link* is this object, the link to the autopilot. A call takes five steps:
     ///
     /// | step | from | to | data | why at this point |
     /// | --- | --- | --- | --- | --- |
@@ -808,16 +812,18 @@ impl Autopilot {
     /// | 5 | relay | link | readiness, hold reasons, setpoint, values for the operator | the link sends the newest ones |
     ///
     /// Call it in each turn of the main loop, after [`handle_bytes`](Self::handle_bytes) and before
-    /// [`poll_transmit`](Self::poll_transmit). The relay sends the position in the same turn if its ports are served afterwards. A loop
-    /// may call it a second time once they have been served: the link then sends a new setpoint in the same turn. A call that has
-    /// nothing new to hand over has no effect.
+    /// [`poll_transmit`](Self::poll_transmit). If the relay's ports are served after this call, the relay sends the new position in the
+    /// same turn. A loop may call it a second time after the ports were served: the link then sends a new setpoint in the same turn. A
+    /// call without new data has no effect.
     ///
-    /// Returns true if the relay was handed anything that it did not know, so that its frames, its events and its next timeout may have
-    /// changed; and the drone's position, if a new one was handed over. A loop that serves the relay's ports after each call ignores both.
+    /// Returns a flag and a position. The flag is true if the relay received new data from the link. Then the relay's frames, its events
+    /// and its next timeout may have changed. The position is the drone's position if the link passed a new position to the relay, else
+    /// `None`. A loop that serves the relay's ports after each call can ignore both results.
     ///
-    /// The caller still hands events of the relay to [`handle_event`](Self::handle_event), because [`Relay::poll_event`] returns each event
-    /// once, and [`handle_bearing`](Self::handle_bearing) the bearing of an antenna that [`point_antenna`](Self::point_antenna) does not set. The first line is that of [`new`](Self::new); an
-    /// exchange replaces a line of [`fly_along`](Self::fly_along).
+    /// Some calls remain for the caller. It passes events of the relay to [`handle_event`](Self::handle_event), because
+    /// [`Relay::poll_event`] returns each event once. For an antenna that [`point_antenna`](Self::point_antenna) does not set, it passes
+    /// the bearing to [`handle_bearing`](Self::handle_bearing). The line from Tx to Rx is at first the line given to [`new`](Self::new).
+    /// An exchange replaces a line that [`fly_along`](Self::fly_along) has set.
     ///
     /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when these positions have changed.
     ///

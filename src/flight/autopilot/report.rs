@@ -35,7 +35,7 @@ const NAMES: [&str; 4] = ["sir_db", "relay_x", "relay_y", "relay_h"];
 /// Topic of a line of text to the operator. If a line has to wait, a newer line of the same topic replaces it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Topic {
-    /// Event about the control of the drone: the relay takes or loses it.
+    /// Event about the control of the drone: the relay takes or loses control.
     Control,
     /// Reason for which the pilot cannot give the relay control of the drone.
     Wait,

@@ -28,10 +28,11 @@ pub struct Hello {
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
     /// True if the sender could be inserted between the destination and a neighbour of the destination. This is the
-    /// neighbour that the destination has selected on the sender's side. From a sender outside of the chain: it would
-    /// join the chain if called. To a node outside of the chain: it is called.
+    /// neighbour that the destination has selected on the sender's side. If the sender is outside of the chain, the
+    /// flag means that the sender would join the chain if it is called. If the destination is outside of the chain,
+    /// the flag means that the destination is called.
     pub ready: bool,
-    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are
+    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. These are
     /// the connected relays from the sender to the end of the chain away from the destination.
     pub behind: u16,
     /// Nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3, stands for the node
@@ -43,11 +44,12 @@ pub struct Hello {
     pub active: bool,
     /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
     pub active_in_view: bool,
-    /// True if the mission `latest_mission` is refused. The sender refuses it, or a relay farther from the
+    /// True if the mission `latest_mission` is refused. Either the sender refuses it, or a relay farther from the
     /// destination.
     pub refused: bool,
-    /// True with `fresh` if the sender is outside of the chain: no relay selects it. True without it if the destination is outside: a
-    /// view without it is agreed on, and the relays of that view are in place.
+    /// If `fresh` is true: the sender is outside of the chain, and no relay selects it. If `fresh` is false: the
+    /// destination is outside of the chain; a view without the destination is agreed on, and the relays of this view
+    /// are in place.
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,

@@ -54,11 +54,11 @@ impl Upload {
     }
 }
 
-/// Message between neighbours. A *pass* is a message that goes along the chain once, and whose result comes back.
+/// Message between neighbours. A *pass* is a message that travels along the chain once; its result travels back.
 /// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
-    /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each.
+    /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
     Sweep(Sweep),
     /// Reply to a sweep of target SIRs: its verdict, the result for each target.
     Verdict(SweepVerdict),
@@ -185,8 +185,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass (onward). They are messages of
-    /// passes, proposals and lease renewals, but not the replies to them.
+    /// Returns true for messages that relays forward in the direction of a pass (onward). These are messages of
+    /// passes, proposals and lease renewals, but not the replies.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

@@ -52,14 +52,15 @@ impl Upload {
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
-    /// Version of the upload, and digest of the mission loaded before flight that it replaces.
+    /// Version of the upload, and digest of the mission loaded before flight, which the upload replaces.
     pass: PassId,
     relays: Word,
     numbers: [f32; 9],
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Required SIR from Rx to Tx, relative to that from Tx to Rx, and transmit power of Rx in W.
+    /// Two numbers: the required SIR from Rx to Tx divided by the required SIR from Tx to Rx, and the transmit power
+    /// of Rx, W.
     back: [f32; 2],
     /// SNR gap of fitted time slots, each as long as its hop needs; 0 for equal slots.
     fitted_gap: f32,

@@ -85,7 +85,8 @@ impl Entry {
 
     /// Returns the time at which the relay was in this state, for an entry received at `now`.
     ///
-    /// `None` if it is older than an entry can say, or than the receiver's clock.
+    /// `None` if the age is too large for the entry's field, or if the time would be before the start of the
+    /// receiver's clock.
     pub fn time(&self, now: Instant) -> Option<Instant> {
         let age = Duration::from_millis(100).times(self.age.into());
         let micros = now.as_micros().checked_sub(age.as_micros())?;
@@ -111,8 +112,8 @@ impl Entry {
     }
 }
 
-/// Additional state of one relay in a report: the relay whose entry is the first one. A relay adds these details to
-/// every eighth entry that it sends about itself.
+/// Additional state of one relay in a report: the relay of the first entry. A relay adds these details to every
+/// eighth entry that it sends about itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Detail {
     /// Setpoint of the drone, and the agreed position of the relay.

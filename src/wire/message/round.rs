@@ -18,8 +18,8 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x that meets each. Farthest means
-/// in the direction of the pass.
+/// Sweep message of a pass along the chain: target SIRs, and for each target the farthest x at which the sender meets
+/// it. "Farthest" means in the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -30,13 +30,14 @@ pub struct Sweep {
     pub ladder: Ladder,
     /// Lateral offset, altitude and transmit power of the sender.
     pub relay: Station,
-    /// True if relays use the lateral offsets and altitudes of the joint method. False for the configured ones.
+    /// True if relays use the lateral offsets and altitudes of the joint method. False if they use the configured
+    /// values.
     pub chosen: bool,
     /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if
     /// receivers must use the field, the mission's known distribution of interference along x.
     pub measured_per_w: Option<f32>,
     /// Farthest x in the direction of the pass at which the sender meets each target SIR, m. The list begins with the
-    /// lowest target, and ends at the first one that cannot be met.
+    /// lowest target, and ends before the first target that cannot be met.
     pub reaches: PerTarget,
 }
 
@@ -145,7 +146,7 @@ pub struct SweepVerdict {
     /// x that it has reported for this target.
     pub required_x_m: Option<f32>,
     /// True if the power or the fixed altitude of some relay differs from the mission's common profile. This relay is
-    /// the sender or a later one of the pass.
+    /// the sender or a later relay of the pass.
     pub own: bool,
 }
 
@@ -186,7 +187,7 @@ impl SweepVerdict {
 /// Maximum number of relay profiles (altitude and power) in one message.
 pub const MOST_NAMED: usize = 8;
 
-/// Profile of a relay, altitude and power, that differs from the mission's common one.
+/// Profile of a relay, altitude and power, that differs from the mission's common profile.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct OwnSeat {
     /// Index of the relay among the members of the view, 1 next to Tx.
@@ -439,8 +440,8 @@ fn sir_in_range(sir: f32) -> Option<f32> {
     (0.0..=f32::MAX).contains(&sir).then_some(sir)
 }
 
-/// Length of a sensing message's body, bytes: the sum of the lengths of its fields. They are the tag, the pass, the
-/// estimate, the sums, the interference level at Rx, and the excluded node.
+/// Length of a sensing message's body, bytes: the sum of the lengths of its fields. The fields are the tag, the pass,
+/// the estimate, the sums, the interference level at Rx, and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
 /// Sensing message: interference estimate, and sums of measurements. In a pass the sums are over the relays up to the
@@ -451,14 +452,14 @@ pub struct Heard {
     pub number: u16,
     /// Digest of the sender's mission and view, which the receiver compares with its own.
     pub view_digest: u16,
-    /// Interference estimate that all relays are to use.
+    /// Interference estimate that all relays must use.
     pub estimate: NumberedEstimate,
     /// Weighted sums of the relays' measurements.
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. The measurements
-    /// of that relay are left out of `sums`. Set in replies only.
+    /// Node number of a relay whose measurements contradict the measurements of the other relays; 0 for none. The
+    /// measurements of that relay are left out of `sums`. Set in replies only.
     pub excluded: u16,
 }
 

@@ -7,7 +7,8 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, take, write};
 
-/// Proposal of a new view, an agreement on the chain's members. It goes from relay to relay and collects votes.
+/// Proposal of a new view, an agreement on the chain's members. The message travels from relay to relay and collects
+/// votes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proposal {
@@ -35,8 +36,8 @@ pub struct Poll {
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of views before `agreed` have expired, in tenths of a second; 65535 if unknown. Positions of
-    /// the new view may be used only after that time.
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second; 65535 if unknown.
+    /// Positions of the new view may be used only after that time.
     pub earlier_lease_left: u16,
     /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on. `None` without such
     /// a view.
@@ -63,7 +64,7 @@ impl Poll {
 pub struct Successor {
     /// Identifier of the proposal on which the view was decided.
     pub proposal: ViewId,
-    /// Decided view: the proposed one, or an earlier one that the proposal found to be decided already.
+    /// Decided view: the proposed view, or an earlier view that was found to be decided already.
     pub view: View,
 }
 
@@ -81,7 +82,7 @@ pub struct Decision {
     pub reached: u16,
     /// Newest view that any polled relay knows to be agreed on. The decided view replaces it.
     pub base: View,
-    /// View to accept: the proposed one, or an earlier one that was found to be decided already. `None` without a
+    /// View to accept: the proposed view, or an earlier view that was found to be decided already. `None` without a
     /// quorum.
     pub accepted: Option<View>,
     /// Time until positions of the accepted view may be used, in tenths of a second. Until then, members of the
@@ -173,7 +174,7 @@ impl Proposal {
         )
     }
 
-    /// Decodes a proposal. Rejects it if the agreed view or the accepted one is not earlier than the proposed view.
+    /// Decodes a proposal. Rejects it if the agreed view or the accepted view is not earlier than the proposed view.
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let (call, agreed, numbers, proposer, successor): ProposalBody = read(body)?;
         let [votes, lease_left, rest] = numbers.map(Word::number);
@@ -259,7 +260,7 @@ impl Decision {
     }
 }
 
-/// Lease renewal, which the leader of a view sends and each relay forwards to the last one.
+/// Lease renewal, which the leader of a view sends and each relay forwards toward the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pulse {
@@ -275,7 +276,7 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader to a relay that may leave and to one that joins; part of each lease renewal.
+/// Orders of the leader to a relay that may leave and to a relay that joins; part of each lease renewal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
@@ -295,18 +296,18 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by relays that need to leave or would join. They are of the relays from the last one to the
-/// sender.
+/// Requests to the leader by relays that need to leave or would join. The requests come from the relays between the
+/// last relay and the sender, including both.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
     /// Node that needs to leave the chain most urgently, 0 for none.
     pub leaver: u16,
-    /// Remaining endurance of that node, s; 65535 if unknown, 0 if it has the order to leave.
+    /// Remaining endurance of the node `leaver`, s; 65535 if unknown, 0 if it has the order to leave.
     pub endurance_s: u16,
     /// Node outside of the chain that would join it, 0 for none.
     pub spare: u16,
-    /// True if all relays from the last one to the sender are in place.
+    /// True if all relays from the last relay to the sender are in place.
     pub in_place: bool,
 }
 
@@ -318,8 +319,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. The more urgent departure counts, and the spare with the lower
-    /// number.
+    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts; of two spares the
+    /// spare with the lower number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
@@ -347,9 +348,9 @@ pub struct Pulsed {
     pub number: u16,
     /// Digest of the mission and the view to which the lease belongs.
     pub view_digest: u16,
-    /// True if the renewal has reached the last relay of the chain. False if it is still on its way.
+    /// True if the renewal has reached the last relay of the chain. False if the renewal is still on its way.
     pub done: bool,
-    /// Requests of the relays from the last one to the sender. Without meaning unless `done`.
+    /// Requests of the relays from the last relay to the sender. They have no meaning while `done` is false.
     pub requests: Requests,
 }
 
@@ -377,7 +378,7 @@ impl RenewalBody {
     /// Returns the nodes that leave and join, 0 for none.
     ///
     /// # Errors
-    /// [`MessageError::Value`] if a number is above 1000, or if both are there and are 0.
+    /// [`MessageError::Value`] if a number is above 1000, or if both numbers are present and 0.
     fn nodes(&self) -> Result<[u16; 2], MessageError> {
         let Some([a, b, c, d]) = self.nodes else {
             return Ok([0; 2]);

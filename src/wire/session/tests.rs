@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Capacity of the session table ([`PEERS`]) in the type of node numbers, to count nodes with.
+/// Capacity of the session table ([`PEERS`]) in the type of node numbers, so that tests can count nodes with it.
 const ROOM: u16 = 8;
 
 /// Silence after which a node is forgotten; the value of `Settings::dead_after`.
@@ -63,8 +63,8 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Lets two nodes exchange handshakes until none is pending; returns their number. `ends` are each node's session and
-/// node number, `counters` their frame counters.
+/// Lets two nodes exchange handshakes until none is pending; returns the number of handshakes. `ends` are each node's
+/// session and node number, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;
@@ -175,8 +175,8 @@ fn a_handshake_body_contains_the_known_nonces() {
     );
 }
 
-/// Checks that a full session table keeps the pinned entries and the newest one. Recorded frames of a forgotten node
-/// are rejected.
+/// Checks that a full session table keeps the pinned entries and the newest entry. Recorded frames of a forgotten
+/// node are rejected.
 #[test]
 fn a_forgotten_node_is_met_again_and_replays_are_rejected() {
     let mut own = session();
@@ -338,7 +338,7 @@ fn frames_in_between_prevent_the_report_of_old_handshakes() {
 }
 
 /// Checks which frames under the relay's own number reveal another node with that number. Only a handshake with the
-/// same key and no older epoch does.
+/// same key, and with an epoch that is not older, reveals it.
 #[test]
 fn only_a_handshake_with_the_key_and_no_older_epoch_is_a_rival() {
     const FAR: u32 = 1 << 20;
@@ -427,8 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks when the node with the smaller claim may replace another node of the same number. It is accepted once the node with the larger
-/// claim is silent. Recorded frames of that node are then rejected, until that node sends new frames.
+/// Checks when the node with the smaller claim may replace another node of the same number. It is accepted once the
+/// node with the larger claim is silent. Recorded frames of that node are then rejected, until this node sends new
+/// frames.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;
