@@ -121,6 +121,12 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The others have closed up: its drone may
     /// fly away.
     MayLeave,
+    /// The drone's endurance is unknown; raised only with a reserve (`Relay::set_reserve`).
+    ///
+    /// A value was invalid, none came for 10 s, or there was none while the relay controls the drone. The last valid value counts
+    /// down. Without any the relay does not leave by itself: the pilot watches the battery. Raised again every minute while that
+    /// lasts, and never sooner.
+    EnduranceUnknown,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
@@ -164,6 +170,8 @@ const POLLED_LAST: &[Event] = &[
     Event::InterfererUnclear,
     #[cfg(feature = "departures")]
     Event::MayLeave,
+    #[cfg(feature = "departures")]
+    Event::EnduranceUnknown,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.

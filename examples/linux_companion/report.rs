@@ -160,6 +160,12 @@ impl Report {
                 "may leave",
                 "the chain works without this relay now, so this drone may fly away",
             ),
+            Event::EnduranceUnknown => self.log.event(
+                now,
+                "endurance unknown",
+                json!({ "leaves_below_s": relay.endurance_limit_s() }),
+                "the drone's remaining time of flight is invalid, or has not been received for 10 s; the last one counts down; watch the battery",
+            ),
             other => self.node_event(now, other, relay),
         }
     }

@@ -1,6 +1,6 @@
 //! Texts and numbers for the operator, shown by a ground station, and events for the firmware.
 //!
-//! Equal lines are sent at most once per [`SPACING`], and within it at most [`RECENT`] different lines. A waiting line is replaced
+//! Equal lines are sent at most once per [`SPACING`], critical ones per [`URGENT`], and within it at most [`RECENT`] different lines. A waiting line is replaced
 //! by a newer line of the same [`Topic`], so the last line on a topic is always current.
 
 use heapless::{Deque, String, Vec};
@@ -18,6 +18,9 @@ use crate::time::{Duration, Instant};
 
 /// Minimum time between two equal lines of text to the operator.
 const SPACING: Duration = Duration::from_millis(10_000);
+
+/// Minimum time between two equal lines that require action now.
+const URGENT: Duration = Duration::from_millis(5_000);
 
 /// Maximum number of different lines of text to the operator that are sent within [`SPACING`].
 const RECENT: usize = 16;
@@ -49,10 +52,12 @@ pub(super) enum Topic {
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
+    /// Order to the pilot to fly home.
+    Leave,
 }
 
 impl Topic {
-    const COUNT: usize = 7;
+    const COUNT: usize = 8;
 }
 
 /// Line of text for the operator. The text is stored in two parts, which are joined when it is sent.
@@ -64,6 +69,18 @@ pub(super) struct Line {
 }
 
 impl Line {
+    /// Returns the text for the pilot of a drone that has to leave, repeated every [`URGENT`].
+    ///
+    /// `is_battery` is false for a departure that the operator or the firmware has ordered.
+    pub(super) const fn leave(is_battery: bool) -> Self {
+        let why = if is_battery { "battery" } else { "relay" };
+        Self {
+            topic: Topic::Leave,
+            severity: severity::CRITICAL,
+            text: [why, ": leave now"],
+        }
+    }
+
     pub(super) const fn info(topic: Topic, text: &'static str) -> Self {
         Self {
             topic,
@@ -104,6 +121,10 @@ impl Line {
     /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
+            Event::EnduranceUnknown => {
+                let text = ["battery: endurance unknown", ""];
+                return Some(Self::warning(Topic::Relay, text));
+            }
             Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",
@@ -171,12 +192,12 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within 10
-    /// s after an equal line.
-    fn passes(&mut self, now: Instant, hash: u32) -> bool {
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within
+    /// `spacing` after an equal line.
+    fn passes(&mut self, now: Instant, hash: u32, spacing: Duration) -> bool {
         self.recent.retain(|(_, until)| *until > now);
         self.recent.iter().all(|(of, _)| *of != hash)
-            && self.recent.push((hash, now + SPACING)).is_ok()
+            && self.recent.push((hash, now + spacing)).is_ok()
     }
 
     /// Removes the line at index `at`; unlike `Vec::remove`, without a panic if there is none.
@@ -196,7 +217,9 @@ impl Report {
             let is_known = newest.as_deref() == Some(&Some(line));
             let rest = self.lines.get(at + 1..).unwrap_or_default();
             let is_overtaken = rest.iter().any(|other| other.topic == line.topic);
-            if self.passes(now, line.hash()) {
+            let is_urgent = line.severity == severity::CRITICAL;
+            let spacing = if is_urgent { URGENT } else { SPACING };
+            if self.passes(now, line.hash(), spacing) {
                 self.remove_line(at);
                 if let Some(newest) = self.newest_sent.get_mut(line.topic as usize) {
                     *newest = Some(line);
@@ -216,7 +239,7 @@ impl Report {
         }
         for _ in 0..self.texts.len() {
             let text = self.texts.pop_front()?;
-            if self.passes(now, hash([&text, ""])) {
+            if self.passes(now, hash([&text, ""]), SPACING) {
                 return Some((severity::INFO, text));
             }
             // The queue has room for it.

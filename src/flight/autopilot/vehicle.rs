@@ -103,6 +103,9 @@ pub(super) struct Vehicle {
     /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
     measured_at: Option<Instant>,
     position: Option<Position>,
+    /// Place to return to (HOME_POSITION); `None` if unknown.
+    home: Option<Geodetic>,
+    pub(super) battery: Battery,
 }
 
 impl Vehicle {
@@ -217,6 +220,15 @@ impl Vehicle {
             Incoming::PositionTargetGlobal { lat_e7, lon_e7, .. } => {
                 VehicleUpdate::Target(lat_e7, lon_e7)
             }
+            Incoming::Battery { .. } if cfg!(feature = "departures") => {
+                // On the ground a PX4 computes the time from an assumed current.
+                self.battery.record(now, message, self.armed && self.in_air);
+                VehicleUpdate::StateChanged
+            }
+            Incoming::Home(at) if cfg!(feature = "departures") => {
+                self.home = Some(at).filter(|at| at.is_valid()).or(self.home);
+                VehicleUpdate::StateChanged
+            }
             Incoming::FenceStatus { is_breached } => {
                 self.is_breached = is_breached;
                 VehicleUpdate::StateChanged
@@ -313,6 +325,22 @@ impl Vehicle {
         });
     }
 
+    /// Returns the newest remaining time of flight, once, and the time of the way home, s.
+    ///
+    /// NaN is unknown, as the way home is without a position, and to a home that is unknown or far from the line.
+    pub(super) fn take_endurance(&mut self, axis: &Axis) -> Option<[f32; 2]> {
+        let remaining_s = self.battery.newest.take()?;
+        let [_, return_m_s, descent_m_s] = self.battery.setup.unwrap_or(Battery::UNSET);
+        let home = self.home.and_then(|home| axis.place(home));
+        let way = home.zip(self.position);
+        let home_s = way.map_or(f32::NAN, |(to, Position { place: from, .. })| {
+            let level_m = libm::hypotf(from.x_m - to.x_m, from.y_m - to.y_m);
+            let height_m = (from.altitude_m - to.altitude_m).abs();
+            level_m / return_m_s + height_m / descent_m_s
+        });
+        Some([remaining_s, home_s])
+    }
+
     pub(super) fn address(&self) -> Option<Address> {
         self.known.map(|(address, _)| address)
     }
@@ -354,6 +382,57 @@ impl Vehicle {
         all.chain(self.echo.next_timeout(now))
             .filter(|at| *at > now)
             .min()
+    }
+}
+
+/// Age of a BATTERY_STATUS from which on SYS_STATUS counts instead.
+const NO_DETAILS: Duration = Duration::from_millis(10_000);
+/// Part of a reported remaining time that counts.
+const CERTAIN: f32 = 0.9;
+
+/// Endurance by the battery's messages.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Battery {
+    /// Time of flight with a full battery, s; speeds of the return and of the descent to land, m/s.
+    ///
+    /// `None` for [`UNSET`](Self::UNSET): the messages are not requested.
+    pub(super) setup: Option<[f32; 3]>,
+    detailed_at: Option<Instant>,
+    /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
+    newest: Option<f32>,
+}
+
+impl Battery {
+    const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
+
+    /// Records the first battery's BATTERY_STATUS, or without one SYS_STATUS. The time counts; without one, the percentage.
+    #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
+    fn record(&mut self, now: Instant, message: Incoming, is_flying: bool) {
+        let Incoming::Battery {
+            battery,
+            percent,
+            remaining_s,
+        } = message
+        else {
+            return;
+        };
+        let is_detailed = self
+            .detailed_at
+            .is_some_and(|at| now.since(at) < NO_DETAILS);
+        match battery {
+            Some(0) => self.detailed_at = Some(now),
+            None if !is_detailed => {}
+            _ => return,
+        }
+        self.newest = is_flying.then(|| {
+            if remaining_s > 0 {
+                CERTAIN * remaining_s as f32
+            } else if (0..=100).contains(&percent) {
+                f32::from(percent) / 100.0 * self.setup.unwrap_or(Self::UNSET)[0]
+            } else {
+                f32::NAN
+            }
+        });
     }
 }
 

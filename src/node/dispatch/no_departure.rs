@@ -15,6 +15,12 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Hello;
 
+pub(crate) struct Turn {
+    pub(crate) after: u16,
+    pub(crate) all: u16,
+    pub(crate) refused: bool,
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Leaving;
 
@@ -45,6 +51,26 @@ impl Layers {
 }
 
 impl Node {
+    pub(crate) const fn leave(&self, _: Instant, _: Option<u16>) {}
+
+    pub(crate) const fn leaves(&self) -> Option<bool> {
+        None
+    }
+
+    pub(crate) const fn withdraw(&self, _: Instant) -> bool {
+        true
+    }
+
+    pub(crate) const fn turn(&self, _: Instant) -> Turn {
+        Turn {
+            after: 0,
+            all: 1,
+            refused: true,
+        }
+    }
+
+    pub(crate) const fn set_spent(&self, _: bool) {}
+
     pub(super) const fn return_if_expired(&self, _: Instant) {}
 
     pub(super) const fn frees(&self, _: Side, _: u16) -> bool {
