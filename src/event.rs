@@ -127,6 +127,10 @@ pub enum Event {
     /// down. Without any the relay does not leave by itself: the pilot watches the battery. Raised again every minute while that
     /// lasts, and never sooner.
     EnduranceUnknown,
+    /// The drone has only the way home and its reserve left: the pilot flies it home. Raised again every minute while that lasts.
+    ///
+    /// It needs a reserve (`Relay::set_reserve`), and does not need a request to leave: an order to stay does not silence it.
+    AtReserve,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
@@ -172,6 +176,8 @@ const POLLED_LAST: &[Event] = &[
     Event::MayLeave,
     #[cfg(feature = "departures")]
     Event::EnduranceUnknown,
+    #[cfg(feature = "departures")]
+    Event::AtReserve,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.

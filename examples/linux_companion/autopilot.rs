@@ -316,6 +316,11 @@ impl Companion {
         self.link.state()
     }
 
+    /// Returns true while the autopilot reports that the drone is on the ground.
+    pub(crate) fn is_landed(&self, now: Instant) -> bool {
+        self.link.is_landed(now)
+    }
+
     /// Shows an event of the relay on the operator's ground station.
     pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);

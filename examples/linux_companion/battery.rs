@@ -23,11 +23,9 @@ const AGAIN: Duration = Duration::from_millis(60_000);
 const LOGGED: Duration = Duration::from_millis(10_000);
 
 /// Maximum time from the start for which the relay waits for the endurance of its drone.
-const FIRST: Duration = Duration::from_millis(5_000);
-/// Maximum time from the start for which the relay waits for the confirmation of a low endurance.
-const CONFIRMED: Duration = Duration::from_millis(12_000);
-/// Time from the start after which a drone on the ground is not waited for.
-const GROUND: Duration = Duration::from_millis(3_000);
+const FIRST: Duration = Duration::from_millis(10_000);
+/// Maximum time for which the relay waits for the confirmation of the first low endurance.
+const CONFIRMED: Duration = Duration::from_millis(20_000);
 
 /// State of the departure, as logged.
 #[derive(Debug)]
@@ -37,6 +35,8 @@ pub(crate) struct Battery {
     told_at: Instant,
     /// True until the relay may take part in the chain.
     waits: bool,
+    /// Time of the first low endurance during the wait.
+    low_at: Option<Instant>,
 }
 
 impl Battery {
@@ -47,6 +47,7 @@ impl Battery {
             logged_at: Instant::ZERO,
             told_at: Instant::ZERO,
             waits,
+            low_at: None,
         }
     }
 
@@ -54,18 +55,16 @@ impl Battery {
     ///
     /// A relay that restarts with a low battery then leaves before it has taken part in anything, and does not join the chain.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
-        let state = link.map(Companion::control);
-        let age = now.since(Instant::ZERO);
-        let is_grounded = age >= GROUND && state == Some(State::Grounded);
         let left_s = relay.endurance_s(now);
-        let is_low = left_s.is_some() && left_s < relay.endurance_limit_s();
+        if left_s.is_some() && left_s < relay.endurance_limit_s() {
+            self.low_at = self.low_at.or(Some(now));
+        }
         let is_inside = matches!(relay.departure(now), Departure::Member | Departure::Spare);
-        let is_open = if is_low {
-            is_inside && age < CONFIRMED
-        } else {
-            left_s.is_none() && age < FIRST
+        let is_open = match self.low_at {
+            Some(at) => is_inside && now.since(at) < CONFIRMED,
+            None => left_s.is_none() && now.since(Instant::ZERO) < FIRST,
         };
-        self.waits &= is_open && !is_grounded;
+        self.waits &= is_open && !link.is_some_and(|link| link.is_landed(now));
         self.waits
     }
 
@@ -91,7 +90,7 @@ impl Battery {
             let fields = self.status(relay, now);
             log.event(now, "departure", fields, describe(departure));
         }
-        let refusal = refusal(departure, relay);
+        let refusal = refusal(departure);
         let is_again = refusal.is_some() && now.since(self.told_at) >= AGAIN;
         if let Some(autopilot) = autopilot
             && !matches!(autopilot.control(), State::Silent | State::Grounded)
@@ -99,9 +98,9 @@ impl Battery {
         {
             self.told_at = now;
             let text = match departure {
-                Departure::Requested => Some("asks the chain to close up".to_owned()),
-                Departure::Outside => Some("waits for the others to close up".to_owned()),
-                Departure::Member => Some("is in the chain, or joins it".to_owned()),
+                Departure::Requested => Some("asks the chain to close up"),
+                Departure::Outside => Some("waits for the others to close up"),
+                Departure::Member => Some("is in the chain, or joins it"),
                 _ => refusal,
             };
             let why = if relay.leaves_by_endurance() {
@@ -130,7 +129,9 @@ impl Battery {
             }
             "stay" => {
                 relay.stay(now);
-                if relay.endurance_limit_s().is_some() {
+                if relay.is_at_reserve() {
+                    "this relay stays in the chain, as the operator commands; only the way home and the reserve are left: fly the drone home"
+                } else if relay.endurance_limit_s().is_some() {
                     "this relay stays in the chain, as the operator commands, until half of its time of flight beyond the way home has passed"
                 } else {
                     "this relay stays in the chain, as the operator commands"
@@ -154,6 +155,8 @@ impl Battery {
             "endurance_s": relay.endurance_s(now),
             "leaves_below_s": relay.endurance_limit_s(),
             "endurance_losses": relay.endurance_losses(),
+            "at_reserve": relay.is_at_reserve(),
+            "must_leave": relay.must_leave(),
         })
     }
 }
@@ -167,14 +170,13 @@ const fn is_pending(departure: Departure) -> bool {
 }
 
 /// Returns the reason of a refusal for the pilot, up to 37 bytes; `None` without one.
-fn refusal(departure: Departure, relay: &Relay) -> Option<String> {
-    let relays = relay.mission().relays();
+const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
-        Departure::NeedsGuard => "refused: no guard".to_owned(),
-        Departure::NeedsChannel => "refused: needs a shared radio".to_owned(),
-        Departure::NeedsQuorum => format!("{relays} relays needed: no fresh relay"),
-        Departure::WideGap => "refused: gap in the numbers".to_owned(),
-        Departure::Blocked => "refused: neighbours lack a link".to_owned(),
+        Departure::NeedsGuard => "refused: no guard",
+        Departure::NeedsChannel => "refused: needs a shared radio",
+        Departure::NeedsQuorum => "refused: others lack a quorum",
+        Departure::WideGap => "refused: gap in the numbers",
+        Departure::Blocked => "refused: neighbours lack a link",
         _ => return None,
     })
 }

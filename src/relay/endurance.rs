@@ -1,22 +1,13 @@
 //! Endurance of the drone, and the departure that it causes.
 //!
-//! The margin is the remaining time of flight less the time of the way home. Without a reserve (`Relay::set_reserve`) the endurance is
-//! only shown. A condition has to hold for [`HOLD`], and one value decides nothing: a later one has to confirm it.
-//!
-//! | event | action |
-//! | --- | --- |
-//! | invalid value; no valid one for [`STALE`]; setpoint control without any | unknown, the last valid one counts down; with a reserve raise `EnduranceUnknown`, at most once per [`AGAIN`] |
-//! | margin below the limit: the reserve and the time of a replacement | request to leave |
-//! | margin [`STEP`] above the limit, and nothing granted | withdraw this request |
-//! | margin at or below the floor: the reserve, and a part of the time of a replacement by the relay's number | the pilot has to leave; outside of the chain, do not return by time |
-//! | `Relay::stay` | lower the limit to half of the present margin |
-//! | `Relay::leave` | restore the limit; a request of the firmware is not withdrawn |
-//! | drone on the ground | forget the endurance and the lower limit |
+//! The margin is the remaining time of flight less the time of the way home. The rules are in [`docs::batteries`](crate::docs::batteries),
+//! section "Endurance". The floor is the reserve, and a part of the time of a replacement by the relay's number.
 
 use super::Relay;
 use crate::event::Event;
 use crate::node::Node;
-use crate::node::departure::{Leaving, Turn};
+use crate::node::context::Member;
+use crate::node::departure::Leaving;
 use crate::settings::Settings;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
@@ -26,10 +17,10 @@ const STALE: Duration = Duration::from_millis(10_000);
 /// Maximum time between two comparisons of the margin with the limit.
 const REVIEW: Duration = Duration::from_millis(1_000);
 /// Time for which a condition must hold.
-const HOLD: Duration = Duration::from_millis(5_000);
-/// Hysteresis of a withdrawal, and least change of a request's endurance that the leader is told.
+const HOLD: Duration = Duration::from_millis(15_000);
+/// Hysteresis, greatest difference of two values that agree, and least change of a request's endurance that the leader is told.
 const STEP: Duration = Duration::from_millis(30_000);
-/// Minimum time between two `EnduranceUnknown`.
+/// Time between two `EnduranceUnknown`, and between two `AtReserve`.
 const AGAIN: Duration = Duration::from_millis(60_000);
 /// Usual time of a replacement, in units of `dead_after`.
 ///
@@ -50,18 +41,20 @@ pub(super) struct Endurance {
     end: Option<(Instant, Duration)>,
     /// Time of the last valid value.
     sampled_at: Instant,
+    /// True if the last two valid values agree: the countdown from the last one counts.
+    is_steady: bool,
     /// True from the loss of the endurance to the next valid value.
     is_lost: bool,
     losses: u32,
-    /// Time of the last `EnduranceUnknown`.
-    raised_at: Option<Instant>,
+    /// Times of the last `EnduranceUnknown` and `AtReserve`.
+    raised_at: [Option<Instant>; 2],
     /// Limit of the margin since `Relay::stay`; `None` for the usual one.
     limit: Option<Duration>,
-    /// Start times of three conditions: request to change, margin at or below the floor, leader to be told.
-    since: [Option<Instant>; 3],
+    /// Start times of four conditions: request to change, margin at or below the floor, leader to be told, margin above the floor again.
+    since: [Option<Instant>; 4],
     /// True if the request to leave is this module's.
     is_own: bool,
-    /// True while the margin is at or below the floor.
+    /// True from a margin at or below the floor until it is [`STEP`] above the floor.
     is_spent: bool,
     /// Time of the floor, as the leader was told.
     floor_at: Instant,
@@ -98,10 +91,18 @@ impl Endurance {
         if !core::mem::replace(&mut self.is_lost, true) {
             bump(&mut self.losses);
         }
-        let is_due = self.raised_at.is_none_or(|at| now.since(at) >= AGAIN);
-        if self.reserve.is_some() && is_due {
-            self.raised_at = Some(now);
-            node.raise(Event::EnduranceUnknown);
+        if self.reserve.is_some() {
+            self.raise(now, node, 0, Event::EnduranceUnknown);
+        }
+    }
+
+    /// Raises an event whose last time is `which`, at most once per [`AGAIN`].
+    fn raise(&mut self, now: Instant, node: &mut Node, which: usize, event: Event) {
+        if let Some(last) = self.raised_at.get_mut(which)
+            && last.is_none_or(|at| now.since(at) >= AGAIN)
+        {
+            *last = Some(now);
+            node.raise(event);
         }
     }
 
@@ -112,7 +113,7 @@ impl Endurance {
         };
         let at = since.unwrap_or(now);
         *since = is_true.then_some(at);
-        is_true && now.since(at) >= HOLD && at != self.sampled_at
+        is_true && now.since(at) >= HOLD && (self.is_steady || at < self.sampled_at)
     }
 
     /// Compares the margin with the limit and the floor, and requests to leave or withdraws that.
@@ -135,26 +136,27 @@ impl Endurance {
             margin < limit
         };
         // Pilots of a fleet of equal endurance are told one by one, in the leader's order, also if it is slow or refuses all.
-        let Turn {
-            after,
-            all,
-            refused,
-        } = node.turn(now);
+        let Member {
+            node: number, all, ..
+        } = *node.member();
         let each = Self::replacement(&settings).as_micros() / u64::from(all.max(1));
-        let each = if refused {
+        let each = if node.is_refused(now) {
             Duration::from_micros(each)
         } else {
             Duration::from_micros(each / 2).min(APART)
         };
-        let floor = Instant::ZERO + reserve + each.times(after.into());
-        self.is_spent = self.holds(now, 1, Instant::ZERO + margin <= floor);
+        let floor = Instant::ZERO + reserve + each.times(all.saturating_sub(number).into());
+        let is_spent = self.holds(now, 1, Instant::ZERO + margin <= floor);
+        let is_restored = self.holds(now, 3, Instant::ZERO + margin >= floor + STEP);
+        self.is_spent = is_spent || self.is_spent && !is_restored;
         node.set_spent(self.is_spent);
+        if self.is_spent {
+            self.raise(now, node, 1, Event::AtReserve);
+        }
         // The leader's order is due before the reserve is used.
         let left = (Instant::ZERO + margin).since(Instant::ZERO + reserve);
         let floor_at = now + left;
-        let moved = floor_at
-            .since(self.floor_at)
-            .max(self.floor_at.since(floor_at));
+        let moved = apart(floor_at, self.floor_at);
         let is_due = self.holds(now, 0, changes);
         let is_moved = self.holds(now, 2, leaves && self.is_own && moved >= STEP);
         if is_due && leaves {
@@ -165,6 +167,10 @@ impl Endurance {
             node.leave(now, Some(seconds(left)));
         }
     }
+}
+
+fn apart(one: Instant, other: Instant) -> Duration {
+    one.since(other).max(other.since(one))
 }
 
 /// Returns `seconds` as a duration; `None` if it is negative, not finite, or more than [`MAX_S`].
@@ -191,7 +197,7 @@ impl Relay {
     /// pause of 10 s make the endurance unknown: the last valid one counts down.
     ///
     /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay calls [`leave`](Self::leave) by itself once the endurance has been below
-    /// [`endurance_limit_s`](Self::endurance_limit_s) for 5 s, and [`stay`](Self::stay) once it has been 30 s above for 5 s, if nothing has been
+    /// [`endurance_limit_s`](Self::endurance_limit_s) for 15 s, and [`stay`](Self::stay) once it has been 30 s above for 15 s, if nothing has been
     /// granted until then. Takes constant time.
     ///
     /// ```
@@ -214,7 +220,9 @@ impl Relay {
             return;
         };
         if let Some((left, home)) = duration(remaining_s).zip(duration(home_s)) {
-            endurance.end = Some((now + left, home));
+            let end = now + left;
+            let last = endurance.end.replace((end, home));
+            endurance.is_steady = last.is_some_and(|(last, _)| apart(last, end) < STEP);
             endurance.sampled_at = now;
             endurance.is_lost = false;
         } else {
@@ -261,10 +269,13 @@ impl Relay {
     ///
     /// The drone may leave, or the relay has requested that and only the way home and the reserve are left. Takes constant time.
     pub fn must_leave(&self) -> bool {
-        let is_spent = self.endurance.first().is_some_and(|it| it.is_spent);
-        self.node
-            .leaves()
-            .is_some_and(|is_free| is_free || is_spent)
+        let leaves = self.node.leaves();
+        leaves.is_some_and(|is_free| is_free || self.is_at_reserve())
+    }
+
+    /// Returns true while the endurance is no more than the way home and the reserve. See [`Event::AtReserve`].
+    pub fn is_at_reserve(&self) -> bool {
+        self.endurance.first().is_some_and(|it| it.is_spent)
     }
 
     /// Forgets the endurance of a drone on the ground. A departure goes on.
@@ -287,7 +298,7 @@ impl Relay {
             let limit = endurance.limit(&self.node.member().settings);
             let margin = endurance.margin(now).or(limit).filter(|_| stays);
             endurance.limit = margin.map(|margin| Duration::from_micros(margin.as_micros() / 2));
-            (endurance.since, endurance.is_own) = ([None; 3], false);
+            (endurance.since, endurance.is_own) = ([None; 4], false);
         }
     }
 

@@ -15,6 +15,7 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     reboot, mute, speak          begins anew on the ground; says nothing; says something
     stranger, vehicle            heartbeats of no known autopilot; of its own kind again
     battery 40 600               40 percent and 600 s are left from now on, as BATTERY_STATUS once a second (ArduCopter: if requested)
+    drop 245 147                 it sends none of these messages from now on
     noise 150                    a SiK radio hears so much between frames
     clear 2                      a ground station clears relay 2: MAV_CMD_USER_1 to the companion, by way of this autopilot
     track                        from now on its place is an output line, too, 50 times a second, with this computer's time
@@ -141,7 +142,7 @@ class Drone:
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
         self.is_stranger = self.is_tracked = self.is_lost = False
         self.system, self.parameters = SYSTEM, {}
-        self.battery = None
+        self.battery, self.dropped = None, set()
         self.port = port_of(link)
         self.start()
         self.plug()
@@ -200,6 +201,8 @@ class Drone:
                 self.battery = int(percent), int(left)
                 if self.kind == "px4":
                     self.streams |= {147: [1.0, 0.0], 242: [2.0, 0.0]}
+            case ["drop", *numbers]:
+                self.dropped = set(map(int, numbers))
             case ["noise", noise]:
                 self.noise(int(noise))
             case ["clear", *relays]:
@@ -339,7 +342,7 @@ class Drone:
     def say_what_is_due(self):
         now = time.monotonic()
         for number, stream in self.streams.items():
-            if stream[0] > 0 and stream[1] <= now:
+            if stream[0] > 0 and stream[1] <= now and number not in self.dropped:
                 stream[1] = now + stream[0]
                 if message := self.message(number, int((now - self.began) * 1e3)):
                     self.say(message)

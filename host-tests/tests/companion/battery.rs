@@ -117,8 +117,8 @@ fn a_low_battery_leads_a_drone_out_of_the_chain() {
         ),
     ] {
         let mut pair = Pair::grounded(kind, more, low);
-        // A member requests to leave after 5 s.
-        std::thread::sleep(Duration::from_secs(8));
+        // A member requests to leave after 15 s.
+        std::thread::sleep(Duration::from_secs(18));
         let said = pair.status();
         assert_eq!(said["departure"], "member", "{said:#}");
         assert!(said["endurance_s"].is_null(), "{said:#}");
@@ -208,9 +208,9 @@ fn endurance_is_read_from_the_positions() {
     assert!(!line.contains("\"departure\":\"member\""), "{line}");
 }
 
-/// Writes `line` once a second for 8 s. A low endurance decides after 5 s.
+/// Writes `line` once a second for 18 s. A low endurance decides after 15 s.
 fn flows(fifo: &str, line: &str) {
-    for _ in 0..8 {
+    for _ in 0..18 {
         write(fifo, line);
         std::thread::sleep(Duration::from_secs(1));
     }

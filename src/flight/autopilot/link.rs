@@ -790,6 +790,14 @@ impl Autopilot {
         self.state.is_flown()
     }
 
+    /// Returns true while the autopilot reports that the drone is on the ground.
+    ///
+    /// That is a disarmed drone, or one with that landed state for 2 s. [`State::Grounded`] also covers an unknown landed state.
+    pub fn is_landed(&self, now: Instant) -> bool {
+        let now = self.clock.internal(now);
+        self.state == State::Grounded && self.vehicle.is_landed(now)
+    }
+
     /// Returns the counts of intact and broken messages from the autopilot.
     pub const fn counters(&self) -> Counters {
         self.parser.counters()
@@ -882,12 +890,13 @@ impl Autopilot {
             relay.handle_sample(now, sample);
             is_news = true;
         }
-        if self.state == State::Grounded {
+        if self.is_landed(now) {
             relay.reset_endurance();
         }
-        if let Some([remaining_s, home_s]) = self.vehicle.take_endurance(&self.axis) {
+        let internal = self.clock.internal(now);
+        if let Some([remaining_s, home_s]) = self.vehicle.take_endurance(internal, &self.axis) {
             relay.handle_endurance(now, remaining_s, home_s);
-            is_news = true;
+            is_news |= relay.endurance_limit_s().is_some();
         }
         if let Some(side) = self.poll_cleared() {
             relay.clear_lost(now, side);

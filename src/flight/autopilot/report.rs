@@ -52,7 +52,7 @@ pub(super) enum Topic {
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
-    /// Order to the pilot to fly home.
+    /// Battery at the reserve, and order to the pilot to fly home.
     Leave,
 }
 
@@ -122,8 +122,13 @@ impl Line {
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
             Event::EnduranceUnknown => {
-                let text = ["battery: endurance unknown", ""];
-                return Some(Self::warning(Topic::Relay, text));
+                return Some(Self::warning(
+                    Topic::Relay,
+                    ["battery: endurance unknown", ""],
+                ));
+            }
+            Event::AtReserve => {
+                return Some(Self::warning(Topic::Leave, ["battery: at the reserve", ""]));
             }
             Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",

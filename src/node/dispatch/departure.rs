@@ -60,15 +60,6 @@ pub enum Departure {
     Free,
 }
 
-/// Turn of a relay to leave.
-pub(crate) struct Turn {
-    /// Number of relays whose turn is later.
-    pub(crate) after: u16,
-    pub(crate) all: u16,
-    /// True if all departures are refused for good.
-    pub(crate) refused: bool,
-}
-
 /// Departure of this relay, and what it knows of spares.
 #[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
@@ -243,18 +234,13 @@ impl Node {
         true
     }
 
-    /// Returns this relay's turn to leave among relays of equal endurance.
-    pub(crate) fn turn(&self, now: Instant) -> Turn {
-        let Member { node, all, .. } = self.member;
+    /// Returns true if every departure is refused for good.
+    pub(crate) fn is_refused(&self, now: Instant) -> bool {
         let refusal = self.layers.departure_refusal(now, &self.member);
-        Turn {
-            after: all.saturating_sub(node),
-            all,
-            refused: matches!(
-                refusal,
-                Some(Departure::NeedsGuard | Departure::NeedsChannel)
-            ),
-        }
+        matches!(
+            refusal,
+            Some(Departure::NeedsGuard | Departure::NeedsChannel)
+        )
     }
 
     /// Records if the drone has no endurance for a return to the chain.

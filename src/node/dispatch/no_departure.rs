@@ -15,12 +15,6 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::Hello;
 
-pub(crate) struct Turn {
-    pub(crate) after: u16,
-    pub(crate) all: u16,
-    pub(crate) refused: bool,
-}
-
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Leaving;
 
@@ -61,12 +55,8 @@ impl Node {
         true
     }
 
-    pub(crate) const fn turn(&self, _: Instant) -> Turn {
-        Turn {
-            after: 0,
-            all: 1,
-            refused: true,
-        }
+    pub(crate) const fn is_refused(&self, _: Instant) -> bool {
+        true
     }
 
     pub(crate) const fn set_spent(&self, _: bool) {}
