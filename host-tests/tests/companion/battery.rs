@@ -15,15 +15,16 @@ use crate::process::Relay;
 /// Options of relays that a loaded computer does not make lose each other.
 const PATIENT: &str = "--probe-after-ms 1000 --dead-after-ms 5000";
 
-/// Chain of two relays on a channel: relay 1 hovers by hand, relay 2 has an autopilot.
+/// Chain on a channel: one relay has an autopilot, and the others hover by hand.
 struct Pair {
     chain: Chain,
     drone: Peer,
-    /// Relay 2, and its options.
+    /// Relay with the autopilot, its number and its options.
     relay: Option<Relay>,
+    index: usize,
     own: String,
-    _first: Relay,
-    /// Thread that reports the position of drone 1 until the flag is true. Without it the guard of relay 1 holds its drone.
+    _others: Vec<Relay>,
+    /// Thread that reports the positions of the other drones until the flag is true. Without it their guards hold them.
     hover: (Arc<AtomicBool>, Option<JoinHandle<()>>),
 }
 
@@ -35,24 +36,37 @@ impl Drop for Pair {
 }
 
 impl Pair {
-    /// Starts both relays, and the drone on the ground with a battery at `battery`.
-    fn grounded(kind: &str, more: &str, battery: &str) -> Self {
-        let chain = Chain::on_channel(2, Medium::new(2, QUIET));
-        let fifo = chain.files.fifo("positions");
+    /// Starts relay `index` of `of` with its drone on the ground and a battery at `battery`, and the other relays.
+    fn grounded([index, of]: [usize; 2], kind: &str, more: &str, battery: &str) -> Self {
+        let chain = Chain::on_channel(of, Medium::new(of, QUIET));
         let link = chain.files.text("autopilot");
         let mut drone = Peer::autopilot(kind, &link, 700.0, None);
         drone.order(battery);
         let socket = chain.files.text("status");
         let options = peer::options(&link);
         let places = options.split("--autopilot").next().unwrap();
-        let first = chain.relay(1, &format!("{PATIENT} {places} --positions {fifo}"));
+        let mut others = Vec::new();
+        let mut hovering = Vec::new();
+        for other in (1..=of).filter(|other| *other != index) {
+            let fifo = chain.files.fifo(&format!("positions-{other}"));
+            let own = format!("{PATIENT} {places} --positions {fifo}");
+            others.push(chain.relay(other, &own));
+            let x_m = if other < index {
+                300
+            } else {
+                700 + 150 * (other - index)
+            };
+            hovering.push((fifo, format!("{x_m} 0 20\n")));
+        }
         let own = format!("{PATIENT} {options} --reserve 30 --status-socket {socket} {more}");
-        let relay = chain.relay(2, &own);
+        let relay = chain.relay(index, &own);
         let over = Arc::new(AtomicBool::new(false));
         let is_over = Arc::clone(&over);
         let thread = std::thread::spawn(move || {
             while !is_over.load(Ordering::Relaxed) {
-                write(&fifo, "300 0 20\n");
+                for (fifo, line) in &hovering {
+                    write(fifo, line);
+                }
                 std::thread::sleep(Duration::from_millis(200));
             }
         });
@@ -60,15 +74,39 @@ impl Pair {
             chain,
             drone,
             relay: Some(relay),
+            index,
             own,
-            _first: first,
+            _others: others,
             hover: (over, Some(thread)),
         };
         pair.line("autopilot: found a");
         pair
     }
 
-    /// Takes off, and gives relay 2 the control of its drone.
+    /// Stops the companion, and starts it again after `between`.
+    fn restart(&mut self, between: impl FnOnce(&mut Peer)) {
+        drop(self.relay.take());
+        between(&mut self.drone);
+        self.relay = Some(self.chain.relay(self.index, &self.own));
+    }
+
+    /// Checks that the relay has gone outside of the chain, and stays there.
+    fn stays_outside(&mut self) {
+        let line = self.line("departure: ");
+        // The others may have said at once that they do not need it.
+        let is_outside = [
+            "this relay is outside of the chain",
+            "this drone may fly away",
+        ];
+        assert!(is_outside.iter().any(|it| line.contains(it)), "{line}");
+        std::thread::sleep(Duration::from_secs(12));
+        let said = self.status();
+        let departure = said["departure"].as_str().unwrap();
+        assert!(["outside", "free"].contains(&departure), "{said:#}");
+        assert!(!self.relay.as_mut().unwrap().has_printed("converged: "));
+    }
+
+    /// Takes off, and gives the relay the control of its drone.
     fn engage(&mut self, kind: &str) {
         self.drone.takes_off();
         self.line("autopilot: in the air, and not controlled by the relay");
@@ -116,7 +154,7 @@ fn a_low_battery_leads_a_drone_out_of_the_chain() {
             ["battery 80 0", "battery 4 0"],
         ),
     ] {
-        let mut pair = Pair::grounded(kind, more, low);
+        let mut pair = Pair::grounded([2, 2], kind, more, low);
         // A member requests to leave after 15 s.
         std::thread::sleep(Duration::from_secs(18));
         let said = pair.status();
@@ -150,21 +188,32 @@ fn a_low_battery_leads_a_drone_out_of_the_chain() {
         let heard = pair.drone.receive_for(Duration::from_secs(7));
         assert!(!heard.iter().any(|it| it.is_text("battery: leave now")));
         // The companion restarts while the pilot flies the drone home.
-        drop(pair.relay.take());
-        pair.relay = Some(pair.chain.relay(2, &pair.own));
-        let line = pair.line("departure: ");
-        // The others may have said at once that they do not need it.
-        let is_outside = [
-            "this relay is outside of the chain",
-            "this drone may fly away",
-        ];
-        assert!(is_outside.iter().any(|it| line.contains(it)), "{line}");
-        std::thread::sleep(Duration::from_secs(12));
-        let said = pair.status();
-        let departure = said["departure"].as_str().unwrap();
-        assert!(["outside", "free"].contains(&departure), "{said:#}");
-        assert!(!pair.relay.as_mut().unwrap().has_printed("converged: "));
+        pair.restart(|_| {});
+        pair.stays_outside();
     }
+}
+
+/// Checks the first leader's restart in flight with a low battery and a slow autopilot: it stays outside.
+///
+/// The first landed state comes after 3 s, and the next message of the battery is lost.
+#[test]
+fn a_leader_with_a_slow_autopilot_restarts_outside_of_the_chain() {
+    let mut pair = Pair::grounded([1, 3], "px4", "", "battery 80 1200");
+    pair.drone.takes_off();
+    pair.line("autopilot: in the air, and not controlled by the relay");
+    until(pair.chain.files.path("status"), |said| {
+        said["relay"]["relays"] == 3 && said["relay"]["has_lease"] == true
+    });
+    pair.restart(|drone| {
+        drone.order("battery 5 60");
+        drone.order("drop 245 147");
+    });
+    pair.line("autopilot: found a");
+    std::thread::sleep(Duration::from_secs(3));
+    pair.drone.order("drop 147");
+    std::thread::sleep(Duration::from_secs(1));
+    pair.drone.order("drop");
+    pair.stays_outside();
 }
 
 /// Checks the lines of `--positions`: an endurance, and an invalid one. Then the operator's commands.
@@ -191,10 +240,19 @@ fn endurance_is_read_from_the_positions() {
     flows(&fifo, "endurance 120 20\n");
     let line = relay.line("\"event\":\"departure\"");
     assert!(line.contains("\"leaves_below_s\":218"), "{line}");
+    // Nobody but this log tells the pilot of a drone without an autopilot's link.
+    let line = relay.line("\"event\":\"at the reserve\"");
+    assert!(line.contains("fly it home now"), "{line}");
+    assert_eq!(status()["at_reserve"], true);
+    assert_eq!(status()["must_leave"], true);
     let (is_done, text) = commanded(&socket, "stay\n");
-    assert!(is_done, "{text}");
+    assert!(
+        is_done && text.contains("only the way home and the reserve are left"),
+        "{text}"
+    );
     let line = relay.line("\"event\":\"departure\"");
     assert!(line.contains("\"departure\":\"member\""), "{line}");
+    assert_eq!(status()["must_leave"], false, "the operator's order");
     flows(&fifo, "endurance 118 20\n");
     assert_eq!(
         status()["departure"],
@@ -203,6 +261,9 @@ fn endurance_is_read_from_the_positions() {
     );
     let limit_s = status()["leaves_below_s"].as_u64().unwrap();
     assert!((65..=70).contains(&limit_s), "{limit_s}");
+    // That order does not silence the reserve.
+    let line = relay.line("\"event\":\"at the reserve\"");
+    assert!(line.contains("\"must_leave\":false"), "{line}");
     assert!(commanded(&socket, "leave\n").0);
     let line = relay.line("\"event\":\"departure\"");
     assert!(!line.contains("\"departure\":\"member\""), "{line}");
