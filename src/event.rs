@@ -124,12 +124,9 @@ pub enum Event {
     /// The drone's endurance is unknown; raised only with a reserve (`Relay::set_reserve`).
     ///
     /// A value was invalid, none came for 10 s, or there was none while the relay controls the drone. The last valid value counts
-    /// down. Without any the relay does not leave by itself: the pilot watches the battery. Raised again every minute while that
-    /// lasts, and never sooner.
+    /// down. Without any the relay does not leave by itself. Raised at most once a minute, and again while that lasts.
     EnduranceUnknown,
-    /// The drone has only the way home and its reserve left: the pilot flies it home. Raised again every minute while that lasts.
-    ///
-    /// It needs a reserve (`Relay::set_reserve`), and does not need a request to leave: an order to stay does not silence it.
+    /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
     AtReserve,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
@@ -174,9 +171,7 @@ const POLLED_LAST: &[Event] = &[
     Event::InterfererUnclear,
     #[cfg(feature = "departures")]
     Event::MayLeave,
-    #[cfg(feature = "departures")]
     Event::EnduranceUnknown,
-    #[cfg(feature = "departures")]
     Event::AtReserve,
 ];
 

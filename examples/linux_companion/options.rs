@@ -221,6 +221,21 @@ impl BatteryOptions {
     pub(crate) fn reserve(&self) -> Option<Duration> {
         self.reserve.map(micros)
     }
+
+    /// Checks that a full battery lasts until the relay asks to leave.
+    fn check(&self, dead_after_ms: u64) -> Result<(), String> {
+        let (Some(reserve), Some(full)) = (self.reserve, self.flight_time) else {
+            return Ok(());
+        };
+        let replacement = u32::try_from(dead_after_ms * 12 / 1_000).map_or(240, |s| s.min(240));
+        let least = f64::from(reserve) + f64::from(replacement);
+        if f64::from(full) > least {
+            return Ok(());
+        }
+        Err(format!(
+            "--flight-time {full}: must be above {least}, which is --reserve {reserve} and {replacement} s of a replacement"
+        ))
+    }
 }
 
 /// Direction of a directional antenna.
@@ -302,6 +317,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
             options.probe_after_ms + 1
         ));
     }
+    options.battery.check(options.dead_after_ms)?;
     let wiring = wiring(&options)?;
     let load = match wiring {
         Wiring::Pair => ChannelLoad::of_radios(1),

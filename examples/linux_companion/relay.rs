@@ -187,6 +187,7 @@ impl Flight {
         };
         let waits = self.battery.waits(time, relay, self.autopilot.as_ref());
         let wake = if waits {
+            self.ports.discard();
             Some(time + WAIT)
         } else {
             self.ports.poll(time, relay, &mut store)

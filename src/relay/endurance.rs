@@ -33,6 +33,7 @@ const APART: Duration = Duration::from_millis(10_000);
 /// Maximum remaining time and way home, s. A longer one is unknown: it is no multicopter's.
 const MAX_S: f32 = 21_600.0;
 
+#[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Endurance {
     /// Reserve beyond the way home; `None` if the relay does not leave by itself.
@@ -49,7 +50,7 @@ pub(super) struct Endurance {
     /// Times of the last `EnduranceUnknown` and `AtReserve`.
     raised_at: [Option<Instant>; 2],
     /// Limit of the margin since `Relay::stay`; `None` for the usual one.
-    limit: Option<Duration>,
+    limit: Option<Instant>,
     /// Start times of four conditions: request to change, margin at or below the floor, leader to be told, margin above the floor again.
     since: [Option<Instant>; 4],
     /// True if the request to leave is this module's.
@@ -69,21 +70,21 @@ impl Endurance {
     }
 
     /// Returns the margin below which the relay requests to leave; `None` without a reserve.
-    fn limit(&self, settings: &Settings) -> Option<Duration> {
+    fn limit(&self, settings: &Settings) -> Option<Instant> {
         let usual = Instant::ZERO + self.reserve? + Self::replacement(settings);
-        let usual = usual.since(Instant::ZERO);
         Some(self.limit.map_or(usual, |lower| lower.min(usual)))
     }
 
     /// Returns the remaining time of flight, s; `None` while it is unknown.
     fn known(&self, now: Instant) -> Option<u16> {
-        let is_known = !self.is_lost && now.since(self.sampled_at) < STALE;
-        let (end, _) = self.end.filter(|_| is_known)?;
-        Some(seconds(end.since(now)))
+        let (end, _) = self.end?;
+        (!self.is_lost && now.since(self.sampled_at) < STALE).then(|| seconds(end.since(now)))
     }
 
-    fn margin(&self, now: Instant) -> Option<Duration> {
-        self.end.map(|(end, home)| end.since(now + home))
+    /// Returns the margin as a time from zero, to which durations are added.
+    fn margin(&self, now: Instant) -> Option<Instant> {
+        let (end, home) = self.end?;
+        Some(Instant::ZERO + end.since(now + home))
     }
 
     /// Makes the endurance unknown, and reports that.
@@ -122,16 +123,14 @@ impl Endurance {
             self.lose(now, node);
         }
         let settings = node.member().settings;
-        let (Some(reserve), Some(limit)) = (self.reserve, self.limit(&settings)) else {
-            return;
-        };
-        let Some(margin) = self.margin(now) else {
+        let all = (self.reserve, self.limit(&settings), self.margin(now));
+        let (Some(reserve), Some(limit), Some(margin)) = all else {
             return;
         };
         self.reviewed_at = now;
         let leaves = node.leaves().is_some();
         let changes = if leaves {
-            self.is_own && Instant::ZERO + margin >= Instant::ZERO + limit + STEP
+            self.is_own && margin >= limit + STEP
         } else {
             margin < limit
         };
@@ -146,15 +145,14 @@ impl Endurance {
             Duration::from_micros(each / 2).min(APART)
         };
         let floor = Instant::ZERO + reserve + each.times(all.saturating_sub(number).into());
-        let is_spent = self.holds(now, 1, Instant::ZERO + margin <= floor);
-        let is_restored = self.holds(now, 3, Instant::ZERO + margin >= floor + STEP);
-        self.is_spent = is_spent || self.is_spent && !is_restored;
+        let is_restored = self.holds(now, 3, margin >= floor + STEP);
+        self.is_spent = self.holds(now, 1, margin <= floor) || self.is_spent && !is_restored;
         node.set_spent(self.is_spent);
         if self.is_spent {
             self.raise(now, node, 1, Event::AtReserve);
         }
         // The leader's order is due before the reserve is used.
-        let left = (Instant::ZERO + margin).since(Instant::ZERO + reserve);
+        let left = margin.since(Instant::ZERO + reserve);
         let floor_at = now + left;
         let moved = apart(floor_at, self.floor_at);
         let is_due = self.holds(now, 0, changes);
@@ -193,12 +191,10 @@ fn seconds(span: Duration) -> u16 {
 impl Relay {
     /// Records the drone's remaining time of flight and the time of its way home, s, 0 to 21 600.
     ///
-    /// Needs the feature `departures`. The time of flight is the least likely one. Any other value, such as NaN for an unknown one, and a
-    /// pause of 10 s make the endurance unknown: the last valid one counts down.
+    /// Needs the feature `departures`. Any other value, such as NaN for an unknown one, and a pause of 10 s make the endurance unknown.
     ///
-    /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay calls [`leave`](Self::leave) by itself once the endurance has been below
-    /// [`endurance_limit_s`](Self::endurance_limit_s) for 15 s, and [`stay`](Self::stay) once it has been 30 s above for 15 s, if nothing has been
-    /// granted until then. Takes constant time.
+    /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay calls [`leave`](Self::leave) by itself below [`endurance_limit_s`](Self::endurance_limit_s).
+    /// The rules are in [`docs::batteries`](crate::docs::batteries). Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -208,8 +204,6 @@ impl Relay {
     /// let mut relay = relay(Settings::default());
     /// relay.set_reserve(Some(Duration::from_millis(180_000)));
     /// relay.handle_endurance(Instant::from_millis(1_000), 900.0, 60.0);
-    /// # #[cfg(feature = "departures")]
-    /// assert_eq!(relay.endurance_s(Instant::from_millis(6_000)), Some(895));
     /// // The way home, 3 min of reserve, and 3 min for the replacement.
     /// # #[cfg(feature = "departures")]
     /// assert_eq!(relay.endurance_limit_s(), Some(420));
@@ -245,13 +239,12 @@ impl Relay {
 
     /// Returns the endurance below which the relay requests to leave, s.
     ///
-    /// `None` without a reserve, and before a valid value. It is the time of the way home, the reserve, and the time of a replacement: twelve times `dead_after`, and `respacing`, but at most
-    /// 4 min. After [`stay`](Self::stay) it is at most the way home and half of what was left beyond it. Takes constant time.
+    /// `None` without a reserve, and before a valid value. It is the way home and the limit of [`docs::batteries`](crate::docs::batteries).
     pub fn endurance_limit_s(&self) -> Option<u16> {
         let endurance = self.endurance.first()?;
         let limit = endurance.limit(&self.node.member().settings)?;
         let (_, home) = endurance.end?;
-        Some(seconds((Instant::ZERO + home + limit).since(Instant::ZERO)))
+        Some(seconds((limit + home).since(Instant::ZERO)))
     }
 
     /// Returns the number of times that the endurance became unknown.
@@ -297,23 +290,17 @@ impl Relay {
         if let Some(endurance) = self.endurance.first_mut() {
             let limit = endurance.limit(&self.node.member().settings);
             let margin = endurance.margin(now).or(limit).filter(|_| stays);
-            endurance.limit = margin.map(|margin| Duration::from_micros(margin.as_micros() / 2));
+            endurance.limit = margin.map(|margin| Instant::from_micros(margin.as_micros() / 2));
             (endurance.since, endurance.is_own) = ([None; 4], false);
         }
     }
 
-    /// Reports that a drone under control has no known endurance.
-    pub(super) fn require_endurance(&mut self, now: Instant) {
-        if let Some(endurance) = self.endurance.first_mut()
-            && endurance.known(now).is_none()
-        {
-            endurance.lose(now, &mut self.node);
-        }
-    }
-
-    /// Compares the margin of the endurance with its limit.
-    pub(super) fn review_endurance(&mut self, now: Instant) {
+    /// Compares the margin of the endurance with its limit. Reports an unknown endurance of a drone that is `flown`.
+    pub(super) fn review_endurance(&mut self, now: Instant, flown: bool) {
         if let Some(endurance) = self.endurance.first_mut() {
+            if flown && endurance.known(now).is_none() {
+                endurance.lose(now, &mut self.node);
+            }
             endurance.review(now, &mut self.node);
         }
     }

@@ -2,6 +2,7 @@
 
 use super::{Port, Transmit};
 use crate::event::Event;
+use crate::features::DEPARTURES;
 use crate::field::estimate::Estimate;
 use crate::geodetic::Sites;
 use crate::guard::HoldReason;
@@ -87,7 +88,7 @@ pub struct Relay {
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
     /// Endurance of the drone. Empty without the feature `departures`.
-    pub(super) endurance: [Endurance; cfg!(feature = "departures") as usize],
+    pub(super) endurance: [Endurance; DEPARTURES as usize],
 }
 
 impl Relay {
@@ -146,7 +147,7 @@ impl Relay {
             endpoint: Endpoint::new(identity.network, identity.index),
             deframers: [Deframer::new(), Deframer::new()],
             clock: MonotonicClock::new(now),
-            endurance: [Endurance::default(); cfg!(feature = "departures") as usize],
+            endurance: [Endurance::default(); DEPARTURES as usize],
         }
     }
 
@@ -226,7 +227,7 @@ impl Relay {
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.handle_timeout(now);
-        self.review_endurance(now);
+        self.review_endurance(now, false);
     }
 
     /// Restarts the placement method from its beginning. Better positions can result once the relays have measured
@@ -322,10 +323,8 @@ impl Relay {
     /// assert!(relay.poll_timeout().is_some_and(|due| due >= Instant::ZERO), "sleep until then, or the next byte");
     /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let due = match (self.node.poll_timeout(), self.endurance_timeout()) {
-            (Some(due), Some(endurance)) => due.min(endurance),
-            (due, endurance) => due.or(endurance)?,
-        };
+        let due = [self.node.poll_timeout(), self.endurance_timeout()];
+        let due = due.into_iter().flatten().min()?;
         Some(self.clock.external(due))
     }
 }
@@ -715,9 +714,7 @@ impl Relay {
     /// Returns true if that is a change for the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         let now = self.clock.advance(now);
-        if flown {
-            self.require_endurance(now);
-        }
+        self.review_endurance(now, flown);
         self.node.handle_control(now, flown)
     }
 

@@ -238,11 +238,11 @@ fn endurance_is_read_from_the_positions() {
     assert_eq!(status()["endurance_losses"], 1);
     assert_eq!(status()["departure"], "member");
     flows(&fifo, "endurance 120 20\n");
-    let line = relay.line("\"event\":\"departure\"");
-    assert!(line.contains("\"leaves_below_s\":218"), "{line}");
     // Nobody but this log tells the pilot of a drone without an autopilot's link.
     let line = relay.line("\"event\":\"at the reserve\"");
-    assert!(line.contains("fly it home now"), "{line}");
+    assert!(line.contains("\"must_leave\":true"), "{line}");
+    let line = relay.line("\"event\":\"departure\"");
+    assert!(line.contains("\"leaves_below_s\":218"), "{line}");
     assert_eq!(status()["at_reserve"], true);
     assert_eq!(status()["must_leave"], true);
     let (is_done, text) = commanded(&socket, "stay\n");
@@ -308,4 +308,14 @@ fn a_spare_waits_outside_of_the_chain() {
         line.contains("--spare: relay 1 is the first leader"),
         "{line}"
     );
+}
+
+#[test]
+fn a_battery_that_does_not_outlast_its_reserve_is_refused() {
+    let options = peer::options("/dev/null");
+    let own = format!("--index 1 --of 1 {options} --reserve 180 --flight-time");
+    let line = Relay::start(&format!("{own} 360")).refused_at_once(2);
+    let why =
+        "--flight-time 360: must be above 360, which is --reserve 180 and 180 s of a replacement";
+    assert!(line.contains(why), "{line}");
 }

@@ -611,10 +611,8 @@ impl Autopilot {
         if self.state != State::Silent
             && let Some(kind) = self.vehicle.kind()
         {
-            if let Some((id, interval_us)) =
-                self.streams
-                    .take(now, kind, self.vehicle.battery.setup.is_some())
-            {
+            let counts = self.vehicle.battery.setup.is_some();
+            if let Some((id, interval_us)) = self.streams.take(now, kind, counts) {
                 return Some(self.frame(Outgoing::SetMessageInterval { id, interval_us }));
             }
             if let Some(asked) = self.vehicle.echo.take(now) {
@@ -790,12 +788,9 @@ impl Autopilot {
         self.state.is_flown()
     }
 
-    /// Returns true while the autopilot reports that the drone is on the ground.
-    ///
-    /// That is a disarmed drone, or one with that landed state for 2 s. [`State::Grounded`] also covers an unknown landed state.
+    /// Returns true while the drone is disarmed, or has reported for 2 s that it is on the ground.
     pub fn is_landed(&self, now: Instant) -> bool {
-        let now = self.clock.internal(now);
-        self.state == State::Grounded && self.vehicle.is_landed(now)
+        self.state == State::Grounded && self.vehicle.is_landed(self.clock.internal(now))
     }
 
     /// Returns the counts of intact and broken messages from the autopilot.
@@ -907,8 +902,8 @@ impl Autopilot {
         let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
         self.handle_hold(now, holds);
         if matches!(self.state, State::Engaged | State::Blind) && relay.must_leave() {
-            self.report
-                .queue_line(Line::leave(relay.leaves_by_endurance()));
+            let line = Line::leave(relay.leaves_by_endurance());
+            self.report.queue_line(line);
         }
         self.handle_setpoint(now, setpoint);
         if let Some(side) = self.antenna {

@@ -52,7 +52,7 @@ pub(super) enum Topic {
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
-    /// Battery at the reserve, and order to the pilot to fly home.
+    /// Order to the pilot to fly home.
     Leave,
 }
 
@@ -69,9 +69,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Returns the text for the pilot of a drone that has to leave, repeated every [`URGENT`].
-    ///
-    /// `is_battery` is false for a departure that the operator or the firmware has ordered.
+    /// Returns the order to leave, repeated every [`URGENT`]; `is_battery` is false if the operator or the firmware has ordered it.
     pub(super) const fn leave(is_battery: bool) -> Self {
         let why = if is_battery { "battery" } else { "relay" };
         Self {
@@ -121,15 +119,8 @@ impl Line {
     /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
-            Event::EnduranceUnknown => {
-                return Some(Self::warning(
-                    Topic::Relay,
-                    ["battery: endurance unknown", ""],
-                ));
-            }
-            Event::AtReserve => {
-                return Some(Self::warning(Topic::Leave, ["battery: at the reserve", ""]));
-            }
+            Event::EnduranceUnknown => "battery: endurance unknown",
+            Event::AtReserve => "battery: at the reserve",
             Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",
@@ -139,6 +130,9 @@ impl Line {
             Event::DuplicateIndex { .. } => "relay: duplicate relay number, land one",
             _ => return None,
         };
+        if matches!(event, Event::EnduranceUnknown | Event::AtReserve) {
+            return Some(Self::warning(Topic::Relay, [text, ""]));
+        }
         Some(Self::info(Topic::Relay, text))
     }
 

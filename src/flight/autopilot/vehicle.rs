@@ -138,7 +138,7 @@ impl Vehicle {
             return VehicleUpdate::Nothing;
         }
         // The battery's messages come at their own rate: they do not show that the link works.
-        if cfg!(feature = "departures") && self.read_battery(now, message) {
+        if self.read_battery(now, message) {
             return VehicleUpdate::Nothing;
         }
         // A gap counts even if no timeout was handled meanwhile.
@@ -425,9 +425,7 @@ const CERTAIN: f32 = 0.9;
 /// Endurance by the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Time of flight with a full battery, s; speeds of the return and of the descent to land, m/s.
-    ///
-    /// `None` for [`UNSET`](Self::UNSET): the messages are not requested.
+    /// Arguments of `Autopilot::set_endurance`; `None` for [`UNSET`](Self::UNSET), and if the messages are not requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
     /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
@@ -442,8 +440,8 @@ impl Battery {
         if battery == Some(0) {
             self.detailed_at = Some(now);
         }
-        let is_detailed = self.detailed_at.is_some_and(|at| now.since(at) < OLD);
-        battery == Some(0) || battery.is_none() && !is_detailed
+        let is_only = self.detailed_at.is_none_or(|at| now.since(at) >= OLD);
+        battery.map_or(is_only, |id| id == 0)
     }
 
     /// Returns the remaining time of flight, s: the reported one, or without one the percentage of that of a full battery.
