@@ -7,6 +7,7 @@
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
+//! | own control state, or that in a stored entry, has changed and [begins an alarm](begins_alarm) | send the entry ahead of its turn, also during an agreement |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -14,11 +15,14 @@
 //! length, so that the reports of all relays take less than a tenth of the data rate. Without the feature `telemetry`,
 //! `handing_on` takes the place of this file.
 
+use core::num::NonZeroU16;
+
 use heapless::Vec;
 
 use super::context::Member;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
+use crate::flight::autopilot::state::State;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
@@ -49,6 +53,15 @@ pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 /// The same for the first agreement.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
+/// Time by which a report that begins an alarm may be ahead of the share of the channel.
+const AHEAD: Duration = Duration::from_millis(2_000);
+
+/// Minimum time between the states of two own entries, more than [`ROUNDING`].
+const STEP: Duration = Duration::from_millis(400);
+
+/// Maximum difference of the times of one entry that was received on two ways. Each relay rounds the age.
+const ROUNDING: Duration = Duration::from_millis(300);
+
 /// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
 
@@ -76,6 +89,8 @@ pub(crate) struct Reporting {
     control: u16,
     /// Last measured interference, W; 0 before any.
     power_w: f32,
+    /// Time of the state in the last own entry.
+    reported: Instant,
     stored: Vec<Stored, STORED>,
     watched: [Watched; 2],
     /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
@@ -91,7 +106,17 @@ struct Stored {
     at: Instant,
     /// Time from which the entry may be sent. After it has been sent, a newer one should arrive before.
     from: Instant,
-    is_new: bool,
+    rank: Rank,
+}
+
+/// Order in which stored entries are sent, the last one first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Rank {
+    /// Sent before.
+    Sent,
+    New,
+    /// New, and begins an alarm.
+    Alarm,
 }
 
 /// Side with a ground station that watches.
@@ -114,7 +139,7 @@ struct Watched {
     confirmed: Instant,
     unconfirmed: u8,
     /// Node to which a handshake is due that requests a reply.
-    to_greet: Option<u16>,
+    to_greet: Option<NonZeroU16>,
     /// Time of the next report, at least `free`.
     due: Instant,
     /// Time from which the share of the channel allows a report.
@@ -125,6 +150,10 @@ struct Watched {
     count: u8,
     /// True if entries have arrived since the last report.
     is_fed: bool,
+    /// True if the own control state begins an alarm that has not been reported.
+    is_alarmed: bool,
+    /// True if an entry that begins an alarm is stored and has not been sent.
+    stores_alarm: bool,
 }
 
 /// State of the relay for its own entry: the number of an entry's state, setpoint and agreed position.
@@ -139,12 +168,16 @@ impl Reporting {
         self.power_w = power_w;
     }
 
-    /// Takes the control state; a change is reported as soon as the share of the channel allows.
+    /// Takes the control state. A change is reported as soon as the share of the channel allows, the beginning of an alarm
+    /// earlier.
     pub(crate) fn handle_control(&mut self, control: u16) {
-        if core::mem::replace(&mut self.control, control) != control {
-            for watched in &mut self.watched {
-                (watched.due, watched.own_from) = (Instant::ZERO, Instant::ZERO);
-            }
+        let before = core::mem::replace(&mut self.control, control);
+        if before == control {
+            return;
+        }
+        for watched in &mut self.watched {
+            (watched.due, watched.own_from) = (Instant::ZERO, self.reported + STEP);
+            watched.is_alarmed |= begins_alarm(before, control);
         }
     }
 
@@ -195,8 +228,7 @@ impl Reporting {
         for side in [Side::Upstream, Side::Downstream] {
             let watched = self.at(side);
             watched.expire(now, member);
-            let is_ready = |at| now >= at + wait;
-            while watched.hand_on != 0 && is_ready(watched.hand_on_at) {
+            while watched.hand_on != 0 && now >= watched.hand_on_at + wait {
                 let distance = if watched.hand_on & 1 != 0 {
                     1
                 } else {
@@ -214,7 +246,7 @@ impl Reporting {
                     let mission = member.digest;
                     if distance == CANDIDATES && now >= watched.confirmed + UNCONFIRMED {
                         // It may have restarted: then it accepts only handshakes.
-                        watched.to_greet = Some(to).filter(|_| watched.unconfirmed > 0);
+                        watched.to_greet = NonZeroU16::new(to).filter(|_| watched.unconfirmed > 0);
                         watched.hand_on |= mask(CANDIDATES);
                         watched.hand_on_at = now + REPEAT_AFTER.times(1 << watched.unconfirmed);
                         watched.unconfirmed = (watched.unconfirmed + 1).min(MOST_DOUBLINGS);
@@ -222,8 +254,7 @@ impl Reporting {
                     return Some((away, to, Message::Watch { number, mission }));
                 }
             }
-            if let Some(at) = watched.report_at()
-                && is_ready(at)
+            if watched.report_at(wait).is_some_and(|at| now >= at)
                 && let Some(to) = watched.to.or_else(|| next(member, neighbours, side))
                 && let Some(report) = self.report(now, member, neighbours, side, own)
             {
@@ -238,7 +269,7 @@ impl Reporting {
     /// Returns the next node to which a handshake is due that requests a reply.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         let mut watched = self.watched.iter_mut();
-        watched.find_map(|watched| watched.to_greet.take())
+        watched.find_map(|watched| watched.to_greet.take().map(NonZeroU16::get))
     }
 
     /// Records that the relay's timers have been handled up to `now`.
@@ -258,12 +289,27 @@ impl Reporting {
 
     /// Returns the times at which a Watch or a Report is due.
     fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
-        let times = self.watched.iter().flat_map(|watched| {
-            let hand_on = Some(watched.hand_on_at).filter(|_| watched.hand_on != 0);
-            [watched.report_at(), hand_on]
+        let times = self.watched.iter().flat_map(move |watched| {
+            let hand_on = (watched.hand_on != 0).then(|| watched.hand_on_at + wait);
+            [watched.report_at(wait), hand_on]
         });
-        times.flatten().map(move |at| at + wait)
+        times.flatten()
     }
+}
+
+/// Returns the time `span` before `at`, at least 0.
+const fn earlier(at: Instant, span: Duration) -> Instant {
+    Instant::from_micros(at.as_micros().saturating_sub(span.as_micros()))
+}
+
+/// Returns true if a change of the control state, each from 1 or 0 if unknown, begins an alarm.
+///
+/// The autopilot is not received or has no position any more, or the relay no longer controls the drone.
+const fn begins_alarm(before: u16, now: u16) -> bool {
+    const SILENT: u16 = State::Silent as u16 + 1;
+    const ENGAGED: u16 = State::Engaged as u16 + 1;
+    const BLIND: u16 = State::Blind as u16 + 1;
+    before != now && before != 0 && (now == SILENT || now == BLIND || before == ENGAGED)
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
@@ -301,9 +347,17 @@ impl Watched {
         }
     }
 
-    /// Returns the time of the next report; `None` while nobody watches.
-    fn report_at(&self) -> Option<Instant> {
-        (self.until > Instant::ZERO).then(|| self.due.max(self.free))
+    /// Returns the time of the next report; `None` while nobody watches. The beginning of an alarm does not `wait`.
+    fn report_at(&self, wait: Duration) -> Option<Instant> {
+        let mut at = self.due.max(self.free) + wait;
+        let ahead = earlier(self.free, AHEAD);
+        if self.is_alarmed {
+            at = at.min(ahead.max(self.own_from));
+        }
+        if self.stores_alarm {
+            at = at.min(ahead);
+        }
+        (self.until > Instant::ZERO).then_some(at)
     }
 }
 
@@ -390,40 +444,44 @@ impl Reporting {
         for entry in &report.entries {
             let detail = detail.take();
             if let Some(at) = entry.time(now) {
-                self.store(now, *entry, detail, at);
+                let is_alarm = self.store(now, *entry, detail, at);
+                self.at(side.other()).stores_alarm |= is_alarm;
             }
         }
         true
     }
 
     /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
-    /// else the oldest one, is dropped.
-    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) {
+    /// else the oldest one, is dropped. Returns true if the entry begins an alarm.
+    fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
         let mut stored = Stored {
             entry,
             detail,
             at,
             from: now,
-            is_new: true,
+            rank: Rank::New,
         };
         let mut all = self.stored.iter_mut();
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
-            // Two ways of one entry differ by the rounding of its age.
-            if at > old.at + Duration::from_millis(300) {
+            if at > old.at + ROUNDING {
+                if begins_alarm(old.entry.control(), entry.control()) {
+                    stored.rank = Rank::Alarm;
+                }
+                let begins = stored.rank == Rank::Alarm;
+                stored.rank = stored.rank.max(old.rank);
                 stored.detail = detail.or(old.detail);
                 *old = stored;
+                return begins;
             } else if old.detail.is_none() {
                 old.detail = detail;
             }
         } else if let Err(stored) = self.stored.push(stored) {
-            let worst = self
-                .stored
-                .iter_mut()
-                .min_by_key(|old| (old.is_new, old.at));
+            let worst = self.stored.iter_mut().min_by_key(|old| (old.rank, old.at));
             if let Some(worst) = worst {
                 *worst = stored;
             }
         }
+        false
     }
 
     /// Returns the report toward `side` that is due now; `None` if there is nothing to report.
@@ -439,29 +497,40 @@ impl Reporting {
         let period = period(member, side, byte);
         let position = self.position.filter(|(at, _)| now.since(*at) < OLD);
         let (control, power_w) = (self.control, self.power_w);
-        let watched = self.at(side);
+        let (watched, reported) = {
+            let [upstream, downstream] = &mut self.watched;
+            let watched = match side {
+                Side::Upstream => upstream,
+                Side::Downstream => downstream,
+            };
+            (watched, &mut self.reported)
+        };
         let mut report = Reports::new(watched.number, member.digest);
         let is_due = now >= watched.own_from;
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
-            let age = position.map_or(0, |(at, _)| age(now, at));
+            // A position from before the last entry would not count as newer than that entry.
+            let state_at = position.map_or(now, |(at, _)| at);
+            *reported = state_at.max(*reported + STEP).min(now);
+            let age = age(now, *reported);
             let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
             _ = report.entries.push(entry);
         }
         self.stored.retain(|stored| {
             let age = now.since(stored.at);
-            age < OLDEST && (stored.is_new || age < period.times(3))
+            age < OLDEST && (stored.rank > Rank::Sent || age < period.times(3))
         });
-        let mut is_left = false;
-        for are_new in [true, false] {
+        let (mut is_left, mut stores_alarm) = (false, false);
+        for rank in [Rank::Alarm, Rank::New, Rank::Sent] {
             for stored in &mut self.stored {
                 let is_toward = (stored.entry.relay() > member.node) == (side == Side::Upstream);
-                if stored.is_new != are_new || !is_toward || now < stored.from {
+                if stored.rank != rank || !is_toward || now < stored.from {
                     continue;
                 }
                 stored.entry.age = age(now, stored.at);
                 if report.entries.push(stored.entry).is_err() {
-                    is_left |= are_new;
+                    is_left |= rank > Rank::Sent;
+                    stores_alarm |= rank == Rank::Alarm;
                     continue;
                 }
                 if report.detail.is_none() && stored.detail.is_some() {
@@ -470,7 +539,7 @@ impl Reporting {
                         core::mem::swap(first, last);
                     }
                 }
-                stored.is_new = false;
+                stored.rank = Rank::Sent;
                 stored.from = now + period;
             }
         }
@@ -490,13 +559,15 @@ impl Reporting {
         // On a shared channel half a period's share may be sent at once. On wires that would overflow the stores of relays nearer to the station.
         let saved = match member.settings.wiring {
             Wiring::Pair => now,
-            Wiring::Shared => Instant::from_micros(now.as_micros().saturating_sub(half.into())),
+            Wiring::Shared => earlier(now, Duration::from_micros(half.into())),
         };
         watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
         let late = Duration::from_micros((half / 4).into());
         if is_due {
             watched.own_from = now + late.times(6);
+            watched.is_alarmed = false;
         }
+        watched.stores_alarm = stores_alarm;
         watched.due = match (is_left, watched.is_fed) {
             (true, _) => now,
             // The reports of relays behind come first.

@@ -42,10 +42,19 @@ pub struct Chain<'a> {
 impl Chain<'_> {
     /// Returns the state of the chain at the time `now`, from the newest report of each relay by number.
     ///
-    /// A relay is lost if another relay has reported it as lost, by `alarms`, and its report is old.
+    /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`, or reports a neighbour
+    /// beyond it [`SILENT_AFTER`] later.
     pub fn snapshot(&self, now: Instant, reports: &[Report], alarms: &Alarms) -> Snapshot {
-        let is_lost =
-            |report: &Report| alarms.is_lost(report.relay) && now.since(report.at) >= SILENT_AFTER;
+        let is_skipped = |report: &Report| {
+            let mut later = reports
+                .iter()
+                .filter(|by| by.at.since(report.at) >= SILENT_AFTER);
+            later.any(|by| has_beyond(by, report.relay))
+        };
+        let is_lost = |report: &Report| {
+            now.since(report.at) >= SILENT_AFTER
+                && (alarms.is_lost(report.relay) || is_skipped(report))
+        };
         let mut relays: Vec<RelaySnapshot> = (1..=self.relays).map(RelaySnapshot::new).collect();
         for report in reports {
             let mut known = RelaySnapshot {
@@ -139,6 +148,13 @@ impl Chain<'_> {
             is_estimated: self.is_estimated,
         })
     }
+}
+
+/// Returns true if relay `by` reports a neighbour beyond the relay `number`.
+fn has_beyond(by: &Report, number: u16) -> bool {
+    let [before, after] = by.neighbours;
+    before.is_some_and(|it| (it + 1..by.relay).contains(&number))
+        || after.is_some_and(|it| (by.relay + 1..it).contains(&number))
 }
 
 /// Returns true if relay `number` is between the two ends of a hop by its number.

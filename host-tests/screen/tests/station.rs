@@ -264,3 +264,26 @@ fn the_snapshot_and_the_log_contain_what_is_known_and_nothing_else() {
     assert_eq!(silent.last.relays.len(), 5);
     assert_eq!(silent.last.relays[1].phase.as_deref(), Some("agreed"));
 }
+
+#[test]
+fn a_silent_relay_that_its_neighbours_have_closed_up_over_is_lost() {
+    // The station may have missed the reports of the 2 s in which a neighbour counted the relay as silent.
+    let mut watched = Watched::new();
+    watched.second();
+    watched.changes("3:off");
+    (0..2).for_each(|_| watched.second());
+    watched.changes("2:skipsnext");
+    watched.second();
+    assert_eq!(watched.condition(3), Some(Condition::Normal));
+    (0..5).for_each(|_| watched.second());
+    assert_eq!(watched.condition(3), Some(Condition::Lost));
+    assert_eq!(watched.hops(), "Tx-1 1-2 2-4 4-5 5-Rx ");
+    // A relay that reports is not lost, even while another one reports the neighbours beyond it.
+    watched.changes("3:ok");
+    (0..10).for_each(|_| watched.second());
+    assert_eq!(watched.condition(3), Some(Condition::Normal));
+    // Nor is a silent one without reports of others about newer neighbours.
+    watched.changes("12345:off");
+    (0..20).for_each(|_| watched.second());
+    assert_eq!(watched.condition(3), Some(Condition::Normal));
+}

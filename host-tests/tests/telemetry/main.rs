@@ -2,6 +2,8 @@
 //!
 //! `cargo test --test telemetry -- --nocapture` prints the figures.
 
+mod changes;
+
 use host_tests::fixtures::paper;
 use uav_relay::{Duration, GuardConfig, Instant, Mission, Phase, Placement, Side};
 use uav_relay_decode::envelope::unstuffed;
@@ -40,10 +42,9 @@ fn setup(relays: u16, access: Option<Access>, from: Instant, until: Instant) -> 
     setup.soaked(until)
 }
 
-/// Returns the setup with drones that hover 20 m off their positions and fly there.
-fn flown(mut setup: Setup) -> Setup {
-    let relays = setup.mission.relays();
-    let config = setup.mission.config();
+/// Returns places of the drones, evenly spaced on the line from Tx to Rx.
+fn evenly(setup: &Setup) -> Vec<Point> {
+    let (relays, config) = (setup.mission.relays(), setup.mission.config());
     let place = |index: u16| -> Point {
         let share = f64::from(index) / f64::from(relays + 1);
         [
@@ -52,12 +53,14 @@ fn flown(mut setup: Setup) -> Setup {
             config.common.altitude_m.into(),
         ]
     };
-    setup.settings.guard = Some(GuardConfig::of(&setup.mission, config.common));
-    setup.flight = Some(FlightSpec::multicopters(
-        (1..=relays).map(place).collect(),
-        0.0,
-        0.0,
-    ));
+    (1..=relays).map(place).collect()
+}
+
+/// Returns the setup with drones that hover 20 m off their positions and fly there.
+fn flown(mut setup: Setup) -> Setup {
+    let common = setup.mission.config().common;
+    setup.settings.guard = Some(GuardConfig::of(&setup.mission, common));
+    setup.flight = Some(FlightSpec::multicopters(evenly(&setup), 0.0, 0.0));
     setup
 }
 

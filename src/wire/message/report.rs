@@ -104,6 +104,11 @@ impl Entry {
     pub const fn state(&self) -> u16 {
         self.state.number()
     }
+
+    /// Returns the control state of the drone, from 1; 0 without an autopilot.
+    pub(crate) const fn control(&self) -> u16 {
+        self.state.number() / 4096 % 6
+    }
 }
 
 /// Additional state of one relay in a report: the relay whose entry is the first one. A relay adds these details to

@@ -1,6 +1,6 @@
 //! State of a running chain, for a screen that shows the flight.
 
-use uav_relay::{Instant, Mission, Profile, Report, Side};
+use uav_relay::{Instant, Mission, Profile, Relay, Report, Side};
 
 use super::{Chain, MAX_EVENTS};
 use crate::simulator::drones::{placement, point};
@@ -35,6 +35,16 @@ impl Chain {
             self.end_soak(Instant::from_micros(u64::MAX));
         }
         has_ended
+    }
+
+    /// Passes an input of its firmware to relay `number`, from 1, at the time `now`. The chain has been advanced to that time.
+    pub fn input(&mut self, now: Instant, number: u16, input: impl FnOnce(&mut Relay)) {
+        self.now = now;
+        let index = usize::from(number).saturating_sub(1);
+        if let Some(member) = self.members.get_mut(index) {
+            input(&mut member.relay);
+        }
+        self.drain(index);
     }
 
     /// Returns the log of the run so far.

@@ -1,0 +1,220 @@
+//! Changes of a relay's state: each reaches the station in time, and the last one always.
+
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::{Duration, GuardConfig, Instant, Placement, Report, Side, Upload};
+use uav_relay_sim::simulator::chain::Chain;
+use uav_relay_sim::simulator::medium::Access;
+use uav_relay_sim::simulator::setup::UploadSpec;
+
+use crate::{Figures, RATE, quantile, s, seconds, setup};
+
+const STATES: [State; 5] = [
+    State::Silent,
+    State::Grounded,
+    State::Standby,
+    State::Engaged,
+    State::Blind,
+];
+
+const fn ms(millis: u64) -> Duration {
+    Duration::from_millis(millis)
+}
+
+fn report(chain: &Chain, relay: u16) -> Option<Report> {
+    let mut reports = chain.reports(Side::Upstream).into_iter();
+    reports.find(|it| it.relay == relay)
+}
+
+/// Returns a position with coordinates in quarters of a metre, as in reports.
+fn place(rng: &mut ChaCha8Rng) -> Placement {
+    let [x_m, y_m, altitude_m] =
+        [800, 40, 120].map(|quarters| rng.random_range(0..quarters) as f32 / 4.0);
+    Placement {
+        x_m,
+        y_m,
+        altitude_m,
+    }
+}
+
+/// Checks that a position reaches the station right after a report without a position.
+#[test]
+fn a_position_that_is_given_once_reaches_the_station() {
+    for (relays, access) in [(2, None), (4, None), (8, Some(Access::Ideal))] {
+        let mut chain = Chain::new(setup(relays, access, s(1), s(600))).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let (mut now, mut delays_s) = (s(20), Vec::new());
+        chain.advance(now);
+        for turn in 0..40_u16 {
+            let relay = relays - turn % relays.min(2);
+            let given = place(&mut rng);
+            let begun = now;
+            chain.input(now, relay, |it| it.handle_position(now, given, now));
+            let shows = |chain: &Chain| report(chain, relay).unwrap().position == Some(given);
+            while !shows(&chain) {
+                assert!(
+                    now < begun + ms(4_000),
+                    "turn {turn} of {relays} relays: not shown"
+                );
+                now = now + ms(20);
+                chain.advance(now);
+            }
+            delays_s.push(seconds(now.since(begun)));
+            // Then the position is unknown again.
+            now = now + ms(6_000 + rng.random_range(0..1_000));
+            chain.advance(now);
+            assert_eq!(report(&chain, relay).unwrap().position, None);
+        }
+        let most_s = quantile(&delays_s, 1.0);
+        println!(
+            "{relays} relays, {access:?}: positions given once are shown within {most_s:.1} s"
+        );
+        assert!(most_s <= 2.0, "{most_s}");
+    }
+}
+
+/// Checks that the station knows every relay's last state in time after the last change.
+#[test]
+fn the_last_state_reaches_the_station() {
+    for seed in 0..40 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (relays, access) =
+            [(8, Some(Access::Ideal)), (8, Some(Access::Csma)), (3, None)][rng.random_range(0..3)];
+        let loss = [0.0, 0.1, 0.3][rng.random_range(0..3)];
+        // Frames that are lost or collide are sent again in later turns.
+        let within = match (access, loss) {
+            (None | Some(Access::Ideal), 0.0) => ms(2_500),
+            (_, 0.0) => ms(4_000),
+            _ => ms(10_000),
+        };
+        let mut setup = setup(relays, access, s(1), s(600));
+        setup.faults.loss = loss;
+        setup.seed = seed;
+        let mut chain = Chain::new(setup).unwrap();
+        let mut now = s(60);
+        chain.advance(now);
+        for round in 0..6 {
+            let mut last = vec![(None, None); usize::from(relays)];
+            for _ in 0..rng.random_range(1..40) {
+                now = now + ms(rng.random_range(0..800));
+                chain.advance(now);
+                let relay = rng.random_range(1..=relays);
+                let (control, position) = &mut last[usize::from(relay) - 1];
+                if rng.random_bool(0.5) {
+                    let state = STATES[rng.random_range(0..5)];
+                    *control = Some(state);
+                    chain.input(now, relay, |it| it.report_control(state));
+                } else {
+                    let at = Instant::from_micros(now.as_micros() - rng.random_range(0..300_000));
+                    let given = place(&mut rng);
+                    *position = Some((now, given));
+                    chain.input(now, relay, |it| it.handle_position(now, given, at));
+                }
+            }
+            let silence = now;
+            let mut shown = vec![false; usize::from(relays)];
+            while now < silence + within {
+                for (relay, (is_shown, (_, position))) in (1..).zip(shown.iter_mut().zip(&last)) {
+                    let given = position.map(|it| it.1);
+                    *is_shown |= report(&chain, relay).is_some_and(|it| it.position == given);
+                }
+                now = now + ms(50);
+                chain.advance(now);
+            }
+            for (relay, (control, position)) in (1..).zip(&last) {
+                let report = report(&chain, relay).unwrap();
+                let what = format!(
+                    "seed {seed}, round {round}, {relays} relays, {access:?}, loss {loss}, relay {relay}: {report:?}"
+                );
+                if control.is_some() {
+                    assert_eq!(report.control, *control, "{what}");
+                }
+                // A position is sent for 2 s, which may be too short if frames are lost.
+                let is_late = position.is_some_and(|(at, _)| at + ms(500) >= silence);
+                if loss == 0.0 && access != Some(Access::Csma) && is_late {
+                    assert!(
+                        shown[usize::from(relay) - 1],
+                        "{position:?} at {silence:?}, {what}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Returns true if the change of the control state is an alarm on the station's page.
+fn begins_alarm(before: State, now: State) -> bool {
+    before != now && (matches!(now, State::Silent | State::Blind) || before == State::Engaged)
+}
+
+/// Checks the time until the station knows that an alarm has begun. Missions are uploaded, so that the chain often agrees
+/// on new positions meanwhile.
+#[test]
+fn alarms_are_known_in_time() {
+    let (mut delays_s, mut ages_s, mut most) = (Vec::new(), Vec::new(), 0.0_f64);
+    for seed in 1..=4 {
+        let span = [s(60), s(260)];
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = setup(8, Some(Access::Ideal), s(1), span[1]);
+        setup.seed = seed;
+        let config = *setup.mission.config();
+        setup.settings.guard = Some(GuardConfig::of(&setup.mission, config.common));
+        setup.uploads = (1..=12)
+            .map(|version| UploadSpec {
+                end: Side::Upstream,
+                at: span[0] + ms(16_000).times(version.into()),
+                upload: Upload::new(&setup.mission, version, config).unwrap(),
+            })
+            .collect();
+        let mut chain = Chain::new(setup).unwrap();
+        let mut figures = Figures::default();
+        let mut now = s(50);
+        chain.advance(now);
+        for relay in 1..=8 {
+            chain.input(now, relay, |it| it.report_control(State::Engaged));
+        }
+        now = span[0];
+        chain.advance(now);
+        let mut states = [State::Engaged; 8];
+        // Time of a change that the station does not know yet.
+        let mut begun = [None; 8];
+        let mut next = now;
+        while now < span[1] {
+            now = now + ms(20);
+            chain.advance(now);
+            figures.frames.extend(chain.frames(now));
+            while next <= now {
+                // Two changes of one relay may follow each other closely, as a pilot's and a silent autopilot's.
+                next = next + ms([100, 400, 2_000, 4_000, 8_000][rng.random_range(0..5)]);
+                let index = [rng.random_range(0..8), 7][rng.random_range(0..2)];
+                let state = STATES[rng.random_range(0..5)];
+                let before = core::mem::replace(&mut states[index], state);
+                chain.input(now, index as u16 + 1, |it| it.report_control(state));
+                if before != state {
+                    begun[index] = begins_alarm(before, state).then_some(now);
+                }
+            }
+            for index in 0..8 {
+                let report = report(&chain, index as u16 + 1).unwrap();
+                ages_s.push(seconds(now.since(report.at)));
+                if let Some(since) = begun[index].filter(|_| report.control == Some(states[index]))
+                {
+                    begun[index] = None;
+                    delays_s.push(seconds(now.since(since)));
+                }
+            }
+        }
+        most = most.max(figures.most_bytes(span));
+    }
+    let [delay_s, age_s] =
+        [&delays_s, &ages_s].map(|all| [0.5, 0.95, 1.0].map(|share| quantile(all, share)));
+    println!(
+        "{} alarms, no collisions: known after (50 %, 95 %, most) {delay_s:.2?} s, ages {age_s:.2?} s; {:.1} % of the rate",
+        delays_s.len(),
+        100.0 * most / RATE
+    );
+    assert!(most <= 0.1 * RATE, "{most}");
+    assert!(delays_s.len() > 100 && delay_s[2] <= 0.6, "{delay_s:?}");
+    assert!(age_s[1] <= 2.0, "{age_s:?}");
+}
