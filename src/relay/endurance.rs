@@ -18,7 +18,7 @@ const STALE: Duration = Duration::from_millis(10_000);
 const REVIEW: Duration = Duration::from_millis(1_000);
 /// Time for which a condition must hold.
 const HOLD: Duration = Duration::from_millis(15_000);
-/// Hysteresis, greatest difference of two values that agree, and least change of a request's endurance that the leader is told.
+/// Hysteresis, difference of two values that agree, and change of a request that the leader is told.
 const STEP: Duration = Duration::from_millis(30_000);
 /// Time between two `EnduranceUnknown`, and between two `AtReserve`.
 const AGAIN: Duration = Duration::from_millis(60_000);
@@ -51,7 +51,7 @@ pub(super) struct Endurance {
     raised_at: [Option<Instant>; 2],
     /// Limit of the margin since `Relay::stay`; `None` for the usual one.
     limit: Option<Instant>,
-    /// Start times of four conditions: request to change, margin at or below the floor, leader to be told, margin above the floor again.
+    /// Start times of four conditions: request to change, floor reached, leader to be told, floor left.
     since: [Option<Instant>; 4],
     /// True if the request to leave is this module's.
     is_own: bool,

@@ -484,7 +484,7 @@ fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
     }
 }
 
-/// Checks a relay outside of the chain at its reserve: high values put it back into the chain only after 15 s.
+/// Checks that a relay outside of the chain at its reserve returns only after 15 s of high values.
 #[test]
 fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     let mut relay = shared(3, 2);
@@ -534,7 +534,7 @@ fn an_order_to_stay_does_not_silence_the_reserve() {
     }
 }
 
-/// Checks that a drone is landed once it is disarmed, or has reported that for 2 s: not before the first landed state.
+/// Checks that a drone is landed once it is disarmed, or has reported that for 2 s.
 #[test]
 fn a_drone_is_landed_by_its_own_report() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -585,7 +585,7 @@ fn a_way_home_from_an_old_position_is_unknown() {
     assert_eq!(pair.told()[0], None);
 }
 
-/// Checks that messages of the battery do not hide the silence after which a PX4 may be in its failsafe.
+/// Checks that messages of the battery hide no silence after which a PX4 may be in its failsafe.
 #[test]
 fn messages_of_the_battery_hide_no_silence_of_a_px4() {
     let mut vehicle = Vehicle::engaged(Kind::Px4, 300.0);

@@ -36,7 +36,7 @@ impl Drop for Pair {
 }
 
 impl Pair {
-    /// Starts relay `index` of `of` with its drone on the ground and a battery at `battery`, and the other relays.
+    /// Starts relay `index` of `of`, its drone on the ground with a battery at `battery`, and the others.
     fn grounded([index, of]: [usize; 2], kind: &str, more: &str, battery: &str) -> Self {
         let chain = Chain::on_channel(of, Medium::new(of, QUIET));
         let link = chain.files.text("autopilot");
@@ -195,7 +195,7 @@ fn a_low_battery_leads_an_arducopter_out_of_the_chain() {
     a_low_battery_leads_it_out_of_the_chain("arducopter", "--flight-time 1500", batteries);
 }
 
-/// Checks the first leader's restart in flight with a low battery and a slow autopilot: it stays outside.
+/// Checks a first leader that restarts with a low battery and a slow autopilot: it stays outside.
 ///
 /// The first landed state comes after 3 s, and the next message of the battery is lost.
 #[test]

@@ -69,7 +69,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Returns the order to leave, repeated every [`URGENT`]; `is_battery` is false if the operator or the firmware has ordered it.
+    /// Returns the order to leave. `is_battery` is false if the operator or the firmware has requested the departure.
     pub(super) const fn leave(is_battery: bool) -> Self {
         let why = if is_battery { "battery" } else { "relay" };
         Self {

@@ -354,9 +354,9 @@ impl Vehicle {
         self.heard_at.is_some() && (!self.armed || is_grounded)
     }
 
-    /// Returns the newest remaining time of flight, once, and the time of the way home, s; `None` before the home is known.
+    /// Returns the newest remaining time of flight, once, and the time of the way home, s.
     ///
-    /// NaN is unknown, as the way home is without a recent position, and to a home far from the line.
+    /// `None` before the home is known. NaN is unknown, as the way home is without a recent position, and to a home far from the line.
     pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let home = axis.place(self.home?);
@@ -417,7 +417,7 @@ impl Vehicle {
 
 /// Time on the ground after which an armed drone counts as landed: a single report in flight does not.
 const LANDED: Duration = Duration::from_millis(2_000);
-/// Age of a BATTERY_STATUS from which on SYS_STATUS counts instead, and of a position from which on the way home is unknown.
+/// Age from which on SYS_STATUS counts instead of BATTERY_STATUS, and a position gives no way home.
 const OLD: Duration = Duration::from_millis(10_000);
 /// Part of a reported remaining time that counts.
 const CERTAIN: f32 = 0.9;
@@ -425,7 +425,7 @@ const CERTAIN: f32 = 0.9;
 /// Endurance by the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Arguments of `Autopilot::set_endurance`; `None` for [`UNSET`](Self::UNSET), and if the messages are not requested.
+    /// Arguments of `Autopilot::set_endurance`; `None` for [`UNSET`](Self::UNSET) without requests.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
     /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
@@ -444,7 +444,7 @@ impl Battery {
         battery.map_or(is_only, |id| id == 0)
     }
 
-    /// Returns the remaining time of flight, s: the reported one, or without one the percentage of that of a full battery.
+    /// Returns the remaining time of flight, s, as reported, or else by the percentage.
     ///
     /// NaN is unknown. Without a valid percentage a PX4 has no estimate of the time either.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
