@@ -6,7 +6,6 @@
 use super::Relay;
 use crate::event::Event;
 use crate::node::Node;
-use crate::node::context::Member;
 use crate::node::departure::Leaving;
 use crate::settings::Settings;
 use crate::stats::bump;
@@ -47,12 +46,12 @@ pub(super) struct Endurance {
     /// True from the loss of the endurance to the next valid value.
     is_lost: bool,
     losses: u32,
-    /// Times of the last `EnduranceUnknown` and `AtReserve`.
-    raised_at: [Option<Instant>; 2],
+    /// Times of the last `EnduranceUnknown` and `AtReserve`; 0 before.
+    raised_at: [Instant; 2],
     /// Limit of the margin since `Relay::stay`; `None` for the usual one.
     limit: Option<Instant>,
-    /// Start times of four conditions: request to change, floor reached, leader to be told, floor left.
-    since: [Option<Instant>; 4],
+    /// Start times of four conditions, or 0: change due, floor reached, leader to be told, floor left.
+    since: [Instant; 4],
     /// True if the request to leave is this module's.
     is_own: bool,
     /// True from a margin at or below the floor until it is [`STEP`] above the floor.
@@ -100,9 +99,9 @@ impl Endurance {
     /// Raises an event whose last time is `which`, at most once per [`AGAIN`].
     fn raise(&mut self, now: Instant, node: &mut Node, which: usize, event: Event) {
         if let Some(last) = self.raised_at.get_mut(which)
-            && last.is_none_or(|at| now.since(at) >= AGAIN)
+            && (*last == Instant::ZERO || now.since(*last) >= AGAIN)
         {
-            *last = Some(now);
+            *last = now;
             node.raise(event);
         }
     }
@@ -112,8 +111,8 @@ impl Endurance {
         let Some(since) = self.since.get_mut(which) else {
             return false;
         };
-        let at = since.unwrap_or(now);
-        *since = is_true.then_some(at);
+        let at = Some(*since).filter(|at| *at > Instant::ZERO).unwrap_or(now);
+        *since = if is_true { at } else { Instant::ZERO };
         is_true && now.since(at) >= HOLD && (self.is_steady || at < self.sampled_at)
     }
 
@@ -135,9 +134,7 @@ impl Endurance {
             margin < limit
         };
         // Pilots of a fleet of equal endurance are told one by one, in the leader's order, also if it is slow or refuses all.
-        let Member {
-            node: number, all, ..
-        } = *node.member();
+        let (number, all) = (node.member().node, node.member().all);
         let each = Self::replacement(&settings).as_micros() / u64::from(all.max(1));
         let each = if node.is_refused(now) {
             Duration::from_micros(each)
@@ -291,7 +288,7 @@ impl Relay {
             let limit = endurance.limit(&self.node.member().settings);
             let margin = endurance.margin(now).or(limit).filter(|_| stays);
             endurance.limit = margin.map(|margin| Instant::from_micros(margin.as_micros() / 2));
-            (endurance.since, endurance.is_own) = ([None; 4], false);
+            (endurance.since, endurance.is_own) = ([Instant::ZERO; 4], false);
         }
     }
 

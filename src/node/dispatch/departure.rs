@@ -237,10 +237,8 @@ impl Node {
     /// Returns true if every departure is refused for good.
     pub(crate) fn is_refused(&self, now: Instant) -> bool {
         let refusal = self.layers.departure_refusal(now, &self.member);
-        matches!(
-            refusal,
-            Some(Departure::NeedsGuard | Departure::NeedsChannel)
-        )
+        let lasting = [Departure::NeedsGuard, Departure::NeedsChannel];
+        refusal.is_some_and(|why| lasting.contains(&why))
     }
 
     /// Records if the drone has no endurance for a return to the chain.
