@@ -55,10 +55,10 @@ pub enum Event {
         /// Index of the node with the other mission.
         node: u16,
     },
-    /// Three handshakes in a row from a node are signed with another key than this relay's. None in between has the
-    /// right key. An operator gives both nodes the same key. A single forged frame does not raise it, but an attacker
-    /// without the key who sends three in a row does: if that node is received at the same time, it is an attack and
-    /// the node is fine.
+    /// A node signs its handshakes with another key than this relay. Raised after three such handshakes in a row; a
+    /// handshake with the right key starts the count again. An operator should give both nodes the same key. A single
+    /// forged frame does not raise this event. But an attacker without the key can raise it with three forged
+    /// handshakes in a row: if the node is received at the same time, this is an attack and the node is fine.
     KeyMismatch {
         /// Index of the node that signs with another key.
         node: u16,
@@ -108,9 +108,9 @@ pub enum Event {
     /// contradictory. `Relay::unfit` gives the reason.
     InterfererUnclear,
     /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator
-    /// checks its receiver. Only the leader reports the transmitter and the receiver. A relay that measures nothing
-    /// at all is reported only by itself. With four relays or fewer the faulty one cannot be identified
-    /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// should check the receiver of this node. Only the leader reports the transmitter and the receiver. A relay that
+    /// measures nothing at all is reported only by itself. With four relays or fewer the faulty relay cannot be
+    /// identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,

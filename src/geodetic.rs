@@ -5,7 +5,7 @@
 
 /// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
-/// A step of 1 in `lat_e7` is 1.1 cm on the ground, a step of 1 in `lon_e7` at most that.
+/// A step of 1 in `lat_e7` is 1.1 cm on the ground, a step of 1 in `lon_e7` at most 1.1 cm.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Geodetic {
@@ -106,9 +106,9 @@ impl Sites {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from the distance between its Tx and Rx positions. Or the mission has no such
-    /// positions, and its distance differs from that of the positions which the relay was configured with
-    /// (`Settings::sited`).
+    /// The mission's distance differs from the distance between its Tx and Rx positions. Or the mission has no Tx and
+    /// Rx positions, and its distance differs from the distance between the positions that the relay was configured
+    /// with (`Settings::sited`).
     Distance,
     /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,

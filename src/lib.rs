@@ -15,8 +15,9 @@
 
 /// Implements `Display`, `Error` and `defmt::Format` for an error enum, from one text for each variant.
 ///
-/// The texts are string literals, because `defmt` takes nothing else: an image stores only their numbers, so that they take no flash. A
-/// `const fn text` returns them, also to a `const fn` that panics.
+/// The texts are string literals, because `defmt` takes nothing else: an image stores only their numbers, so that
+/// they take no flash. The function `text` returns these texts. It is a `const fn`, so a `const fn` that panics can
+/// use it.
 macro_rules! error_texts {
     ($type:ty { $($variant:ident => $text:literal),* $(,)? }) => {
         impl $type {
@@ -80,10 +81,13 @@ mod place;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod place;
-pub mod planning;
 pub mod pointing;
 mod relay;
+#[cfg(not(feature = "internals"))]
 mod root;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
+pub mod root;
 pub mod sensing;
 pub mod serial;
 mod settings;

@@ -36,7 +36,7 @@ impl defmt::Format for Event {
     }
 }
 
-/// Returns the index of the node that the event concerns; `None` if it concerns none.
+/// Returns the index of the node that the event concerns; `None` if the event concerns no node.
 const fn node(event: Event) -> Option<u16> {
     match event {
         Event::NeighbourLost { node, .. }

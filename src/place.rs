@@ -82,7 +82,7 @@ pub struct Station {
     pub power_w: f32,
 }
 
-/// Behaviour of a relay while the relays that it can reach are too few for a quorum of the chain.
+/// Behaviour of a relay while it can reach too few relays for a quorum of the chain.
 ///
 /// [`Leave`](Self::Leave) clears the line for the relays that have a quorum. Set the same value on all relays: relays
 /// that leave the line then keep their order and distances.
@@ -110,7 +110,8 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position at which a relay without a quorum waits; `place` is the last agreed position.
+    /// Returns the position at which a drone waits while its relay has no quorum. `place` is the last agreed
+    /// position.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

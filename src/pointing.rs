@@ -21,7 +21,8 @@ const MAX_ERROR_RAD: f32 = 0.002_967;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
-    /// Angle in the ground plane from x toward y, rad, within -pi to pi. 0 for a position straight above or below.
+    /// Angle in the ground plane from x toward y, rad, within -pi to pi. The angle is 0 for a position straight above
+    /// or below the relay.
     pub azimuth_rad: f32,
     /// Elevation: angle of the direction above the horizon, rad, within -pi/2 to pi/2.
     pub elevation_rad: f32,
@@ -96,7 +97,8 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// Returns the angle whose tangent is `opposite` / `adjacent`, rad, in the quadrant of the two. 0 if both are 0.
+/// Returns the angle whose tangent is `opposite` / `adjacent`, rad, in the quadrant given by the two signs. 0 if both
+/// arguments are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());
     if large > 0.0 {
@@ -118,8 +120,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::place::Placement;
 
-    /// Returns the errors of [`Bearing::new`] compared with f64. They are those of azimuth, elevation and direction,
-    /// rad, and the relative error of the distance.
+    /// Returns the errors of [`Bearing::new`] compared with f64. These are the errors of azimuth, elevation and
+    /// direction, rad, and the relative error of the distance.
     fn errors(ahead_m: f32, aside_m: f32, climb_m: f32) -> [f64; 4] {
         let bearing = Bearing::new(ahead_m, aside_m, climb_m).unwrap();
         let [x, y, h] = [ahead_m, aside_m, climb_m].map(f64::from);

@@ -10,7 +10,7 @@ use core::ops::{Add, Div, Mul, Sub};
 /// instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa: a factor of
 /// 4 changes only the exponent of the result, so two octaves cover all exponents.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
-pub(crate) fn sqrt(x: f32) -> f32 {
+pub fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
 }
 
 /// Number type in which a root is searched: f32 on board, f64 in formulas for the ground.
-pub(crate) trait Real:
+pub trait Real:
     Copy
     + PartialOrd
     + From<f32>
@@ -50,12 +50,7 @@ impl Real for f64 {}
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
 /// The value searched is the one up to which `holds` returns true. It is assumed to be true at `low` and false at `high`.
-pub(crate) fn bisected<T: Real>(
-    low: T,
-    high: T,
-    steps: u8,
-    mut holds: impl FnMut(T) -> bool,
-) -> (T, T) {
+pub fn bisected<T: Real>(low: T, high: T, steps: u8, mut holds: impl FnMut(T) -> bool) -> (T, T) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {
         let middle = T::from(0.5) * (low + high);

@@ -5,10 +5,10 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Heading {
     /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position is computed
-    /// from that of its neighbour toward Tx, which sends to it.
+    /// from the position of its neighbour toward Tx, which sends to this relay.
     TowardRx,
     /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each position is computed
-    /// from that of the relay's receiver, where the interference is known.
+    /// from the position of the relay's receiver, where the interference is known.
     TowardTx,
 }
 

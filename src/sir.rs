@@ -35,9 +35,9 @@ use crate::root::{PowerRatio, Real, bisected, sqrt};
 
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
-/// The SIR of a hop to a receiver at `at` is the sender's gain times this, over the squared length of the hop. For an
-/// interferer at (X, Y) it is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu s). For interference that
-/// the mission gives as a distribution along x, it is Upsilon(x) / `Upsilon_max`, with noise.
+/// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of
+/// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu
+/// s). In an interference field the factor is Upsilon(x) / `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -117,8 +117,8 @@ impl Sender {
     }
 }
 
-/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. It is the paper's `SIR_{N+1}`:
-/// [`Mission::receiver_gain`] over the squared distance from the relay to Rx.
+/// Returns the SIR at the ground receiver for a relay of `power_w` watts at `from`. This is `SIR_{N+1}` of the paper:
+/// [`Mission::receiver_gain`] divided by the squared distance from the relay to Rx.
 pub fn at_receiver(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     let distance = mission.config().distance_m - from.x_m;
     let across = square(from.y_m) + square(from.altitude_m);
@@ -131,7 +131,8 @@ pub fn at_transmitter(mission: &Mission, from: Placement, power_w: f32) -> f32 {
     transmitter_gain(mission, power_w) / (square(from.x_m) + across)
 }
 
-/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K over the squared length of the hop.
+/// Returns the factor K of the hop from a relay to Tx, m^2. The SIR at Tx is K divided by the squared length of the
+/// hop.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float that fits by the ranges of the mission"
@@ -152,7 +153,7 @@ pub(crate) fn transmitter_gain(mission: &Mission, power_w: f32) -> f32 {
     (f64::from(power_w) * squared / (eta * heard)) as f32
 }
 
-pub(crate) const fn square(x: f32) -> f32 {
+pub const fn square(x: f32) -> f32 {
     x * x
 }
 
@@ -221,19 +222,20 @@ pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f3
 /// Function phi(t) with the sign of the slope of the first hop's SIR at t, a position on a line.
 ///
 /// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
-pub(crate) struct Slope<T> {
+#[derive(Debug)]
+pub struct Slope<T> {
     /// t of the point closest to the interferer, m; 0 is the t of the point closest to Tx.
-    pub(crate) p: T,
+    pub p: T,
     /// Difference p^2 + a - b, m^2.
-    pub(crate) q: T,
+    pub q: T,
     /// Squared distance of the line from the interferer, m^2.
-    pub(crate) a: T,
+    pub a: T,
     /// Squared distance of the line from Tx, m^2.
-    pub(crate) b: T,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
-    pub(crate) noise: T,
+    pub b: T,
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2.
+    pub noise: T,
     /// Number of bisection steps for each extremum.
-    pub(crate) halvings: u8,
+    pub halvings: u8,
 }
 
 impl<T: Real> Slope<T> {
@@ -253,13 +255,13 @@ impl<T: Real> Slope<T> {
     }
 
     /// Returns the only maximum of the SIR for p < 0, m. `peak` is its t without noise.
-    pub(crate) fn hill(&self, peak: T) -> T {
+    pub fn hill(&self, peak: T) -> T {
         bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
     /// Returns the minimum and the maximum of the SIR for p > 0, m. `bottom` is the minimum without noise. `None` if
     /// the SIR only falls.
-    pub(crate) fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
+    pub fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
         let bends_up = |t: T| self.bends_up(t);
         if !bends_up(bottom) {
             return None;

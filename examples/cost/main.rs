@@ -20,7 +20,7 @@ mod methods;
 #[cfg(target_os = "none")]
 mod missions;
 #[cfg(target_os = "none")]
-mod planning;
+mod solver;
 #[cfg(target_os = "none")]
 mod stack;
 #[cfg(target_os = "none")]
@@ -40,7 +40,7 @@ mod image {
     use stm32f4xx_hal as _;
     use uav_relay::Relay;
 
-    use super::{auth, counter, local_search, methods, planning, stack, sweeps, upload};
+    use super::{auth, counter, local_search, methods, solver, stack, sweeps, upload};
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -59,8 +59,7 @@ mod image {
         sweeps::predict();
         local_search::local_search();
         methods::methods();
-        planning::planning();
-        planning::joint();
+        solver::joint();
         stack::stack();
         auth::auth();
         upload::upload();

@@ -11,7 +11,8 @@ pub const fn colour(is_green: bool) -> &'static str {
     if is_green { "green" } else { "red" }
 }
 
-/// Returns the last line of a check with `red` red ones of `all` items, whose plural is `items`.
+/// Returns the last line of a check: all items are green, or `red` of `all` items are red. `items` is the plural noun
+/// for the items.
 ///
 /// # Errors
 /// The line, if an item is red.

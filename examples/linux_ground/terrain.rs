@@ -17,7 +17,7 @@ const MOST_POINTS: u16 = 32;
 pub(crate) struct Elevation {
     terrain: Terrain,
     mast_m: f64,
-    /// Line of the profile; `None` before the first one.
+    /// Positions of Tx and Rx for which `profile` was computed; `None` until a profile is computed.
     line: Option<Sites>,
     profile: Option<GroundProfile>,
 }

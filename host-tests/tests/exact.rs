@@ -16,6 +16,7 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::faults::Faults;
 use uav_relay_sim::simulator::outcome::Ending;
 use uav_relay_sim::simulator::setup::Setup;
+use uav_relay_tools::fewest;
 
 /// Largest relative shortfall from the optimum SIR at which a result counts as optimal.
 const NEAR: f64 = 1e-3;
@@ -96,8 +97,7 @@ impl Tally {
         let agreed = plan::solve(mission, Schedule::Bracketed, of);
         let agreed = agreed.unwrap_or_else(|_| panic!("nothing of {best}: {told}"));
         let target = f64::from(agreed.target);
-        let mut places = vec![Placement::default(); usize::from(mission.relays())];
-        assert!(mission.places_for(agreed.target, of, &mut places), "{told}");
+        let places = fewest::places(mission, agreed.target, of).expect(told);
         let reached = sir(&places);
         assert!(
             reached >= target * (1.0 - 3e-5),

@@ -3,11 +3,11 @@
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
 use uav_relay::Mission;
-use uav_relay::planning::single::without_interferer::{best_in_field, stepped};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, log_uniform};
 use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_tools::single::without_interferer::{best_in_field, stepped};
 
 fn mission(link: &StochasticLink) -> Mission {
     of_stochastic_link(link, 0.0).unwrap()

@@ -55,9 +55,9 @@ fn places(outcome: &Outcome) -> Vec<f64> {
     xs(&setpoints(outcome))
 }
 
-/// Checks the closed form for how far before its receiver a hop may begin and still meet a target SIR.
-///
-/// The comparison is with the reference. The tolerance is a fraction of the hop's length.
+/// Checks the closed form of a hop's maximum length in a field against the reference. The position of the hop's
+/// receiver is known. The closed form gives the sender's smallest x at which the hop meets a target SIR. The
+/// tolerance is a fraction of the hop's length.
 #[test]
 fn retreats_agree_with_the_reference() {
     let mut rng = generator(61);

@@ -180,7 +180,7 @@ async fn write(tx: &mut impl Write, mut bytes: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// Signal that one future raises and another one waits for.
+/// Signal that one future raises and another future waits for.
 struct Signal {
     is_raised: Cell<bool>,
     waker: Cell<Option<Waker>>,

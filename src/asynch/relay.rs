@@ -48,7 +48,7 @@ impl<'a> AsyncRelay<'a> {
 
     /// Passes the relay to `work`, for example to report a position or a sample, and wakes its ports. They run as
     /// soon as the calling task waits. Returns `None`, and does nothing, inside the `work` of another call, which
-    /// already has the relay. Takes constant time beside that of `work`.
+    /// already has the relay. Apart from `work` the call takes constant time.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.notify_runner();

@@ -11,6 +11,7 @@
 //! | [`flight`] | control of the drone through its autopilot |
 //! | [`decisions`] | reasons of unusual design decisions |
 //! | [`security`] | protection by signed frames, and its limits |
+//! | [`protocol`] | rules and times: departures, lost neighbours, two nodes with one number; continues `wire_format` |
 //! | [`wire_format`] | specification of every byte on the wire |
 
 #[doc = include_str!("firmware.md")]
@@ -43,6 +44,9 @@ pub mod decisions {}
 
 #[doc = include_str!("../../SECURITY.md")]
 pub mod security {}
+
+#[doc = include_str!("protocol.md")]
+pub mod protocol {}
 
 #[doc = include_str!("../wire/FORMAT.md")]
 pub mod wire_format {}

@@ -54,7 +54,7 @@ impl InNoise<'_> {
 
     /// Returns Upsilon = E[1/I] at `x_m` with the receiver noise included, 1/W. It is interpolated as in
     /// [`Field::upsilon`].
-    pub(crate) const fn upsilon(&self, x_m: f32) -> f32 {
+    pub const fn upsilon(&self, x_m: f32) -> f32 {
         match self.field.around(x_m) {
             (left, Some(right)) => super::between(self.point(left), self.point(right), x_m),
             (end, None) => self.of(end.upsilon_per_w),

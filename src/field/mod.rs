@@ -149,10 +149,10 @@ impl Field {
 
     /// Returns Upsilon = E[1/I] at `x_m`, 1/W, interpolated linearly with a relative error below 4e-7.
     ///
-    /// Every `x_m` is valid: beyond the ends it returns that of the end point, and for NaN that of the first point. The result is
-    /// never outside the range of the two points around it. Work: at most eleven comparisons of a binary search, three divisions.
-    /// The accuracy is asserted by `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in
-    /// `host-tests/tests/field/table.rs`.
+    /// Every `x_m` is valid: beyond an end point the result is the Upsilon of this end point, and for NaN the Upsilon
+    /// of the first point. The result is never outside the range of the two points around it. Work: at most eleven
+    /// comparisons of a binary search, three divisions. The accuracy is asserted by
+    /// `interpolation_agrees_with_f64_and_stays_between_its_neighbours` in `host-tests/tests/field/table.rs`.
     pub const fn upsilon(&self, x_m: f32) -> f32 {
         self.in_noise(0.0).upsilon(x_m)
     }

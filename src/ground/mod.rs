@@ -28,7 +28,7 @@ use crate::wire::session::Checked;
 use crate::wire::upload::{Upload, UploadError};
 
 /// Silence of a relay after which another node with its node number is accepted, 15 s. Relays use
-/// `Settings::dead_after` for this.
+/// `Settings::dead_after` as this time.
 const GONE_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Time after which the ground station repeats a hello that the polled relay has not answered.
@@ -37,37 +37,31 @@ const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 /// Maximum number of relays whose reports are stored, 11 KB in all; 0 without the feature `telemetry`.
 const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
-/// Interval between two requests for the reports of all relays; each goes to another relay in reach.
+/// Interval between two requests for the reports of all relays; each request goes to another relay in reach.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay. After it the station sends its hellos to the next relay.
+/// Number of unanswered hellos to one relay, after which the station sends its hellos to the next relay.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
 ///
 /// After every input call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then wait for a byte or for
-/// [`poll_timeout`](Self::poll_timeout). It accepts any bytes and ignores what is not addressed to it.
+/// [`poll_timeout`](Self::poll_timeout). The station accepts any bytes, and ignores frames that are not addressed to
+/// it.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-/// use uav_relay::MAX_FRAME;
-/// use uav_relay::{Auth, Ground, Instant, Interference, Interferer, Key, Mission, MissionConfig, Progress, Side, Upload, Wiring};
+/// use uav_relay::MAX_FRAME; use uav_relay::{Auth, Ground, Instant, Interference, Interferer, Key, Mission,
+/// MissionConfig, Progress, Side, Upload, Wiring};
 ///
 /// # fn example(loaded: &Mission, mut send: impl FnMut(&[u8]), received: &[u8]) -> Result<Progress, Box<dyn core::error::Error>> {
-/// // The jammer has moved.
-/// let jammer = Interferer { power_w: 80.0, x_m: 700.0, y_m: -300.0 };
-/// let config = MissionConfig { interference: Interference::Source(jammer), ..*loaded.config() };
-/// let upload = Upload::new(loaded, 1, config)?;
-/// let auth = Auth { key: Key::new([7; 32]), epoch: 1 };
-/// let mut ground = Ground::new(loaded, Side::Upstream, 7, Wiring::Pair, auth);
-/// let now = Instant::ZERO;
-/// ground.upload(now, upload)?;
+/// // The jammer has moved. let jammer = Interferer { power_w: 80.0, x_m: 700.0, y_m: -300.0 }; let config =
+/// MissionConfig { interference: Interference::Source(jammer), ..*loaded.config() }; let upload = Upload::new(loaded,
+/// 1, config)?; let auth = Auth { key: Key::new([7; 32]), epoch: 1 }; let mut ground = Ground::new(loaded,
+/// Side::Upstream, 7, Wiring::Pair, auth); let now = Instant::ZERO; ground.upload(now, upload)?;
 ///
-/// // One turn of the main loop.
-/// ground.handle_bytes(received);
-/// ground.handle_timeout(now);
-/// let mut frame = [0; MAX_FRAME];
-/// while let Some(len) = ground.poll_transmit(&mut frame) {
+/// // One turn of the main loop. ground.handle_bytes(received); ground.handle_timeout(now); let mut frame = [0;
+/// MAX_FRAME]; while let Some(len) = ground.poll_transmit(&mut frame) {
 ///     send(&frame[..len]);
 /// }
 /// # Ok(ground.progress())
@@ -86,13 +80,13 @@ pub struct Ground {
     reach: u16,
     upload: Option<Upload>,
     progress: Progress,
-    /// Sequence number of the last query for the relays' mission, which the reply repeats. 0 before the first query.
+    /// Sequence number of the last query for the relays' mission, which the reply repeats. 0 if no query was sent.
     query_number: u16,
     flown: Option<FlownMission>,
     /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
     distance: u16,
     unanswered: u8,
-    /// Newest mission that the polled relay has stored, by its last hello; `None` before that.
+    /// Newest mission that the polled relay has stored, by its last hello; `None` until a hello is received.
     relay_mission: Option<MissionId>,
     /// True from a hello to the polled relay until that relay's next hello, which is the reply.
     query_sent: bool,
@@ -231,8 +225,8 @@ impl Ground {
         self.progress
     }
 
-    /// Returns the number of intact frames that were rejected. Their sender is not in reach, or they are forged,
-    /// replayed or malformed, or from a relay with another loaded mission.
+    /// Returns the number of intact frames that were rejected. A frame is rejected if its sender is not in reach or
+    /// has loaded another mission, or if the frame is forged, replayed or malformed.
     pub fn refused(&self) -> u32 {
         let stats = &self.stats;
         let unknown = stats.unsigned.saturating_add(stats.misaddressed);
@@ -346,7 +340,7 @@ impl Ground {
     }
 
     /// Handles a hello of relay `by`, `distance` relays away, that answers the query for the mission. If the relay
-    /// has stored an uploaded mission, it sends that mission in its next message.
+    /// has stored an uploaded mission, the relay sends this mission in its next message.
     fn on_query_reply(&mut self, by: u16, distance: u16, hello: Hello) {
         self.unanswered = 0;
         self.distance = distance;
@@ -434,7 +428,8 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next hello if it is due: to the same relay again, or to the next relay. Takes constant time.
+    /// Schedules the next hello if its time has come: to the same relay again, or to the next relay. Takes constant
+    /// time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         if TELEMETRY {
@@ -569,7 +564,7 @@ impl Ground {
 
 #[cfg(feature = "telemetry")]
 impl Ground {
-    /// Requests the reports of all relays from now on, or no longer.
+    /// Requests the reports of all relays from now on if `is_on` is true. Otherwise ends the requests.
     ///
     /// The station repeats the request every 5 s. Relays report for 60 s after the last request.
     pub fn watch(&mut self, now: Instant, is_on: bool) {
@@ -578,11 +573,13 @@ impl Ground {
         _ = self.watching.request(now, self.reach, self.node.into());
     }
 
-    /// Returns the newest report of every relay, by number: of the first 128 relays that have reported.
+    /// Returns the newest report of each relay, in the order of the node numbers. At most 128 relays are stored: the
+    /// first that have reported.
     ///
-    /// Reports that arrive are returned from the next call of [`handle_timeout`](Self::handle_timeout) on, whose time is that of their
-    /// arrival. The details (setpoint, agreed position, neighbours, interference, version) are those of the last report that had
-    /// them: a relay sends them with every eighth.
+    /// A report that has arrived is returned only after the next call of [`handle_timeout`](Self::handle_timeout).
+    /// The time of this call counts as the time of its arrival. A relay sends details (setpoint, agreed position,
+    /// neighbours, interference, version) only with every eighth report. The returned details come from the last
+    /// report that had details.
     pub fn reports(&self) -> impl Iterator<Item = crate::Report> {
         let known = self.watching.known.iter();
         known.map(|known| {
@@ -599,11 +596,11 @@ struct Watching {
     /// Time of the next request; `None` while no reports are requested.
     repeat_at: Option<Instant>,
     number: u16,
-    /// Distance, in relays, of the relay that the last request is for; 0 before the first. `is_due` is true until it
-    /// is sent.
+    /// Distance, in relays, of the relay to which the last request goes; 0 without a request. `is_due` is true until
+    /// the request is sent.
     distance: u16,
     is_due: bool,
-    /// Bit mask of the relays that have been received since the last request to each.
+    /// Bit mask of the relays from which a frame was received since the last request to that relay.
     heard: u8,
     /// Report entries that have arrived since the last call with a time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
@@ -611,7 +608,7 @@ struct Watching {
     known: heapless::Vec<KnownState, REPORTED>,
 }
 
-/// Newest known state of a relay, and the last details received. `at` is the time of that state, by the station's
+/// Newest known state of a relay, and the last details received. `at` is the time of this state, on the station's
 /// clock.
 #[derive(Clone, Debug)]
 struct KnownState {
@@ -624,8 +621,8 @@ impl Watching {
     /// Creates the state of a station that requests no reports. With a larger `epoch` its later request numbers are
     /// larger, too.
     ///
-    /// After a run of more than 85 minutes the numbers of the next start may be smaller. Relays then ignore requests
-    /// until 60 s after the last one of that run.
+    /// After a run of more than 85 minutes, the numbers of the next run may be smaller. Relays then ignore requests
+    /// until 60 s after the last request of the earlier run.
     #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
     const fn new(epoch: u32, all: u16) -> Self {
         Self {
@@ -669,8 +666,8 @@ impl Watching {
         is_silent
     }
 
-    /// Schedules the request for reports again for the relay at `distance`. That relay could not verify an earlier
-    /// one.
+    /// Schedules the request for reports again for the relay at `distance`. This relay could not verify an earlier
+    /// request.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;
@@ -678,8 +675,8 @@ impl Watching {
         }
     }
 
-    /// Records the entries of a report. Returns false, and records none, if one has a number outside the
-    /// mission.
+    /// Records the entries of a report. If an entry has a node number outside the mission, records no entry and
+    /// returns false.
     fn record(&mut self, report: &Reports, now: Instant) -> bool {
         let (mut detail, entries) = report.states();
         if entries.iter().any(|entry| entry.relay() > self.all) {
@@ -731,18 +728,18 @@ const fn is_under_way(progress: Progress) -> bool {
 pub struct FlownMission {
     /// Node number of the relay that answered the query.
     pub by: u16,
-    /// Version of the mission; 0 for the one that was loaded before flight.
+    /// Version of the mission; 0 for the mission that was loaded before flight.
     pub version: u16,
     /// True if the relay flies the mission now; false if it has only stored it.
     pub flies: bool,
     /// Uploaded mission with all its parameters. `None` for the mission loaded before flight, and until the relay has
-    /// sent it, which older firmware never does.
+    /// sent the uploaded mission. Older firmware never sends it.
     pub upload: Option<Upload>,
 }
 
 impl FlownMission {
-    /// Returns true once all parameters of the mission are known. The relay has sent them, or the mission is the one
-    /// loaded before flight, which the station knows.
+    /// Returns true once all parameters of the mission are known. Either the relay has sent the parameters, or the
+    /// relay has only the mission loaded before flight, which the station knows.
     pub const fn is_known(&self) -> bool {
         self.version == 0 || self.upload.is_some()
     }
@@ -774,18 +771,18 @@ pub enum Progress {
         by: u16,
         /// Latest view (agreed members of the chain) that the reporting relay knows.
         view: ViewId,
-        /// Number of relays that fly the mission. They are the relay `by`, and the relays of its view that are
-        /// farther from the station.
+        /// Number of relays that fly the mission. These are the relay `by` and the relays of its view that are farther
+        /// from the station.
         relays: u16,
     },
     /// A relay refuses the mission, so the chain does not fly it. The mission does not fit the positions of Tx and
     /// Rx, or that relay's geofence.
     Refused {
-        /// Node number of the relay that reports the refusal. Either this relay refuses the mission, or one that is
-        /// farther from the station.
+        /// Node number of the relay that reports the refusal. Either this relay refuses the mission, or a relay that
+        /// is farther from the station.
         by: u16,
     },
-    /// The upload is outdated: a relay has stored a newer mission, or another with its version.
+    /// The upload is outdated: a relay has stored a newer mission, or another mission with the same version.
     Outdated {
         /// Version of the newer mission that the relay has stored.
         version: u16,
@@ -823,8 +820,8 @@ impl PendingReports {
         self.measurements == 0
     }
 
-    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. That relay may have restarted, and
-    /// has then lost the report.
+    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. This relay
+    /// may have restarted and lost the report.
     pub(super) fn schedule(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.pending |= bit(distance);

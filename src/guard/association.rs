@@ -12,14 +12,14 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer may be
-/// late messages from before.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. A smaller
+/// number may be late messages from an earlier session.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
-/// Number of seconds after which a neighbour's halt request expires unless it is repeated.
+/// Number of seconds after which a neighbour's halt request expires if it is not repeated.
 const HALT_REMINDERS: u8 = 15;
 
-/// Number of seconds after which a neighbour's last reported x expires, unless a new message comes.
+/// Number of seconds after which a neighbour's last reported x expires, if no new message arrives.
 const SEEN_REMINDERS: u8 = 15;
 
 /// Notice that tells a neighbour that this relay has left the association (session) with it. The relay leaves it
@@ -32,8 +32,8 @@ struct LeaveNotice {
     due: bool,
 }
 
-/// State of the association (session) with the neighbour on one side. It has the numbers of the session, and the
-/// messages and requests that are pending.
+/// State of the association (session) with the neighbour on one side. The state has the numbers of the session, and
+/// the pending messages and requests.
 #[expect(
     clippy::struct_excessive_bools,
     reason = "flags of the messages, each for itself"
@@ -56,17 +56,17 @@ pub(super) struct Association {
     /// True while the messages to the neighbour request an open chain. In an open chain all relays are at least the
     /// minimum separation apart along x.
     open_sent: bool,
-    /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without one.
+    /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without a halt request.
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
-    /// Number of the association (session) that the neighbour has left, 0 for none. After that the neighbour counts
-    /// as absent: its drone does not fly to setpoints.
+    /// Number of the association (session) that the neighbour has left, 0 for none. The neighbour then counts as
+    /// absent: its drone does not fly to setpoints.
     left_number: u16,
     /// Notice to the neighbour that this relay has left an association (session) with it. `None` if the neighbour
     /// needs no notice.
     leave_notice: Option<LeaveNotice>,
-    /// Last x received from the neighbour, m, in any association (session); NaN before the first.
+    /// Last x received from the neighbour, m, in any association (session); NaN if none has been received.
     seen_m: f32,
     /// Number of reminders, one per second, until the neighbour's last x expires.
     seen_reminders_left: u8,
@@ -98,13 +98,15 @@ impl Association {
         self.node == 0 || self.is_absent()
     }
 
-    /// Stores the neighbour's x from a message, `x_m`. It expires after 15 reminders without another message.
+    /// Stores the neighbour's x from a message, `x_m`. This x expires after 15 reminders (seconds) without another
+    /// message.
     pub(super) const fn record_x(&mut self, x_m: f32) {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns by how much this relay is on the correct side of its neighbour along x, m. The neighbour is at `side`;
-    /// its last received x counts. Negative on the wrong side; NaN if a position is unknown.
+    /// Returns the distance along x by which this relay is on the correct side of its neighbour at `side`, m. The
+    /// neighbour's last received x counts. The result is negative on the wrong side, and NaN if a position is
+    /// unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -145,21 +147,22 @@ impl Association {
         self.left_number = association;
     }
 
-    /// Accepts the number that the neighbour has given to the association (session) with this relay. A neighbour that
-    /// had left counts as back.
+    /// Accepts the number that the neighbour has given to the association (session) with this relay. If the neighbour
+    /// had left, it counts as present again.
     pub(super) const fn pair(&mut self, association: u16) {
         self.peer_number = association;
         self.left_number = 0;
     }
 
     /// Returns true if `fence` states that the neighbour has left the current association (session). A repetition of
-    /// that message does not count again, because the next association has another number.
+    /// this message does not count again, because the next association has another number.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
 
-    /// Returns a new association (session) in place of this one, which this relay has left. It includes a leave
-    /// notice if the neighbour has sent its number for the old association, because the neighbour then relies on it.
+    /// Returns a new association (session) in place of the old one, which this relay has left. If the neighbour has
+    /// sent its number for the old association, it still relies on the old association. The new association then
+    /// includes a leave notice.
     pub(super) fn leave(&self, jitter: &mut Jitter) -> Self {
         let left = LeaveNotice {
             own_number: self.own_number,
@@ -184,8 +187,9 @@ impl Association {
         }
     }
 
-    /// Returns true if a message is of an association (session) that this relay or its neighbour has left. If this
-    /// relay has left it, its leave notice is sent again, until the neighbour starts a new association.
+    /// Returns true if a message belongs to an association (session) that this relay or its neighbour has left. If
+    /// this relay has left the association, its leave notice is sent again, until the neighbour starts a new
+    /// association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -204,7 +208,7 @@ impl Association {
         fence.association == self.left_number
     }
 
-    /// Schedules a pending leave notice for sending again; returns true if there is one.
+    /// Schedules a pending leave notice for sending again; returns true if a notice is pending.
     pub(super) const fn remind(&mut self) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             leave_notice.due = true;
@@ -212,7 +216,8 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the notice that this relay has left the association (session) with its neighbour, if due.
+    /// Returns the notice that this relay has left the association (session) with its neighbour; `None` if no notice
+    /// must be sent.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
         core::mem::take(&mut leave_notice.due).then(|| Fence {
@@ -248,22 +253,23 @@ impl Association {
     }
 
     /// Stores the neighbour's request for an open chain, or its end, from a message of this association. In an open
-    /// chain all relays are at least the minimum separation apart along x. A reply is due if the message shows that the
-    /// neighbour has not received this relay's last request.
+    /// chain all relays are at least the minimum separation apart along x. A reply must be sent if the message shows
+    /// that the neighbour has not received this relay's last request.
     pub(super) const fn receive_open(&mut self, fence: &Fence) {
         self.open_requested = fence.has_flag(Fence::REQUESTS_OPENING);
         self.due |= fence.has_flag(Fence::OPENING_RECEIVED) != self.open_sent;
     }
 
     /// Requests an open chain from the neighbour if `opens` is true, or else withdraws the request. In an open chain
-    /// all relays are at least the minimum separation apart along x. A message is due after a change.
+    /// all relays are at least the minimum separation apart along x. After a change a message must be sent.
     pub(super) const fn forward_open(&mut self, opens: bool) {
         self.due |= self.open_sent != opens;
         self.open_sent = opens;
     }
 
-    /// Stores the halt request in the neighbour's message. A message without a request ends an earlier one, but only
-    /// if the message has a valid position (`is_placed`): a rebooted neighbour does not know its earlier request.
+    /// Stores the halt request in the neighbour's message. A message without a request ends an earlier request, but
+    /// only if the message has a valid position (`is_placed`). Reason: a rebooted neighbour has no valid position
+    /// yet, and does not know its earlier request.
     pub(super) const fn receive_halt(&mut self, fence: &Fence, is_placed: bool) {
         if fence.has_flag(Fence::HALTS) {
             self.halt_reminders_left = HALT_REMINDERS;
@@ -276,8 +282,8 @@ impl Association {
         self.halt_reminders_left > 0
     }
 
-    /// Requests a halt of the chain from the neighbour if `halts` is true, or else withdraws the request. A message
-    /// is due after a change.
+    /// Requests a halt of the chain from the neighbour if `halts` is true, or else withdraws the request. After a
+    /// change a message must be sent.
     pub(super) const fn forward_halt(&mut self, halts: bool) {
         self.due |= self.halt_sent != halts;
         self.halt_sent = halts;
@@ -294,10 +300,11 @@ impl Association {
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the due message of a relay that does not fly to setpoints or has just started.
+    /// Returns the pending message of a relay that does not fly to setpoints or has just started; `None` if there is
+    /// none.
     ///
-    /// The message contains the relay's position, and a halt request to forward. It is valid without an association
-    /// (session).
+    /// The message contains the relay's position, and a halt request to forward. The message is valid without an
+    /// association (session).
     pub(super) fn poll_unpaired(&mut self, own: &Own) -> Option<Fence> {
         let is_due = self.due && self.node != 0 && self.leave_notice.is_none();
         let place = own.reported.filter(|_| is_due)?;
@@ -310,25 +317,25 @@ impl Association {
         })
     }
 
-    /// Counts a message of another association (session). Returns true once so many came in a row that the neighbour
-    /// must have restarted.
+    /// Counts a message of another association (session). Returns true once so many such messages were received in a
+    /// row that the neighbour must have restarted.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.foreign_messages = self.foreign_messages.saturating_add(1);
         self.foreign_messages >= MAX_FOREIGN_MESSAGES
     }
 }
 
-/// Obstacles that limit this relay's x on one side. They are a lost relay that may still hover, and a drone that does
-/// not fly to setpoints.
+/// Obstacles that limit this relay's x on one side. An obstacle is a lost relay that may still hover, or a drone that
+/// does not fly to setpoints.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
     /// is lost.
     lost: Option<(u16, f32)>,
-    /// x at which this relay will be the minimum separation away from a lost relay, m; NaN if none is near. Until
-    /// then, perhaps only lateral offset and altitude keep the two apart.
+    /// x at which this relay will be the minimum separation away from a lost relay, m; NaN if no lost relay is near.
+    /// Until this relay is at this x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
-    /// True if a lost relay was last reported on the wrong side of this one along x, which is out of order.
+    /// True if a lost relay was last reported on the wrong side of this relay along x.
     disordered: bool,
     /// Node number and last reported position of a neighbour whose drone does not fly to setpoints. `None` without
     /// such a neighbour.
@@ -349,8 +356,8 @@ impl KeepOut {
         self.lost.map(|(_, limit_m)| limit_m)
     }
 
-    /// Adds a lost relay at `side` as an obstacle. Its number is `node`, and it limits this relay's x to `limit_m`,
-    /// m. If there was one before, the nearer node and the tighter limit are kept.
+    /// Adds a lost relay at `side` as an obstacle. The lost relay has the number `node`, and limits this relay's x to
+    /// `limit_m`, m. If there already is a lost relay, the nearer node and the tighter limit are kept.
     #[inline(never)] // called from both sides
     pub(super) fn add_lost(&mut self, side: Side, node: u16, limit_m: f32) {
         let (nearest, tightest_m) = self.lost.unwrap_or((node, limit_m));
@@ -360,9 +367,9 @@ impl KeepOut {
         });
     }
 
-    /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Nodes beyond `node` are
-    /// no obstacles for this relay, because `node` is between. The obstacles are lost relays, or drones that do not fly
-    /// to setpoints.
+    /// Removes obstacles on `side` after a message from `node`: this node, and nodes beyond it. Nodes beyond `node`
+    /// are no obstacles for this relay, because `node` is between them and this relay. The obstacles are lost relays,
+    /// or drones that do not fly to setpoints.
     pub(super) fn on_fence(&mut self, side: Side, node: u16) {
         let is_beyond = |lost: u16| match side {
             Side::Upstream => lost <= node,
@@ -377,8 +384,8 @@ impl KeepOut {
     }
 
     /// Stores the position of a neighbour that reports that its drone does not fly to setpoints. A report with the
-    /// number of the current association (session) is ignored, because it is a late one: the drone flies to setpoints
-    /// again.
+    /// number of the current association (session) is ignored. Such a report is late, because the drone flies to
+    /// setpoints again.
     pub(super) fn record_x(&mut self, association: &Association, fence: &Fence) {
         let is_late = fence.association == association.peer_number;
         if fence.has_flag(Fence::LEFT) && fence.has_flag(Fence::UNPLACED) && !is_late {
@@ -413,10 +420,10 @@ impl KeepOut {
         ways.is_some_and(|(from, to)| self.path_end(from, to, &own.config) != to)
     }
 
-    /// Returns the last position on the path from `from` to `to` that is the separation away from a drone. The drone
-    /// does not fly to setpoints. If `from` is closer, the path comes no nearer. Along x the path ends before that
-    /// drone, unless lateral offset and altitude separate the two. Within the separation along x only moves to the
-    /// side, or up or down, away from the drone remain.
+    /// Returns the last position on the path from `from` to `to` that keeps the separation from a drone. This drone
+    /// does not fly to setpoints. If `from` is closer than the separation, the path comes no nearer to the drone.
+    /// Along x the path ends before the drone, unless lateral offset and altitude separate the two. If the two are
+    /// within the separation along x, only moves to the side, up or down are possible, and only away from the drone.
     pub(super) fn path_end(
         &self,
         from: Placement,
@@ -447,8 +454,7 @@ impl KeepOut {
 
     /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
     ///
-    /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay is the separation away from all of
-    /// them.
+    /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has the separation from all of them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
         if let Some((_, limit_m)) = &mut self.lost {
             *limit_m = x_m;
@@ -462,8 +468,8 @@ impl KeepOut {
         self.near_m = near_m;
     }
 
-    /// Returns the x, m, at which this relay will be the minimum separation away from the relay lost last. NaN if it
-    /// already is.
+    /// Returns the x, m, at which this relay will be the minimum separation away from the relay lost last. NaN if
+    /// this relay is already so far away.
     pub(super) const fn near_m(&self) -> f32 {
         self.near_m
     }
@@ -473,8 +479,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay is the minimum separation from the lost relay. This is so at x
-    /// = `near_m`. `is_beyond` returns true if this relay has passed the x that is its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay has the minimum separation from the lost relay, at x =
+    /// `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {
@@ -487,13 +493,13 @@ impl KeepOut {
         }
     }
 
-    /// Records that a lost relay may be on the wrong side of this one along x.
+    /// Records that a lost relay may be on the wrong side of this relay along x.
     pub(super) const fn mark_disordered(&mut self) {
         self.disordered = true;
     }
 
-    /// Returns true while a lost relay may be on the wrong side of this one along x. It is then unknown in which
-    /// direction a move along x leads away from it.
+    /// Returns true while a lost relay may be on the wrong side of this relay along x. It is then unknown in which
+    /// direction a move along x leads away from the lost relay.
     pub(super) const fn is_disordered(&self) -> bool {
         self.disordered
     }
@@ -504,7 +510,7 @@ impl KeepOut {
 
     /// Adds an obstacle for the relays at `side`, none of which has ever sent a message to this relay. They may hover
     /// anywhere beyond the plane x = `limit_m`. This relay keeps at least `separation_m` away from that plane, until
-    /// one of them sends a message.
+    /// one of these relays sends a message.
     pub(super) fn add_unheard(&mut self, side: Side, limit_m: f32, separation_m: f32) {
         let (nearest, near_m) = match side {
             Side::Upstream => (0, limit_m + separation_m),
@@ -517,7 +523,7 @@ impl KeepOut {
 
 /// Message between neighbours about their fence, a plane x = constant that separates the two.
 ///
-/// It contains the complete state, so it may be lost, duplicated, delayed or reordered.
+/// Each message contains the complete state. So a message may be lost, duplicated, delayed or reordered.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fence {
@@ -525,19 +531,19 @@ pub struct Fence {
     pub association: u16,
     /// Echo of the association (session) number that the destination sent last, 0 for none.
     pub echo: u16,
-    /// Number of the fence, the plane x = constant between the two relays; 0 before the first. The relay upstream
-    /// (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
+    /// Number of the fence, the plane x = constant between the two relays; 0 if there is no fence yet. The relay
+    /// upstream (owner) counts its fences. The relay downstream (follower) repeats the newest number received.
     pub number: u16,
-    /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx sends the x of the fence, or before the
-    /// first fence its highest possible x. The relay toward Rx sends its lowest possible x.
+    /// Limit of x that the sender states, m, -1e7 to 1e7. The relay toward Tx sends the x of the fence, or its
+    /// highest possible x while it has set no fence. The relay toward Rx sends its lowest possible x.
     pub x_m: f32,
     /// x of the position that the chain has agreed on for the sender, m: -1e7 to 1e7.
     pub target_m: f32,
     /// Lateral offset and altitude of the sender's setpoint, m, each -1e7 to 1e7. If the sender does not follow
-    /// setpoints, they are those of its reported position.
+    /// setpoints, this is the lateral offset and altitude of its reported position.
     pub across: CrossSection,
-    /// Distance along x that the upstream relay requests to stay before the fence, m, 0 to 1e5. Below the minimum
-    /// separation, the downstream relay must not change its lateral offset or altitude.
+    /// Distance along x that the upstream relay requests to stay before the fence, m, 0 to 1e5. If the distance is
+    /// below the minimum separation, the downstream relay must not change its lateral offset or altitude.
     pub apart_m: f32,
     /// Sum of the flags [`ARRIVED`](Self::ARRIVED) to [`UNPLACED`](Self::UNPLACED) that are set.
     pub flags: u8,
@@ -549,21 +555,22 @@ impl Fence {
     /// Flag of the downstream relay: it agrees to the distance `apart_m` of the newest fence.
     pub const AGREES: u8 = 2;
     /// Flag: request to open the chain: neighbours at least the minimum separation apart along x. The sender, or a
-    /// relay beyond it, needs that to change its lateral offset or altitude.
+    /// relay beyond the sender, needs the open chain to change its lateral offset or altitude.
     pub const REQUESTS_OPENING: u8 = 4;
-    /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies it from that flag in the
-    /// last message that it has received from the destination.
+    /// Flag: acknowledges [`REQUESTS_OPENING`](Self::REQUESTS_OPENING). The sender copies the flag `REQUESTS_OPENING`
+    /// of the last message received from the destination to this flag.
     pub const OPENING_RECEIVED: u8 = 8;
-    /// Flag: the sender has left this association (session). It does not fly to its setpoints, or did not for a time.
-    /// Positions and the number of the fence are not valid.
+    /// Flag: the sender has left this association (session). The sender's drone does not fly to its setpoints, or did
+    /// not for a time. Positions and the number of the fence are not valid.
     pub const LEFT: u8 = 16;
-    /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond it, is
-    /// on the wrong side of a neighbour along x, or does not know its order. The request is repeated every second,
-    /// and is valid in any association (session).
+    /// Flag: request to halt the chain, so that all relays hold their positions. The sender, or a relay beyond the
+    /// sender, is on the wrong side of a neighbour along x, or does not know its order. The request is repeated every
+    /// second, and is valid in any association (session).
     pub const HALTS: u8 = 32;
-    /// Flag: the position in this message only shows the order of the two relays along x. It does not let the
-    /// neighbour move. The relay downstream sets the flag while its order with its own downstream neighbour is not
-    /// confirmed. With [`LEFT`](Self::LEFT): the sender does not fly to setpoints, and `x_m` is its last reported x.
+    /// Flag: the position in this message only shows the order of the two relays along x. The position does not
+    /// permit the neighbour to move. The relay downstream sets the flag while its order with its own downstream
+    /// neighbour is not confirmed. With [`LEFT`](Self::LEFT): the sender does not fly to setpoints, and `x_m` is its
+    /// last reported x.
     pub const UNPLACED: u8 = 64;
 
     pub(super) const fn without_position(association: u16, echo: u16) -> Self {
@@ -600,14 +607,14 @@ impl Fence {
 pub enum HoldReason {
     /// Messages have not confirmed yet that this relay and the neighbour are in order along x.
     Unheard,
-    /// The neighbour is on the wrong side along x, or too close to tell. Neither relay moves.
+    /// The neighbour is on the wrong side along x, or so close that the order is unknown. Neither relay moves.
     Order,
     /// The agreed positions of this relay and the neighbour are too close. Neither their x nor their lateral offsets
     /// and altitudes separate them.
     Close,
     /// A lost relay may still hover between this relay and its agreed position.
     Lost,
-    /// The neighbour's drone does not fly to setpoints, and is in the way or makes no room.
+    /// The neighbour's drone does not fly to setpoints, and is in the way or does not make room.
     NotFlown,
     /// The setpoint has not moved for at least five seconds, because the neighbour has not made room.
     Pending,

@@ -51,12 +51,12 @@ pub struct GuardConfig {
     pub relays: u16,
     /// Maximum error of a hovering relay's reported position, 0 to 1e3 m per coordinate.
     ///
-    /// It reduces the separation by this much at each of two relays.
+    /// The separation of two relays may be smaller by twice this error.
     pub hover_m: f32,
     /// Maximum time from `Guard::steer` until the drone flies toward the new setpoint.
     ///
-    /// It is the latency to the flight controller plus the stopping time from maximum speed. With the autopilot link it is
-    /// [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
+    /// The time is the latency to the flight controller plus the stopping time from maximum speed. With the autopilot
+    /// link it is [`Pace::stopping_time`](crate::flight::autopilot::carrot::Pace::stopping_time).
     pub lag: Duration,
 }
 
@@ -66,17 +66,17 @@ impl GuardConfig {
     /// The band is extended to the profile's altitude.
     ///
     /// If relays leave the line without a quorum ([`Settings::without_quorum`](crate::Settings)), the geofence needs
-    /// [room](Self::with_room_for) for that, because it limits them.
+    /// [room](Self::with_room_for) for these positions, because it limits all setpoints.
     ///
-    /// `hover_m` is 0 and `lag` 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of the default pace.
+    /// `hover_m` is 0 and `lag` 9.8 s, the [stopping time](crate::flight::autopilot::carrot::Pace::stopping_time) of
+    /// the default pace.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
     /// use uav_relay::GuardConfig;
     ///
-    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
-    /// assert!(guard.is_valid());
+    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common); assert!(guard.is_valid());
     /// assert_eq!(guard.separation_m, MISSION.config().min_separation_m);
     /// ```
     pub fn of(mission: &Mission, profile: Profile) -> Self {
@@ -97,8 +97,8 @@ impl GuardConfig {
         }
     }
 
-    /// Returns this configuration with a geofence enlarged for relays that leave the line Tx-Rx. They do so while
-    /// they have no quorum, if `without_quorum` says so.
+    /// Returns this configuration with a geofence enlarged for relays that leave the line Tx-Rx. With
+    /// [`WithoutQuorum::Leave`] relays do so while they have no quorum.
     pub fn with_room_for(mut self, without_quorum: WithoutQuorum) -> Self {
         if let WithoutQuorum::Leave { y_m, up_m } = without_quorum {
             let fence = &mut self.geofence;
@@ -170,8 +170,8 @@ impl GuardConfig {
 
     /// Returns the x to which relay `node` flies while the chain is open, m; `x_m` is its agreed x.
     ///
-    /// Open means that all relays keep their order, and are at least the minimum separation apart along x, if all
-    /// relays of the mission then fit into the geofence.
+    /// In an open chain all relays keep their order, and are at least the minimum separation apart along x. This
+    /// holds if all relays of the mission fit into the geofence with this separation.
     #[inline(never)] // called from several places
     pub(super) fn open_chain_x(&self, node: u16, x_m: f32) -> f32 {
         let least_m = self.geofence.least_x_m;
@@ -183,8 +183,9 @@ impl GuardConfig {
         (least_m + before + left * (x_m - least_m)).min(self.geofence.most_x_m)
     }
 
-    /// Returns the distance along x at which two relays are the minimum separation apart in space, m. `one` and `other`
-    /// are their lateral offsets and altitudes.
+    /// Returns the least difference of x, m, with which two relays keep the minimum separation in space. `one` and
+    /// `other` are the lateral offsets and altitudes of the two relays. The result is 0 if these alone keep the
+    /// relays apart.
     pub(super) fn least_step(&self, one: CrossSection, other: CrossSection) -> f32 {
         let apart = self.separation_m;
         sqrt((apart * apart - one.apart_squared(other)).max(0.0))

@@ -7,24 +7,25 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Limit for the comparison of wrapping 16-bit fence numbers. A fence is newer if its number minus the last one,
-/// modulo 2^16, is above 0 and below the limit.
+/// Limit for the comparison of wrapping 16-bit fence numbers. A fence is newer than the last fence if the difference
+/// of their numbers, modulo 2^16, is above 0 and below this limit.
 const AHEAD: u16 = 0x8000;
 
-/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets it.
+/// State of the fence toward Tx, a plane x = constant that this relay stays beyond. The upstream neighbour sets this
+/// fence.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceFollower {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Number of the newest fence (limit of x) from the neighbour upstream, 0 before the first.
+    /// Number of the newest fence (limit of x) from the neighbour upstream, 0 if there is no fence yet.
     number: u16,
-    /// x of the newest fence that the upstream neighbour has announced, m. This relay stays beyond it.
+    /// x of the newest fence that the upstream neighbour has announced, m. This relay stays beyond this x.
     fence_m: f32,
-    /// Distance along x that the upstream neighbour asks to keep before its fence, m. Infinite before its first
-    /// request.
+    /// Distance along x that the upstream neighbour asks to keep before its fence, m. Infinite until the neighbour
+    /// requests a distance.
     requested_m: f32,
     /// Distance along x to the upstream neighbour to which this relay has agreed, m. Infinity stands for the minimum
-    /// separation, and is the value before any agreement.
+    /// separation; it is the value until this relay has agreed to a distance.
     agreed_m: f32,
     /// x of the position that the chain has agreed on for the neighbour toward Tx, m.
     target_m: f32,
@@ -32,8 +33,8 @@ pub(super) struct FenceFollower {
     across: CrossSection,
     /// True once this relay is known to be past a fence of the upstream neighbour, at a larger x.
     clear: bool,
-    /// True once the upstream neighbour was informed that this relay is past the newest fence. The fence is a limit of
-    /// x which that neighbour, its owner, has set; past the fence means at a larger x.
+    /// True once the upstream neighbour was informed that this relay is past the newest fence. The fence is a limit
+    /// of x that the upstream neighbour, its owner, has set. Past the fence means at a larger x.
     owner_informed: bool,
 }
 
@@ -63,7 +64,8 @@ impl FenceFollower {
     }
 
     /// Starts a new association (session) with the neighbour upstream. The limit of x because of the previous
-    /// neighbour remains in `keep_out`. If that neighbour was never heard, the limit is this relay's position.
+    /// neighbour remains in `keep_out`. If the previous neighbour was never received, the limit is this relay's
+    /// position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -98,7 +100,7 @@ impl FenceFollower {
     }
 
     /// Starts a new association (session) because the line from Tx to Rx has changed. Lost relays remain obstacles;
-    /// drones that do not fly to setpoints do not.
+    /// drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -108,7 +110,7 @@ impl FenceFollower {
     }
 
     /// Handles the notice that the upstream neighbour no longer flies to setpoints. This relay then comes no nearer
-    /// to it. If the two were not in the right order along x, this relay holds its position.
+    /// to this neighbour. If the two were not in the right order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered());
         self.renew(own, jitter);
@@ -171,8 +173,8 @@ impl FenceFollower {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }
 
-    /// Returns the smallest x that is allowed for this relay, m. If it is above the current setpoint, this relay has
-    /// to fly there.
+    /// Returns the smallest x that is allowed for this relay, m. If this x is above the x of the current setpoint,
+    /// this relay has to fly to it.
     #[inline(never)] // called from several places
     pub(super) fn min_x(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {
@@ -196,9 +198,9 @@ impl FenceFollower {
         self.requested_m < own.config.separation_m
     }
 
-    /// Returns true while this relay and its upstream neighbour may be as close as at the start. That may be below
-    /// the separation. The neighbour has announced a fence (limit of x), but this relay is not known to be beyond it
-    /// yet.
+    /// Returns true while this relay and its upstream neighbour may be as close as at the start. This distance may be
+    /// below the separation. The neighbour has announced a fence (limit of x), but this relay is not known to be
+    /// beyond this fence yet.
     pub(super) const fn is_tight(&self) -> bool {
         self.has_fence() && !self.clear
     }
@@ -208,9 +210,9 @@ impl FenceFollower {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour upstream requests, unless that is too small. This relay's two
-    /// neighbours must stay at least the separation apart: the requested distance plus `downstream_m`, the distance to
-    /// the neighbour downstream, must be at least the separation.
+    /// Agrees to the distance along x that the neighbour upstream requests, unless this distance is too small. This
+    /// relay's two neighbours must stay at least the separation apart: the requested distance plus `downstream_m`,
+    /// the distance to the neighbour downstream, must be at least the separation.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();
@@ -220,7 +222,7 @@ impl FenceFollower {
     }
 
     /// Returns the least possible distance along x to the upstream neighbour, m. Infinity stands for the minimum
-    /// separation. It is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
+    /// separation. The distance is 0 near a lost relay, and until this relay is beyond the first fence (limit of x).
     pub(super) const fn kept_distance(&self) -> f32 {
         if self.keep_out.is_near() || self.has_fence() && !self.clear {
             0.0
@@ -229,11 +231,11 @@ impl FenceFollower {
         }
     }
 
-    /// Returns true if this relay is known to be beyond its upstream neighbour along x. Also if that neighbour does
-    /// not fly to setpoints, or the chain ends here.
+    /// Returns true if this relay is known to be beyond its upstream neighbour along x. Also true if the upstream
+    /// neighbour does not fly to setpoints, or if the chain ends here.
     ///
-    /// The neighbour's fence (limit of x) shows it: the neighbour announces one only after it has found this relay to
-    /// be beyond. False while a lost relay may be on the wrong side.
+    /// A fence (limit of x) of the neighbour shows the order: the neighbour announces a fence only after it has found
+    /// this relay at a larger x. False while a lost relay may be on the wrong side.
     pub(super) const fn is_ordered(&self) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour() || self.has_fence())
@@ -241,7 +243,7 @@ impl FenceFollower {
 
     /// Returns true if the neighbour upstream was reported at a larger x than this relay, the wrong order.
     ///
-    /// Also true while a lost relay may be on the wrong side of this one.
+    /// Also true while a lost relay may be on the wrong side of this relay.
     pub(super) fn is_out_of_order(&self, own: &Own) -> bool {
         self.keep_out.is_disordered()
             || !self.is_ordered() && self.association.is_on_wrong_side(own, Side::Upstream)
@@ -252,9 +254,9 @@ impl FenceFollower {
         self.number != 0
     }
 
-    /// Records that this relay is past the newest fence (limit of x), if its known position shows that. A message to
-    /// the upstream neighbour, which waits for that, is then due. `low_m` is the lowest x of this relay and of those
-    /// downstream, m.
+    /// Records that this relay is past the newest fence (limit of x), if its known position shows this. A message
+    /// must then be sent to the upstream neighbour, which waits for it. `low_m` is the lowest x of this relay and of
+    /// the relays downstream, m.
     pub(super) fn update_clearance(&mut self, own: &Own, low_m: f32) {
         if self.has_fence() && own.reachable.is_known() {
             self.clear |= own.reachable.low_m >= self.fence_m;
@@ -265,7 +267,8 @@ impl FenceFollower {
     /// Returns the highest possible x of the relays upstream during the start, m.
     ///
     /// Until this relay is beyond the first fence (limit of x), the relays upstream may be closer than the
-    /// separation. Afterwards all are before this relay, and the result is negative infinity.
+    /// separation. Afterwards all relays upstream are at a smaller x than this relay, and the result is negative
+    /// infinity.
     pub(super) fn high_m(&self, own: &Own) -> f32 {
         if self.has_fence() && !self.clear {
             self.fence_m - self.requested_m.min(own.config.separation_m)
@@ -274,9 +277,9 @@ impl FenceFollower {
         }
     }
 
-    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. `None` if no message is due.
-    /// If `placed` is false, there is only a message with a halt request, because this relay's order with its
-    /// neighbour downstream is not confirmed.
+    /// Returns the pending message to the neighbour upstream, with `low_m` as its x, m. `None` if no message is
+    /// pending. If `placed` is false, the order of this relay and its neighbour downstream is not confirmed. The only
+    /// possible message is then a message with a halt request.
     pub(super) fn poll_fence(&mut self, own: &Own, low_m: f32, placed: bool) -> Option<Fence> {
         let is_due = self.association.due && (placed || self.association.sends_halt());
         if self.association.node == 0 || !is_due {

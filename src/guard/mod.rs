@@ -112,7 +112,8 @@ pub struct Guard {
     own: Own,
     jitter: Jitter,
     started_at: Instant,
-    /// Last reported position before the first setpoint, which it becomes; `None` before any report.
+    /// Last position reported before the relay has a setpoint. This position becomes the first setpoint; `None` until
+    /// a position is reported.
     initial_place: Option<Placement>,
     /// True while the drone flies to this guard's setpoints.
     flown: bool,
@@ -120,7 +121,8 @@ pub struct Guard {
     owner: FenceOwner,
     /// True while this relay requests a halt of the chain.
     ///
-    /// It is on the wrong side of a neighbour, or several reminders in a row found its order along x unknown.
+    /// Either it is on the wrong side of a neighbour, or its order along x was unknown for several seconds
+    /// (reminders) in a row.
     disorder: bool,
     /// Number of seconds (reminders) in a row in which the order along x was unknown.
     unordered: u8,
@@ -128,7 +130,7 @@ pub struct Guard {
     refused: u32,
 }
 
-/// Number of seconds between two messages of a standing relay that does not fly to setpoints.
+/// Number of seconds between two messages of a relay that does not fly to setpoints and does not move.
 const UNFLOWN_EVERY: u8 = 4;
 
 /// Number of seconds after which an unknown order along x halts the chain.
@@ -137,8 +139,8 @@ const MAX_UNORDERED: u8 = 3;
 impl Guard {
     /// Creates a guard that starts at `now` between the mission's `neighbours`, toward Tx and toward Rx.
     ///
-    /// `None` in `neighbours` is an end of the chain. `config` must be valid ([`GuardConfig::is_valid`]); `seed` must differ from
-    /// relay to relay and from start to start.
+    /// `None` in `neighbours` means an end of the chain. `config` must be valid ([`GuardConfig::is_valid`]); `seed`
+    /// must differ from relay to relay and from start to start.
     pub fn new(config: GuardConfig, neighbours: [Option<u16>; 2], seed: u32, now: Instant) -> Self {
         let [upstream, downstream] = neighbours.map(Option::unwrap_or_default);
         let mut jitter = Jitter::new(seed);
@@ -190,11 +192,11 @@ impl Guard {
         }
     }
 
-    /// Sets whether the relay flies to its setpoints from `now` on; returns true for a change. `flown` is true at the
-    /// start.
+    /// Records if the relay flies to its setpoints from `now` on. Returns true if this is a change. `flown` is true
+    /// at the start.
     ///
     /// While it is `false` there is no setpoint, and both neighbours are informed that the relay may be anywhere.
-    /// Flown again, the relay begins as after a start, with the next reported position.
+    /// When `flown` becomes true again, the relay begins as after a start, with the next reported position.
     pub fn control(&mut self, now: Instant, flown: bool) -> bool {
         if flown == self.flown {
             return false;
@@ -212,8 +214,9 @@ impl Guard {
 
     /// Starts again because the line from Tx to Rx has changed. Earlier positions and messages are void.
     ///
-    /// The relay begins with the first position reported once it has stopped, after `now`, or after the start if that
-    /// is `None`. Lost relays may hover anywhere beyond this relay, as after a start.
+    /// The relay begins with the first position that is reported after `now`, once the drone has stopped. With
+    /// `None`, it begins with the first position after the start. Lost relays may hover anywhere beyond this relay,
+    /// as after a start.
     pub fn leave_line(&mut self, now: Option<Instant>) {
         if let Some(now) = now {
             self.started_at = self.started_at.max(now + self.own.config.lag);
@@ -227,7 +230,7 @@ impl Guard {
         self.owner.leave_line(&mut self.jitter);
     }
 
-    /// Changes the geofence. A relay that is outside the new one returns into it with the next setpoint.
+    /// Changes the geofence. A relay outside the new geofence returns into it with the next setpoint.
     pub fn set_geofence(&mut self, fence: Geofence) {
         self.own.config.geofence = fence;
     }
@@ -252,10 +255,12 @@ impl Guard {
         }
     }
 
-    /// Sets the neighbour at `side`, `None` at the end of the chain. No effect if that is the current neighbour.
+    /// Sets the neighbour at `side`, `None` at the end of the chain. The call has no effect if `node` is the current
+    /// neighbour.
     ///
-    /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget), or until
-    /// that neighbour, or a node between the two, is linked and has sent a message.
+    /// The previous neighbour may still hover. This relay keeps clear of the previous neighbour until
+    /// [`forget`](Self::forget) is called. It also ends when the previous neighbour, or a node between the two, is
+    /// linked and has sent a message.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -271,8 +276,8 @@ impl Guard {
 
     /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
     ///
-    /// `others` states that the chain has more relays at that side. If none of them has been heard, this relay keeps
-    /// clear of everything beyond its present x until it hears one of them.
+    /// `others` states that the chain has more relays at that side. If none of these relays has been received, this
+    /// relay keeps clear of everything beyond its present x until it receives one of them.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
         let (is_heard, limit_m, keep_out) = match side {
@@ -384,7 +389,7 @@ impl Guard {
     }
 
     /// Returns true if this relay and its neighbours are known to be in the wrong order along x. This is so if one
-    /// neighbour is on the wrong side of this relay, or if the upstream neighbour is beyond the downstream one.
+    /// neighbour is on the wrong side of this relay, or if the upstream neighbour is beyond the downstream neighbour.
     fn is_out_of_order(&self) -> bool {
         let (up, down) = (&self.follower.association, &self.owner.association);
         self.follower.is_out_of_order(&self.own)
@@ -418,7 +423,7 @@ impl Guard {
         self.disorder || upstream || downstream
     }
 
-    /// Returns the last setpoint of [`steer`](Self::steer); `None` before the first one.
+    /// Returns the last setpoint of [`steer`](Self::steer); `None` if there is none yet.
     pub const fn setpoint(&self) -> Option<Placement> {
         self.own.setpoint
     }
@@ -464,7 +469,7 @@ impl Guard {
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
-    /// Schedules again all messages that may have been lost; returns true if there are any. To be called about every
+    /// Schedules again all messages that may have been lost; returns true if there are any. Call it about every
     /// second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
@@ -491,8 +496,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position, and the relay was reported there since. The agreed
-    /// position is limited to the geofence.
+    /// Returns true if the setpoint is the agreed position, and a report has shown the relay at this position since
+    /// then. The agreed position is limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -507,12 +512,12 @@ impl Guard {
         }
     }
 
-    /// Returns the reason on the given side that keeps this relay from its agreed position. `None` if there is none,
-    /// or no agreed position.
+    /// Returns the reason on the given side that keeps this relay from its agreed position. `None` without such a
+    /// reason, or without an agreed position.
     ///
     /// Shortly after a new agreement the reason may still refer to the previous agreed positions. While the drone
     /// does not fly to setpoints only [`HoldReason::Order`] is possible: the drone is on the wrong side of a
-    /// neighbour that does.
+    /// neighbour that flies to setpoints.
     pub fn hold_reason(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         if !self.flown {
@@ -545,8 +550,8 @@ impl Guard {
         }
     }
 
-    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if it has not. It is
-    /// `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
+    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if no move has waited so long.
+    /// The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;
         let (clear, keep_out, association) = match side {
@@ -565,7 +570,7 @@ impl Guard {
         is_held_up.then(|| keep_out.reason(association.node, HoldReason::Pending))
     }
 
-    /// Returns the number of rejected inputs: not a number, or out of range. It saturates.
+    /// Returns the number of rejected inputs: not a number, or out of range. The number saturates.
     pub const fn refused(&self) -> u32 {
         self.refused
     }

@@ -44,7 +44,7 @@ pub(super) struct ReachableInterval {
     recent_span: Span,
     recent_since: Instant,
     /// Interval of the x of earlier setpoints, m. At the last position report the relay may still have been on its
-    /// way to one of them.
+    /// way to one of these setpoints.
     earlier_span: Span,
     reported_at: Instant,
     /// True once a position report was measured late enough to show the effect of the first setpoint.
@@ -57,8 +57,8 @@ impl ReachableInterval {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval after the first setpoint, at `x_m`. It counts as unknown until a report shows the effect
-    /// of that setpoint, because the relay may still fly to an earlier one.
+    /// Returns the interval after the first setpoint, at `x_m`. The interval counts as unknown until a report shows
+    /// the effect of this setpoint, because the relay may still fly to an earlier setpoint.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             setpoint_m: x_m,
@@ -84,8 +84,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Extends the interval of the relay's possible x by the new setpoint `x_m`. The relay may first fly on toward
-    /// the last setpoint, and then turn.
+    /// Extends the interval of the relay's possible x by the new setpoint `x_m`. Reason: the relay may first continue
+    /// toward the previous setpoint, and then turn.
     pub(super) fn extend_to(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.setpoint_m).abs() > 0.0 {
             self.setpoint_m = x_m;
@@ -152,8 +152,8 @@ pub(super) struct Own {
     pub(super) sent_place: Placement,
     /// Number of seconds (reminders) since the setpoint changed last.
     reminders: u8,
-    /// Last setpoint at which this relay arrived, or its first one. If the relay halts on its way from there, it
-    /// stops no farther outside the geofence than that setpoint.
+    /// Last setpoint at which this relay arrived, or its first setpoint. If the relay halts on its way from this
+    /// setpoint, it stops no farther outside the geofence than this setpoint.
     last_arrival: Placement,
 }
 
@@ -188,8 +188,8 @@ impl Own {
     }
 
     /// Returns the position from which the relay's next path starts. It is `setpoint` once the relay has arrived
-    /// there. Before that its x is the reported x, moved toward that of `setpoint` by at most the error of the
-    /// report.
+    /// there. Before the arrival its x is the reported x, moved toward the x of `setpoint` by at most the error of
+    /// the report.
     pub(super) fn path_start(&self, setpoint: Placement) -> Placement {
         let ReachableInterval { low_m, high_m, .. } = self.reachable;
         let (at_m, off_m) = match self.reported {
@@ -221,7 +221,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
-    /// Returns true if the relay has moved away from the position that it sent last in manual control.
+    /// Returns true if the relay has moved away from the position in its last message under manual control.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())
@@ -239,8 +239,8 @@ impl Own {
         (self.open, self.halted) = (false, true);
     }
 
-    /// Starts a halt of this relay if `halted` is true, or else ends it. If the relay halts on its way, it stops
-    /// where it was last reported.
+    /// Starts a halt of this relay if `halted` is true, or else ends it. If the relay halts on its way, it stops at
+    /// its last reported position.
     pub(super) fn halt(&mut self, halted: bool, now: Instant) {
         let begins = halted && !self.halted;
         self.halted = halted;

@@ -7,28 +7,31 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets it.
+/// State of the fence toward Rx, a plane x = constant that the downstream neighbour stays beyond. This relay sets
+/// this fence.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FenceOwner {
     pub(super) association: Association,
     pub(super) keep_out: KeepOut,
-    /// Sequence number of the newest fence sent to the neighbour downstream, 0 before the first. A fence is an x that
-    /// this neighbour must stay beyond.
+    /// Sequence number of the newest fence sent to the neighbour downstream, 0 if no fence was sent. A fence is an x
+    /// that this neighbour must stay beyond.
     number: u16,
-    /// x of the newest fence that this relay has announced, m; infinite before the first. The neighbour downstream
-    /// stays beyond it.
+    /// x of the newest fence that this relay has announced, m; infinite if there is none. The neighbour downstream
+    /// stays beyond this x.
     fence_m: f32,
-    /// Distance along x that this relay asks to keep before its fence, m; infinite before any request.
+    /// Distance along x that this relay asks to keep before its fence, m; infinite until this relay asks for a
+    /// distance.
     requested_m: f32,
-    /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed one, or a larger one
-    /// requested since. Infinity stands for the minimum separation.
+    /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed distance, or a larger
+    /// distance that was requested later. Infinity stands for the minimum separation.
     agreed_m: f32,
-    /// Lowest x that the downstream neighbour may reach, m; negative infinity before its first message.
+    /// Lowest x that the downstream neighbour may reach, m; negative infinity until a message of this neighbour is
+    /// received.
     follower_low_m: f32,
     /// x of the position that the chain has agreed on for the neighbour toward Rx, m.
     target_m: f32,
-    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour is
-    /// there.
+    /// Lateral offset and altitude of the downstream neighbour's setpoint. `arrived` is true once the neighbour has
+    /// this lateral offset and altitude.
     across: CrossSection,
     arrived: bool,
     /// True if the neighbour downstream has received the newest fence (limit of x).
@@ -65,7 +68,8 @@ impl FenceOwner {
     }
 
     /// Starts a new association (session) with the neighbour downstream. The limit of x because of the previous
-    /// neighbour remains in `keep_out`. If that neighbour was never heard, the limit is this relay's position.
+    /// neighbour remains in `keep_out`. If the previous neighbour was never received, the limit is this relay's
+    /// position.
     fn renew(&mut self, own: &Own, jitter: &mut Jitter) {
         let mut keep_out = self.keep_out;
         if !self.association.has_no_flown_neighbour() {
@@ -94,7 +98,7 @@ impl FenceOwner {
     }
 
     /// Starts a new association (session) because the line from Tx to Rx has changed. Lost relays remain obstacles;
-    /// drones that do not fly to setpoints do not.
+    /// drones that do not fly to setpoints are no longer obstacles.
     pub(super) fn leave_line(&mut self, jitter: &mut Jitter) {
         *self = Self {
             keep_out: self.keep_out.leave_line(),
@@ -104,7 +108,7 @@ impl FenceOwner {
     }
 
     /// Handles the notice that the downstream neighbour no longer flies to setpoints. This relay then comes no nearer
-    /// to it. If the two were not in the right order along x, this relay holds its position.
+    /// to this neighbour. If the two were not in the right order along x, this relay holds its position.
     fn release(&mut self, association: u16, own: &Own, jitter: &mut Jitter) {
         let (was_absent, is_ordered) = (self.association.is_absent(), self.is_ordered(own));
         self.renew(own, jitter);
@@ -121,8 +125,8 @@ impl FenceOwner {
         self.association.peer_number != 0
     }
 
-    /// Returns true if the neighbour downstream is known to be at a larger x than this relay. Also true if that
-    /// neighbour does not fly to setpoints, or the chain ends here.
+    /// Returns true if the neighbour downstream is known to be at a larger x than this relay. Also true if this
+    /// neighbour does not fly to setpoints, or if the chain ends here.
     pub(super) fn is_ordered(&self, own: &Own) -> bool {
         !self.keep_out.is_disordered()
             && (self.association.has_no_flown_neighbour()
@@ -159,8 +163,8 @@ impl FenceOwner {
         self.follower_low_m - own.reachable.high_m >= least_m
     }
 
-    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream can be lower than this
-    /// one only because of the errors of the reports.
+    /// Returns the lowest x of this relay and of the relays downstream, m. A relay downstream can be at a smaller x
+    /// than this relay only because of the errors of the reports.
     pub(super) fn low_m(&self, own: &Own) -> f32 {
         let low_m = own.reachable.low_m;
         let is_lower = self.follower_low_m < low_m - 2.0 * own.config.rounding();
@@ -171,17 +175,17 @@ impl FenceOwner {
         }
     }
 
-    /// Returns the distance along x that this relay keeps from the downstream neighbour, m. `kept_m` is that to the
-    /// upstream neighbour. Their sum is at least the minimum separation, so that the two neighbours are that far
-    /// apart.
+    /// Returns the distance along x that this relay keeps from the downstream neighbour, m. `kept_m` is the distance
+    /// to the upstream neighbour, m. The sum of both distances is at least the minimum separation, so that the two
+    /// neighbours keep this separation, too.
     pub(super) fn step(&self, own: &Own, kept_m: f32) -> f32 {
         let separation_m = own.config.separation_m;
         self.agreed_m.max(separation_m - kept_m).min(separation_m)
     }
 
-    /// Returns the least possible distance along x to the neighbour downstream, m. It is 0 near a lost relay, and
-    /// until the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the neighbour
-    /// upstream.
+    /// Returns the least possible distance along x to the neighbour downstream, m. The distance is 0 near a lost
+    /// relay, and until the neighbour is beyond the first fence (limit of x). `kept_m` is the distance to the
+    /// neighbour upstream.
     pub(super) fn kept_distance(&self, own: &Own, kept_m: f32) -> f32 {
         let is_open = self.association.has_no_flown_neighbour() || self.clear;
         if self.keep_out.is_near() || !is_open {
@@ -191,9 +195,9 @@ impl FenceOwner {
         }
     }
 
-    /// Returns true if less than the minimum separation along x is requested or agreed to. The distance is that to
-    /// the downstream neighbour. It must then not change its lateral offset or altitude, which may be all that
-    /// separates the two.
+    /// Returns true if less than the minimum separation along x is requested or agreed to. This is about the distance
+    /// to the downstream neighbour. This neighbour must then not change its lateral offset or altitude, because
+    /// perhaps only these separate the two.
     pub(super) fn has_reduced_step(&self, own: &Own) -> bool {
         self.requested_m.min(self.agreed_m) < own.config.separation_m
     }
@@ -275,8 +279,9 @@ impl FenceOwner {
             && !self.keep_out.is_near()
     }
 
-    /// Returns true while this relay and its downstream neighbour may be as close as at the start. That may be below
-    /// the separation. The neighbour has answered, but has not reported yet that it is past a fence (limit of x).
+    /// Returns true while this relay and its downstream neighbour may be as close as at the start. This distance may
+    /// be below the separation. The neighbour has answered, but has not reported yet that it is past a fence (limit
+    /// of x).
     pub(super) const fn is_tight(&self) -> bool {
         self.has_reply() && !self.clear
     }
@@ -293,8 +298,8 @@ impl FenceOwner {
 
     /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
     ///
-    /// It is the minimum separation, or less if the positions agreed on by the two relays are closer along x and both
-    /// relays are at their agreed lateral offsets and altitudes: these then keep them apart.
+    /// The result is usually the minimum separation. It is less if the agreed positions of the two relays are closer
+    /// along x, and both relays have their agreed lateral offsets and altitudes. These then keep the relays apart.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -311,10 +316,10 @@ impl FenceOwner {
     }
 
     /// Returns the next fence for the neighbour downstream: its x, m, a distance, m, and a flag. The neighbour stays
-    /// beyond the fence, and this relay that distance before it. The flag is true if the x is final, false if the
-    /// fence can come nearer once relays have moved. `None` if the neighbour is not known to be beyond this relay.
-    /// `kept_m` is the distance to the neighbour upstream, `upstream_m` the highest possible x of the relays
-    /// upstream, m.
+    /// beyond the fence, and this relay stays that distance before the fence. The flag is true if the x is final, and
+    /// false if the fence can come nearer once relays have moved. `None` if the neighbour is not known to be beyond
+    /// this relay. `kept_m` is the distance to the neighbour upstream, `upstream_m` the highest possible x of the
+    /// relays upstream, m.
     #[inline(never)] // called from several places
     fn next_fence(&self, own: &Own, kept_m: f32, upstream_m: f32) -> Option<(f32, f32, bool)> {
         if !self.has_reply() || !self.is_beyond(own) {
@@ -353,8 +358,10 @@ impl FenceOwner {
         self.number == 0 || (x_m - self.fence_m).abs() > 0.0 || (step_m - announced_m).abs() > 0.0
     }
 
-    /// Returns the pending message to the neighbour downstream. If `moves` is true, it may have a new fence (limit of
-    /// x). Fences are numbered only here, so that every numbered fence is sent.
+    /// Returns the pending Fence message to the downstream neighbour; `None` if no message is pending. A fence is
+    /// this relay's limit on the x of that neighbour. If `moves` is true, the message may contain a new fence with
+    /// the next number; otherwise it repeats the last fence. Only this function numbers fences, so that every
+    /// numbered fence is sent.
     pub(super) fn poll_fence(
         &mut self,
         own: &Own,

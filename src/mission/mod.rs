@@ -53,15 +53,16 @@ pub struct MissionConfig {
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 is one
-    /// direction only, as in the paper; above 0 the worse of the SIR and the backward SIR / r counts,
-    /// once the interference is known.
+    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 means
+    /// one direction only, as in the paper. Above 0, the worse of two SIRs counts, once the interference is known:
+    /// the forward SIR, and the backward SIR divided by r.
     pub reverse: f32,
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
     /// 0.
     pub rx_power_w: f32,
-    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, the joint method maximises the data rate of slots
-    /// as long as each hop needs, whose spectral efficiency is log2(1 + SINR / gap).
+    /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, each time slot is as long as its
+    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is log2(1 + SINR /
+    /// gap).
     pub fitted_gap: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,
@@ -307,17 +308,19 @@ pub(super) const fn within(value: f32, least: f32, most: f32) -> bool {
 pub struct Mission {
     pub(super) config: MissionConfig,
     pub(super) tx_gain: PowerRatio,
-    /// Gain of a drone-to-drone hop per watt of the sender's power, 1/W, in the formula of the hop's SIR. The gain is eta / (`mu_los`
-    /// `p_MSI`), with path-loss factors and the interferer's power; in an interference field `Upsilon_max` / `mu_los`, m^2/W.
+    /// Gain of a drone-to-drone hop per watt of the sender's power, in the formula of the hop's SIR. With one
+    /// interferer the gain is eta / (`mu_los` `p_MSI`), 1/W. eta and `mu_los` are the path-loss factors drone to
+    /// ground and drone to drone, and `p_MSI` is the interferer's power. In an interference field the gain is
+    /// `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of the last hop per watt of its sender, m^2/W. The SIR at Rx is this times the power over the squared
-    /// distance.
+    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's
+    /// power, divided by the squared distance.
     ///
-    /// It is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`, with the interferer of power `p_MSI` at (X, Y). In a
-    /// field it is Upsilon(D) / eta. With noise it refers to the interference plus noise at Rx.
+    /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
+    /// field it is Upsilon(D) / eta. With noise, it refers to the interference plus noise at Rx.
     pub(super) receiver_gain_per_w: f64,
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. 0 without noise and
-    /// in an interference field.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
+    /// noise and in an interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -447,21 +450,21 @@ impl Mission {
         })
     }
 
-    /// Creates a mission in a `const`; an invalid parameter fails the build. Otherwise as [`Mission::try_new`].
+    /// Creates a mission in a `const`; an invalid parameter fails the build. In all other respects it is
+    /// [`Mission::try_new`].
     ///
-    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant; [`Channel::new`](crate::Channel::new), which
-    /// takes the losses as factors, 10^(dB / 10), can:
+    /// [`Channel::from_db`](crate::Channel::from_db) cannot be used in a constant;
+    /// [`Channel::new`](crate::Channel::new), which takes the losses as factors, 10^(dB / 10), can:
     ///
     /// ```
-    /// use uav_relay::channel::AirGround;
-    /// use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
+    /// use uav_relay::channel::AirGround; use uav_relay::{Band, Channel, Interference, Interferer, Mission,
+    /// MissionConfig, Profile};
     ///
-    /// // 0.1 dB and 21 dB.
-    /// const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
+    /// // 0.1 dB and 21 dB. const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los)
+    /// {
     ///     Ok(channel) => channel,
     ///     Err(_) => panic!("the channel is out of range"),
-    /// };
-    /// const MISSION: Mission = Mission::new(MissionConfig {
+    /// }; const MISSION: Mission = Mission::new(MissionConfig {
     ///     relays: 5,
     ///     distance_m: 1_000.0,
     ///     min_separation_m: 4.0,
@@ -476,8 +479,7 @@ impl Mission {
     ///     rx_power_w: 80.0,
     ///     fitted_gap: 0.0,
     ///     tolerance: 1e-4,
-    /// });
-    /// assert_eq!(MISSION.relays(), 5);
+    /// }); assert_eq!(MISSION.relays(), 5);
     /// ```
     ///
     /// A value out of range fails the build:
@@ -510,8 +512,8 @@ impl Mission {
     /// ```
     ///
     /// # Panics
-    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at run time
-    /// use [`Mission::try_new`].
+    /// Panics on a parameter outside its range: in a `const` this is a failed build, as intended. For values known at
+    /// run time use [`Mission::try_new`].
     #[expect(
         clippy::panic,
         reason = "in a constant this fails the build, as documented"
@@ -538,8 +540,8 @@ impl Mission {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in an interference field. For an unknown interferer it returns a substitute far
-    /// away, with equal interference everywhere.
+    /// Returns the interferer; `None` in an interference field. For an unknown interferer the result is a substitute
+    /// far away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -557,24 +559,27 @@ impl Mission {
     }
 
     /// Returns the interference field combined with the receiver noise, or `None` without a field.
-    pub(crate) const fn heard(&self) -> Option<InNoise<'_>> {
+    #[doc(hidden)]
+    pub const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
             Some(field) => Some(field.in_noise(self.config.noise_w)),
             None => None,
         }
     }
 
-    /// Receiver noise over the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m, 1/m^2: nu = N eta / `p_MSI`.
     ///
-    /// 0 without noise and in an interference field, whose Upsilon includes the noise.
+    /// The result is 0 without noise. It is also 0 in an interference field, because Upsilon of the field includes
+    /// the noise.
     pub const fn noise_at_a_metre(&self) -> f32 {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Ratio r: SIR that a hop needs from Rx to Tx, relative to that from Tx to Rx. 0 for one direction.
+    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. 0 for one
+    /// direction.
     ///
-    /// A constant without the feature `reverse`, so that the compiler drops the code for two directions. 0 while the interferer is
-    /// unknown: relays then spread evenly.
+    /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
+    /// function returns a constant, so that the compiler drops the code for two directions.
     pub const fn reverse(&self) -> f32 {
         if REVERSE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.reverse
@@ -583,8 +588,8 @@ impl Mission {
         }
     }
 
-    /// SNR gap of fitted slots, linear; 0 for equal slots. A constant without the feature `altitude`. 0 while the interferer is
-    /// unknown, as [`Mission::reverse`] is.
+    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, as
+    /// for [`Mission::reverse`]. Without the feature `altitude` the function returns a constant.
     pub const fn fitted_gap(&self) -> f32 {
         if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap
@@ -593,8 +598,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to relay N), or in an
-    /// interference field toward Tx (relay N to relay 1).
+    /// Returns the order in which the relays compute their positions. The order is toward Rx (relay 1 to relay N). In
+    /// an interference field it is toward Tx (relay N to relay 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
@@ -603,7 +608,7 @@ impl Mission {
         }
     }
 
-    /// Returns the leader, which computes its position first. It is 1, or N in an interference field.
+    /// Returns the index of the leader, which computes its position first: 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -611,7 +616,8 @@ impl Mission {
         }
     }
 
-    /// Returns the relay whose position is computed after that of relay `index`; `None` after the last one.
+    /// Returns the relay whose position is computed after the position of relay `index`; `None` if relay `index` is
+    /// the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -634,36 +640,29 @@ impl Mission {
             Err(error) => Err(error),
         }
     }
-
-    pub(crate) const fn unseparated(&self) -> Self {
-        let config = MissionConfig {
-            min_separation_m: 0.0,
-            ..self.config
-        };
-        Self { config, ..*self }
-    }
 }
 
 impl Mission {
-    /// Gain A of the first hop: its SIR is A times [`crate::sir::quiet`] over the squared length. `quiet` is the
-    /// inverse interference. A is the power of Tx over that of the interferer, `p_t` / `p_MSI`; in an interference
-    /// field `p_t` `Upsilon_max` / eta.
+    /// Returns the gain A of the first hop. The SIR of this hop is A times [`crate::sir::quiet`], the inverse
+    /// interference, divided by the squared length. With one interferer A is the power of Tx divided by the power of
+    /// the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
-    /// [`crate::sir::quiet`], the inverse interference, over the squared length. The gain is (`p_u` / `p_MSI`)(eta /
-    /// `mu_los`): the powers of relay and interferer, and the path-loss factors drone to ground and drone to drone.
-    /// In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's largest E[1/I].
+    /// Returns the gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
+    /// [`crate::sir::quiet`], the inverse interference, divided by the squared length. With one interferer the gain
+    /// is (`p_u` / `p_MSI`) (eta / `mu_los`): the powers of relay and interferer, and the path-loss factors drone to
+    /// ground and drone to drone. In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's
+    /// largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// Factor K of the last hop, m^2. The SIR at Rx is K / squared distance from the last relay, which has `power_w`
-    /// watts.
+    /// Returns the factor K of the last hop, m^2. The SIR at Rx is K divided by the squared distance to the last
+    /// relay. The last relay sends with `power_w` watts.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -673,14 +672,18 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Ratio G = K / A, m^2, of the last hop's factor K and the first hop's gain A. The optimal position of a single
-    /// relay depends on it. It is (`p_u` / `p_t`)(`mu_nlos` / eta)((X - D)^2 + Y^2), with the powers of relay and Tx,
-    /// and the interferer at (X, Y).
-    pub(crate) fn last_to_first(&self, power_w: f32) -> f64 {
+    /// Returns G, m^2, which determines the optimal position of a single relay that sends with `power_w` watts. G is
+    /// K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is (`p_u` /
+    /// `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and of Tx.
+    /// `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
+    /// ground.
+    #[doc(hidden)]
+    pub fn last_to_first(&self, power_w: f32) -> f64 {
         f64::from(power_w) * self.receiver_gain_per_w / self.tx_gain.wide()
     }
 
-    /// Power that a relay receives from Tx, W, at the squared distance `squared_m2` from it.
+    /// Returns the power that a relay receives from Tx, W. `squared_m2` is the squared distance from Tx to the relay,
+    /// m^2.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -724,7 +727,7 @@ impl Mission {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Returns the number of relays whose positions are computed after that of relay `index`.
+    /// Returns the number of relays whose positions are computed after the position of relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -732,7 +735,8 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays up to Rx their minimum separation.
+    /// Returns the largest x of relay `index`, m, at which the relays between it and Rx still have room for their
+    /// minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -767,11 +771,11 @@ impl Mission {
 }
 
 /// Factor on the gain of the first or last hop that makes it half as long as the other hops. In the best chain all
-/// hops have the same SIR, which is gain over squared length.
+/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if its position is known; `None` for an unknown one or a field.
+    /// Returns the interferer if its position is known; `None` for an unknown interferer or a field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -782,8 +786,8 @@ impl Mission {
     /// Returns the mission with another `interference`.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` has a flag for the first hop and one for the last: true to place the relays so that this hop is half
-    /// as long as the others.
+    /// `halved` has a flag for the first hop and a flag for the last hop. If a flag is true, the relays are placed so
+    /// that this hop is half as long as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -825,8 +829,8 @@ pub(super) const FAR: Interferer = Interferer {
 const FAR_AWAY: f64 = 1e-14;
 
 /// Returns three gains, for an unknown interferer, with which hops of equal length are best. They are the gain of the
-/// first hop, and the gains per watt of the other hops and of the last hop. With relays of `power_w`, W, every hop of
-/// length d has the SIR (`distance_m` / d)^2.
+/// first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the transmit power of the
+/// relays, W. With these gains every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

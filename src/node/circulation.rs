@@ -30,22 +30,22 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the path compute before they forward the message. Their frames are
-/// then twice as long, and each relay may take thirty steps of a computation.
+/// Factor on the wait for a reply, if the relays on the path do long computations before they forward the message.
+/// Their frames are then twice as long, and each relay may take thirty steps of a computation.
 const SLOW: u32 = 4;
 
-/// Number of retransmissions after which the wait before the next one stops doubling. After n of them it is 2 << n
-/// hop times: at most eight.
+/// Number of retransmissions after which the wait before the next retransmission no longer doubles. After n
+/// retransmissions the wait is 2 << n hop times: at most eight.
 const LOG_MOST: u32 = 2;
 
 /// Wait before the first retransmission on a lossy channel, in hop times. The next relay's acknowledgement normally
 /// arrives earlier.
 const SOON: u32 = 4;
 
-/// Number of messages after a lost one for which the channel still counts as lossy.
+/// Number of messages after a lost message for which the channel still counts as lossy.
 const MEMORY: u8 = 8;
 
-/// Progress of a message that goes along the chain and returns with a result, as seen by one relay.
+/// Progress of a message that travels along the chain and back with a result, at one relay.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Stage {
     /// No message is known, or this relay has not forwarded it yet.
@@ -62,7 +62,7 @@ pub(crate) enum Stage {
 /// Reply to the relay from which this relay has received the message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
-    /// The message has completed; the reply contains its result.
+    /// The message has travelled to the last relay and back; the reply contains its result.
     Result,
     /// The message was received, and its result is not known yet.
     InProgress,
@@ -93,9 +93,9 @@ pub(crate) struct Circulation {
     is_received: bool,
     /// True if the channel counts as lossy: this message or one of the last messages has been lost once.
     is_lossy: bool,
-    /// Number of further messages for which the channel still counts as lossy, after a lost one.
+    /// Number of further messages for which the channel still counts as lossy, after a lost message.
     lossy_messages: u8,
-    /// Number of times that the reply will still be repeated unasked, as on a lossy channel.
+    /// Number of times that the reply will still be repeated without a request, because the channel is lossy.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,
@@ -148,8 +148,8 @@ impl Circulation {
         }
     }
 
-    /// Returns the time at which this relay knew the result of the message. `None` before that, and after the message
-    /// was cancelled.
+    /// Returns the time at which this relay knew the result of the message. `None` while the result is unknown, and
+    /// after the message was cancelled.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Completed => Some(self.completed_at),
@@ -168,8 +168,8 @@ impl Circulation {
         self.lossy_messages = self.lossy_messages.saturating_sub(1);
     }
 
-    /// Records the result of the message, and schedules the reply. `path` leads to the relay that started the message. It has no hops at
-    /// that relay itself, which sends no reply.
+    /// Records the result of the message, and schedules the reply. `path` leads to the relay that started the
+    /// message. At the relay that started the message, the path has no hops, and no reply is sent.
     #[inline(never)] // called from many places
     pub(crate) fn complete(&mut self, now: Instant, path: Path) {
         self.stop(Stage::Completed);
@@ -183,13 +183,14 @@ impl Circulation {
         self.stop(Stage::Completed);
     }
 
-    /// Withdraws the message, as if this relay had never had it. Its duplicates are not answered with a result then.
+    /// Withdraws the message, as if this relay had never had it. Duplicates of the message are then not answered with
+    /// a result.
     pub(crate) const fn withdraw(&mut self) {
         self.stop(Stage::Idle);
     }
 
-    /// Cancels the message: it counts as completed, without a result. The time at which it was sent is discarded.
-    /// Otherwise a later message could be taken for its reply, and prove wrongly that a neighbour is alive.
+    /// Cancels the message: it counts as completed, without a result. The time of its transmission is discarded.
+    /// Otherwise a later message could be taken for the reply, and wrongly prove that a neighbour is alive.
     pub(crate) const fn cancel(&mut self) {
         self.stop(Stage::Cancelled);
     }
@@ -203,7 +204,8 @@ impl Circulation {
         self.timer = None;
     }
 
-    /// Handles a retransmission of the current message by the previous relay. `path` leads to the initiator.
+    /// Handles a retransmission of the current message by the previous relay. `path` leads to the relay that started
+    /// the message.
     pub(crate) fn on_duplicate(&mut self, now: Instant, path: Path) {
         self.is_lossy = true;
         if matches!(self.stage, Stage::Completed | Stage::Cancelled) {
@@ -231,7 +233,7 @@ impl Circulation {
         self.is_forward_due |= self.is_outstanding();
     }
 
-    /// Returns true if the message is to be forwarded now. The caller then calls [`await_result`](Self::await_result).
+    /// Returns true if the message must be forwarded now. The caller then calls [`await_result`](Self::await_result).
     pub(crate) fn poll_forward(&mut self) -> bool {
         core::mem::take(&mut self.is_forward_due) && self.is_outstanding()
     }

@@ -69,9 +69,9 @@ impl Member {
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Identifier of the newest mission that this relay has stored. The active mission may still be an older one.
+    /// Identifier of the newest mission that this relay has stored. The active mission may still be an older mission.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last one of its chain, with no neighbour on the side away from the leader.
+    /// True if this relay is the last relay of its chain: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,
     /// Remaining lease times of other relays. Until they have ended, the positions of a new view must not be used.
     pub(crate) other_leases: OtherLeases,
@@ -94,9 +94,9 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. The settings
-    /// must select it, and the mission must leave lateral offset or altitude free, or have fitted slots (as long as
-    /// each hop needs).
+    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. This is so if
+    /// the settings select the joint method, and the mission leaves the lateral offset or the altitude free, or has
+    /// fitted slots (as long as each hop needs).
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
@@ -151,8 +151,8 @@ impl<'a> Context<'a> {
         (0.0..=self.mission().config().distance_m).contains(&place.x_m)
     }
 
-    /// Returns the range of altitudes that this relay may take, m. It is `altitude_m` alone if the relay keeps a
-    /// fixed altitude.
+    /// Returns the range of altitudes that this relay may take, m. The range has the single value `altitude_m` if the
+    /// relay keeps a fixed altitude.
     pub(crate) fn band(&self, altitude_m: f32) -> Band {
         if self.settings().hold_altitude {
             Band::at(altitude_m)
@@ -166,13 +166,13 @@ impl<'a> Context<'a> {
 /// positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct OtherLeases {
-    /// Upper bound of the remaining lease time of the other members of this relay's view. It is known because every
-    /// lease renewal passes this relay, too.
+    /// Upper bound of the remaining lease time of the other members of this relay's view. The bound is known because
+    /// every lease renewal also passes this relay.
     pub(crate) lease_left: Duration,
     /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
-    /// Longest remaining lease time granted in any view before `view`. `None` if unknown, because a member may not
-    /// have accepted `view`.
+    /// Longest remaining lease time granted in an earlier view than `view`. `None` if unknown, because a member may
+    /// not have accepted `view`.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -184,8 +184,8 @@ impl OtherLeases {
         earlier_lease_left: Some(Duration::from_micros(0)),
     };
 
-    /// Returns the time until all leases of views before `view` have ended, in tenths of a second. `u16::MAX` if
-    /// unknown. A lease permits a relay to use the agreed positions of its view.
+    /// Returns the time until all leases of earlier views than `view` have ended, in tenths of a second. `u16::MAX`
+    /// if unknown. A lease permits a relay to use the agreed positions of its view.
     pub(crate) fn earlier_lease_tenths(self, view: ViewId) -> u16 {
         if view == ViewId::LOADED {
             0
@@ -207,16 +207,16 @@ pub(crate) struct Effects {
     pub(crate) ignored: Option<Ignored>,
     /// True if this step scheduled a retransmission of a message.
     pub(crate) resent: bool,
-    /// True if this relay has started a pass (message along the chain) or a view proposal.
+    /// True if, in this step, this relay has started a pass (message along the chain) or a view proposal.
     pub(crate) began: bool,
     /// True if the relays must agree on a new view (membership of the chain).
     pub(crate) view_needed: bool,
     /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
     /// proves that the neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that this relay has received or made now; `None` without a proposal.
+    /// Origin of the view proposal that this relay has received or made in this step; `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
-    /// True while a view proposal awaits its decision. No pass (message along the chain) continues meanwhile.
+    /// True while a view proposal awaits its decision. During this time no pass (message along the chain) continues.
     pub(crate) view_proposed: bool,
     pub(crate) event: Option<LayerEvent>,
     /// Changes of the interference estimate and of the set of faulty interference sensors.
@@ -230,7 +230,7 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour of a relay: the previous or the next one, in the order from the leader to the last relay.
+/// Neighbour of a relay: the previous or the next relay, in the order from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,
@@ -244,9 +244,9 @@ pub(crate) enum LayerEvent {
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease has expired: this relay may not use the agreed positions any more.
+    /// The lease has expired: this relay may no longer use the agreed positions.
     Lapsed,
-    /// A hello that requests a new view is due, to the neighbour toward the leader.
+    /// A hello that requests a new view must be sent to the neighbour toward the leader.
     RequestView,
     /// A proposal of a view (membership of the chain) has been decided.
     ProposalDecided(ProposalOutcome),
@@ -260,7 +260,8 @@ pub(crate) struct Sensed {
     pub(crate) new_estimate: bool,
     /// True if no single interferer explains the measurements.
     pub(crate) unclear: bool,
-    /// Node that was found now to measure values that contradict those of the other nodes; else `None`.
+    /// Node whose measurements were found, in this step, to contradict the measurements of the other nodes. `None`
+    /// without such a finding.
     pub(crate) faulty_sensor: Option<u16>,
 }
 
@@ -270,8 +271,8 @@ pub(crate) enum ProposalOutcome {
     /// Accepted: the view has `relays` members. Its positions may be used after `usable_in` tenths of a second, when
     /// older leases have ended.
     Granted { relays: u16, usable_in: u16 },
-    /// Superseded: another view had been decided on before and is accepted instead. The leader then proposes a view
-    /// that follows it.
+    /// Superseded: another view was decided earlier and is accepted instead. The leader then proposes a view that
+    /// follows this other view.
     Superseded,
     /// Rejected: fewer relays are reachable than a quorum needs.
     NoQuorum,
@@ -346,8 +347,8 @@ pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }
 
-/// Returns the maximum time from the leader's first message along the chain until its result is back. It assumes a
-/// chain of `all` relays that loses half of its frames.
+/// Returns the maximum time from the leader's first message along the chain until the result is back. The time is for
+/// a chain of `all` relays that loses half of its frames.
 pub(crate) fn first_pass(settings: &Settings, all: u16) -> Duration {
     settings.hop_time.times(24 * u32::from(all))
 }

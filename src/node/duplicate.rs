@@ -50,25 +50,25 @@ use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 use crate::wire::session::{RAISED, Rival, Sender};
 
-/// Wait before the first unprompted claim to this relay's node number. The intervals between later claims double each
-/// time.
+/// Wait before the first claim that this relay sends, without a request, to its own node number. The intervals
+/// between later claims double each time.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time added before the first unprompted claim to this relay's node number, after a start. It is about the time that
-/// a hundred relays need for their first agreement. A relay that becomes active again waits as long.
+/// Time added before the first claim to this relay's node number after a start. This is about the time that a hundred
+/// relays need for their first agreement. A relay that becomes active again waits as long.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum of the doubling intervals between unprompted claims to this relay's node number. Later claims follow every
-/// `dead_after`.
+/// Maximum of the doubling intervals between claims that this relay sends to its node number without a request. Later
+/// claims follow every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
-/// Number of claims by which this relay defends its node number against another node's. They are [`least_interval`]
-/// apart.
+/// Number of claims by which this relay defends its node number against another node's claim. The interval between
+/// these claims is [`least_interval`].
 const DEFENCES: u8 = 32;
 
-/// Number of claims that follow a frame with this relay's own node number that shows no claim.
+/// Number of claims that this relay sends after a frame that has its own node number but states no claim.
 ///
-/// With signed frames: number of claims that it repeats after it has raised its claim number.
+/// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
 
 /// Returns the minimum interval between claims of this relay. The claims of two relays and their echoes then do not
@@ -89,22 +89,25 @@ pub(crate) struct IndexClaims {
     number: u32,
     /// Largest claim number received from another node with the same node number and epoch.
     rival: u32,
-    /// Last claim number received from another node with the same node number; 0 before any.
+    /// Last claim number received from another node with the same node number; 0 if none has been received.
     last_rival: u32,
-    /// Last contact with another node of this node number: its time, and a flag. `None` before any. The flag is true
-    /// if this relay already had a position at the first contact. `None` before any.
+    /// Last contact with another node of this node number: its time, and a flag. The flag is true if this relay
+    /// already had a position at the first contact. `None` without a contact.
     contest: Option<(Instant, bool)>,
-    /// Times at which two nodes were last seen to use this relay's number [0], or a neighbour's number [1].
+    /// Times at which two nodes were last seen to use this relay's number (entry 0), or a neighbour's number (entry
+    /// 1).
     observed: [Option<Instant>; 2],
-    /// Time at which this relay last received one of its own frames; `None` before any.
+    /// Time at which this relay last received one of its own frames; `None` if none has been received.
     echoed: Option<Instant>,
     /// Time at which a passive relay becomes active again; `None` while it is active.
     passive_until: Option<Instant>,
-    /// Time of the next claim that this relay sends unprompted, not in reply to a frame; `None` for none.
+    /// Time of the next claim that this relay sends without a request, not in reply to a frame. `None` if none is
+    /// scheduled.
     next_claim: Option<Instant>,
     /// Time from the next claim without a request to the claim after it.
     interval: Duration,
-    /// Number of claims still to be sent in defence of this relay's node number. They are [`least_interval`] apart.
+    /// Number of claims still to be sent in defence of this relay's node number. The interval between these claims is
+    /// [`least_interval`].
     defences: u8,
     /// Earliest time at which a further claim to this relay's node number may be scheduled. This limits the rate of
     /// Claim messages.
@@ -284,8 +287,8 @@ impl IndexClaims {
         }
     }
 
-    /// Schedules claims in answer to the claim `rival` of another node to this relay's number. They are repeated for
-    /// some seconds, or until the other node is passive; with signed frames there is only one.
+    /// Schedules claims in answer to the claim `rival` of another node to this relay's number. The claims are
+    /// repeated for some seconds, or until the other node is passive. With signed frames only one claim is sent.
     fn defend(&mut self, now: Instant, rival: Rival, settings: &Settings) {
         self.defences = 0;
         if !rival.passive {
@@ -301,8 +304,9 @@ impl IndexClaims {
         self.passive_until = Some(now + self.jitter.spread(settings.dead_after.times(2)));
     }
 
-    /// Starts periodic claims to this relay's node number. Needed on point-to-point links without a key, and against
-    /// another active node. On a shared channel a relay receives the frames of such a node directly.
+    /// Starts periodic claims to this relay's node number. Periodic claims are necessary on point-to-point links
+    /// without a key, and against another active node. On a shared channel a relay receives the frames of such a node
+    /// directly.
     fn schedule_unprompted(&mut self, now: Instant, settings: &Settings) {
         self.interval = FIRST_CLAIM;
         let unasked = settings.wiring == Wiring::Pair && settings.auth.is_none();
@@ -319,7 +323,9 @@ impl IndexClaims {
         core::mem::replace(&mut self.claim_due, false)
     }
 
-    /// Returns this relay's new claim number if all authentication sessions must be restarted with it. Else `None`.
+    /// Returns this relay's claim number if it must restart its authentication sessions; otherwise `None`. Of two
+    /// nodes with the same node number, the larger claim number wins. A relay that has raised its claim number
+    /// restarts its sessions with the new number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         core::mem::replace(&mut self.sessions_due, false).then_some(self.number)
     }
@@ -405,8 +411,8 @@ mod tests {
         }
     }
 
-    /// Checks that a claim that names an older claim number of this relay is only answered. It is from before the
-    /// relay's last start.
+    /// Checks that a claim that names an older claim number of this relay is only answered. Such a claim was sent
+    /// before the relay's last start.
     #[test]
     fn a_claim_to_an_earlier_start_is_only_answered() {
         let settings = Settings::default();

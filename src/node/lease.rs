@@ -53,7 +53,7 @@ use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// No lease yet: this view has no agreement, or not all members are known to have it.
+    /// No lease yet: this view has no agreement, or it is unknown if all members know the agreement.
     Pending,
     Until(Instant),
     Lapsed,
@@ -89,7 +89,8 @@ pub(crate) struct Lease {
     circulation: Circulation,
     /// Orders of the leader in the last renewal of this view.
     orders: Orders,
-    /// Requests in the last completed renewal of this view, from the last relay to this one. `None` before any.
+    /// Requests that the last completed renewal of this view has collected, from the last relay to this relay. `None`
+    /// until a renewal is completed.
     requests: Option<Requests>,
     /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
     departures: [Departures; DEPARTURES as usize],
@@ -101,7 +102,8 @@ struct Departures {
     requests: Requests,
     /// Number of relays of the view when no relay requested to leave.
     complement: u16,
-    /// Relay that requests to leave, 0 for none, and the time since which it does, over all views.
+    /// Relay that requests to leave, 0 for none, and the time since which this relay requests it, also in earlier
+    /// views.
     leaver: (u16, Instant),
     /// Time of the first renewal of this view: all relays then had new positions.
     settled_at: Instant,
@@ -149,17 +151,17 @@ impl Lease {
         self.orders
     }
 
-    /// Returns true if all relays of the view have the leader's last orders, as far as this relay knows.
+    /// Returns true if all relays of the view are known to have received the leader's last orders.
     pub(crate) fn has_completed(&self) -> bool {
         self.current.is_some() && !self.circulation.is_outstanding()
     }
 
-    /// Returns the leader's orders for the next renewal, by the requests in the last one.
+    /// Returns the leader's orders for the next renewal, by the requests in the last renewal.
     ///
-    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If there
-    /// is a spare, it joins first, unless the view already has more relays than without requests. A relay that does not
-    /// arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than that duration,
-    /// or than its remaining endurance: so half of the endurance remains.
+    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If
+    /// there is a spare, it joins first, unless the view already has more relays than without requests. A relay that
+    /// does not arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than
+    /// that duration, or than its remaining endurance: so half of the endurance remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -258,7 +260,7 @@ impl Lease {
         self.end();
     }
 
-    /// Ends the lease. There is no new one before this relay has agreed on a position in a later view.
+    /// Ends the lease. The next lease starts after this relay has agreed on a position in a later view.
     pub(crate) fn end(&mut self) {
         self.is_whole = false;
         self.is_agreed = false;
@@ -295,8 +297,8 @@ impl Lease {
         }
     }
 
-    /// Handles a lease renewal, or the reply to one, of this relay's view. A renewal comes from the previous relay, a
-    /// reply from the next one.
+    /// Handles a lease renewal, or the reply to a renewal, of this relay's view. A renewal comes from the previous
+    /// relay, a reply from the next relay.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         match message {
             Message::Pulse(pulse) => self.on_pulse(context, *pulse),
@@ -336,7 +338,7 @@ impl Lease {
     /// the duration in `pulse` has passed since this relay forwarded the renewal.
     ///
     /// This relay's first lease in a view is not granted if `next`, the duration in the next renewal, is more than
-    /// twice as long as that in `pulse`. It would expire before the next renewal completes.
+    /// twice as long as the duration in `pulse`. The lease would expire before the next renewal completes.
     fn grant(&mut self, context: &Context<'_>, pulse: Current, next: u16) {
         let now = context.now;
         let Some(forwarded_at) = self.circulation.started_at() else {
@@ -362,7 +364,7 @@ impl Lease {
     }
 
     /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this one.
+    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this relay.
     fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {

@@ -38,7 +38,8 @@ use crate::time::{Instant, Jitter};
 use crate::wire::digest::{MissionId, between};
 use crate::wire::upload::{Upload, UploadError, check_line};
 
-/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0 stands for none.
+/// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0 means that there is no
+/// nonce.
 ///
 /// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
 #[derive(Clone, Copy, Debug)]
@@ -51,9 +52,9 @@ struct Asked {
 /// State of this relay's mission offers on one side, to the neighbour and to the ground station.
 #[derive(Clone, Copy, Debug)]
 struct Offering {
-    /// Nonce in the neighbour's last hello, 0 before any. An offer to the neighbour repeats it.
+    /// Nonce in the neighbour's last hello, 0 without a hello. An offer to the neighbour repeats this nonce.
     nonce: u16,
-    /// Time at which the neighbour's last hello was received; `None` before any.
+    /// Time at which the neighbour's last hello was received; `None` without a hello.
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
@@ -99,7 +100,7 @@ const OFFERS_AT_A_PACE: u8 = 4;
 /// Maximum number of repetitions of a mission offer to one neighbour.
 const OFFERS: u8 = 16;
 
-/// Missions that one relay has stored, and its offers of the newest one to its neighbours.
+/// Missions that one relay has stored, and its offers of the newest mission to its neighbours.
 #[derive(Clone, Debug)]
 pub(crate) struct MissionUpdate {
     /// Identifier of the newest mission that this relay has stored.
@@ -111,9 +112,9 @@ pub(crate) struct MissionUpdate {
 /// State of mission uploads, which only builds with the feature `upload` have.
 #[derive(Clone, Copy, Debug)]
 struct Uploads {
-    /// Newest mission that was uploaded to this relay; `None` if it has only the one loaded before flight.
+    /// Newest mission that was uploaded to this relay; `None` if it has only the mission loaded before flight.
     upload: Option<Upload>,
-    /// Positions of Tx and Rx that the active mission has of its own; `None` for the configured ones. All x are
+    /// Positions of Tx and Rx that the active mission states; `None` if the configured positions apply. All x are
     /// measured along the line between them.
     sites: Option<Sites>,
     /// Distance from Tx to Rx of the mission loaded before flight, m.
@@ -121,8 +122,8 @@ struct Uploads {
     /// Range of altitudes in the mission loaded before flight, m. It includes the permitted range and the common
     /// altitude.
     loaded_band: Band,
-    /// Identifier of the last mission that a relay has refused; `None` if there is none. It was refused by this
-    /// relay, a neighbour, or a relay that is farther away.
+    /// Identifier of the last mission that a relay has refused; `None` if there is none. This relay, a neighbour or a
+    /// relay farther away has refused it.
     refused: Option<MissionId>,
     /// Current nonce (random number) in this relay's hellos, and the previous one. A mission offer must repeat one of
     /// them.
@@ -132,7 +133,7 @@ struct Uploads {
     jitter: Jitter,
 }
 
-/// Returns true if this relay accepts uploaded missions. It does if its frames are signed.
+/// Returns true if this relay accepts uploaded missions. It accepts them if its frames are signed.
 pub(crate) const fn accepts_uploads(member: &Member) -> bool {
     UPLOAD && member.settings.auth.is_some()
 }
@@ -198,8 +199,8 @@ impl MissionUpdate {
         current.number
     }
 
-    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. Recent is within the last
-    /// two `dead_after`.
+    /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. "Recent" means within the
+    /// last two `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -245,8 +246,8 @@ impl MissionUpdate {
     /// Returns the pending mission offer to the neighbour `to` at `side`, and marks it as sent.
     ///
     /// `holds` is the newest mission that the neighbour has reported; `None` if unknown. The returned number is the
-    /// nonce of the neighbour's hello, which the offer repeats. It is `None` if the hello is older than half of
-    /// `dead_after`, so that a new one must be requested first.
+    /// nonce of the neighbour's hello, which the offer repeats. The number is `None` if the hello is older than half
+    /// of `dead_after`. A new hello must then be requested first.
     pub(crate) fn poll_offer(
         &mut self,
         (side, to): (Side, u16),
@@ -286,8 +287,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules replies to the ground station at `side`. It is sent a hello if `reports` is true, and the stored
-    /// upload if `asks` has a request's number.
+    /// Schedules replies to the ground station at `side`. If `reports` is true, the reply is a hello. If `asks` is
+    /// the number of a request, the stored upload is sent.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -316,7 +317,7 @@ impl MissionUpdate {
     }
 
     /// Records a neighbour's report that the mission `refused` is refused. Returns true if this is the stored
-    /// mission, and news.
+    /// mission, and its refusal was not known yet.
     pub(crate) fn record_refused(&mut self, refused: MissionId) -> bool {
         refused == self.latest && self.refuse(refused)
     }
@@ -386,7 +387,7 @@ impl MissionUpdate {
         Ok(mission)
     }
 
-    /// Returns the stored mission if it was uploaded; `None` if only the one loaded before flight is known.
+    /// Returns the stored mission if it was uploaded; `None` if only the mission loaded before flight is known.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         match self.uploads() {
             Some(uploads) => uploads.upload.as_ref(),
@@ -434,7 +435,7 @@ impl MissionUpdate {
 
 /// Methods for the Tx and Rx positions of the active mission, which define its x axis.
 impl MissionUpdate {
-    /// Returns the positions of Tx and Rx that the active mission has of its own. `None` if the configured positions
+    /// Returns the positions of Tx and Rx if the active mission states them. `None` if the configured positions
     /// apply.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.uploads()?.sites
@@ -445,8 +446,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Replaces the Tx and Rx positions in use by those of the stored mission, which becomes active. Returns true if
-    /// the positions have changed, which makes all relay positions invalid.
+    /// Replaces the Tx and Rx positions in use by the positions of the stored mission, which becomes active. Returns
+    /// true if the positions have changed, which makes all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();
@@ -468,9 +469,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the limit exceeded.
     ///
-    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. A relay with a fixed
-    /// altitude may have that altitude as the lower or upper limit of its geofence. The limit of the loaded mission
-    /// then counts instead, because all relays must decide alike.
+    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. If a relay has a fixed
+    /// altitude, this altitude may be the lower or upper limit of its geofence. Then the limit of the loaded mission
+    /// counts instead, because all relays must decide alike.
     fn encloses(
         &self,
         member: &Member,

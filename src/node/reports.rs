@@ -29,37 +29,41 @@ use crate::side::Side;
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
-/// Time after the last Watch for which a relay reports.
+/// Time for which a relay sends reports after its last Watch. A Watch is a ground station's request for reports.
 const WATCHED: Duration = Duration::from_millis(60_000);
 
-/// Time after a Watch for which its sender is the destination of reports. Four lost ones do not change it.
+/// Time for which a relay sends its reports to the node from which it received the last Watch (request for reports).
+/// Four lost Watches in a row do not change this destination.
 const DESTINED: Duration = Duration::from_millis(25_000);
 
-/// Time without any frame of a relay after which it is the destination of reports no longer.
+/// Time without any frame from a relay after which no more reports are sent to it.
 const UNHEARD: Duration = Duration::from_millis(2_500);
 
-/// Time without a report from a relay after which a Watch to it is repeated.
+/// Time without a report from a relay after which the Watch (request for reports) to this relay is repeated.
 const UNCONFIRMED: Duration = Duration::from_millis(3000);
 
-/// Maximum number of doublings of the time between two such repetitions.
+/// Maximum number of times that the interval doubles between repetitions of a Watch (request for reports).
 const MOST_DOUBLINGS: u8 = 3;
 
-/// Minimum time between two repetitions of a Watch to relays that have not received it.
+/// Minimum time between two repetitions of a Watch (request for reports) to relays that have not received it.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Time by which telemetry waits for an agreement on a shared channel, at most.
+/// Maximum time by which a report is delayed on a shared channel while the relays agree on positions.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 
-/// The same for the first agreement.
+/// Maximum time by which a report is delayed on a shared channel during the first agreement on positions.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
-/// Time by which a report that begins an alarm may be ahead of the share of the channel.
+/// Time by which a report that begins an alarm may be sent early. Other reports wait until the telemetry's share of
+/// the data rate allows them.
 const AHEAD: Duration = Duration::from_millis(2_000);
 
-/// Minimum time between the states of two own entries, more than [`ROUNDING`].
+/// Minimum time between the states in two entries of one relay. An entry is the state of a relay in a report. This
+/// time is longer than [`ROUNDING`].
 const STEP: Duration = Duration::from_millis(400);
 
-/// Maximum difference of the times of one entry that was received on two ways. Each relay rounds the age.
+/// Maximum time difference between two copies of an entry (relay's state) that came by different ways. The copies
+/// differ because each relay rounds the age of an entry.
 const ROUNDING: Duration = Duration::from_millis(300);
 
 /// Age above which a position of the drone counts as unknown.
@@ -68,95 +72,98 @@ const OLD: Duration = Duration::from_millis(2_000);
 /// Minimum time between two reports of a relay.
 const LEAST_PERIOD: Duration = Duration::from_millis(500);
 
-/// Age from which an entry is not handed on. An age of 255 tenths of a second has no upper limit.
+/// Age from which an entry (relay's state in a report) is no longer forwarded. The largest age in a message, 25.5 s,
+/// also stands for any larger age.
 const OLDEST: Duration = Duration::from_millis(25_000);
 
-/// Number of stored entries of other relays.
+/// Number of entries (states of other relays) that a relay stores until it forwards them.
 const STORED: usize = 16;
 
-/// Bytes of a report without its entries, with frame and tag.
+/// Length of a report without its entries, including frame and tag, bytes.
 const FRAME: u32 = 32;
 
-/// Assumed bytes of an entry, with its shares of a frame and of details.
+/// Assumed length of an entry (relay's state) in a report, bytes. It includes a part of the frame and of the details.
 const SHARE: u32 = 24;
 
-/// Reports of one relay, and those that it hands on.
+/// Reports of this relay, and the reports of other relays that it forwards to a ground station.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reporting {
-    /// Last position of the drone, and when it was measured.
+    /// Last position of the drone and the time of its measurement; `None` if unknown.
     position: Option<(Instant, Placement)>,
     /// Control state of the drone, from 1; 0 without an autopilot.
     control: u16,
-    /// Last measured interference, W; 0 before any.
+    /// Last measured interference, W; 0 without a measurement.
     power_w: f32,
-    /// Time of the state in the last own entry.
+    /// Time of the state in the last entry that this relay sent about itself.
     reported: Instant,
     stored: Vec<Stored, STORED>,
     watched: [Watched; 2],
-    /// Time of the last call of `handle_timeout`: what is due then is not the next timeout.
+    /// Time of the last call of `handle_timeout`. Timers that were due at that time are left out of the next timeout.
     checked: Instant,
 }
 
-/// Entry of another relay that is to be handed on.
+/// Entry (state of another relay) that this relay has received and forwards.
 #[derive(Clone, Debug)]
 struct Stored {
     entry: Entry,
     detail: Option<Detail>,
-    /// Time of the relay's state.
+    /// Time at which the relay was in the state of this entry.
     at: Instant,
-    /// Time from which the entry may be sent. After it has been sent, a newer one should arrive before.
+    /// Earliest time at which the entry may be sent. Once it was sent, this time is so late that a newer entry should
+    /// replace it first.
     from: Instant,
     rank: Rank,
 }
 
-/// Order in which stored entries are sent, the last one first.
+/// Order in which stored entries (relays' states) are sent: the last rank first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Rank {
-    /// Sent before.
+    /// The entry was sent already.
     Sent,
     New,
-    /// New, and begins an alarm.
+    /// The entry was not sent yet, and begins an alarm.
     Alarm,
 }
 
-/// Side with a ground station that watches.
+/// State of the reports toward one side, at which a ground station requests reports.
 #[derive(Clone, Copy, Debug, Default)]
 struct Watched {
     number: u16,
     until: Instant,
-    /// Node that reports are sent to, until a time; `None` for the neighbour.
+    /// Node to which reports are sent until the time `to_until`; `None` for the neighbour.
     to: Option<u16>,
     to_until: Instant,
-    /// Time of the last frame of that node, also of one to another node.
+    /// Time of the last frame from node `to`, whatever the destination of the frame.
     heard: Instant,
-    /// Number of the last Watch from the relay four numbers nearer to the station.
+    /// Number of the last Watch (request for reports) from the relay that is four numbers nearer to the station.
     far_number: u16,
-    /// Bit mask of the distances of nodes to which the Watch is to be handed on, and when.
+    /// Nodes to which the Watch (request for reports) must be forwarded at the time `hand_on_at`. A bit mask of their
+    /// distances from this relay.
     hand_on: u8,
     hand_on_at: Instant,
-    /// Time of the last report from the relay four numbers farther from the station. `unconfirmed` counts Watches to it
-    /// since then.
+    /// Time of the last report from the relay that is four numbers farther from the station. `unconfirmed` counts the
+    /// Watches (requests for reports) sent to this relay since then.
     confirmed: Instant,
     unconfirmed: u8,
-    /// Node to which a handshake is due that requests a reply.
+    /// Node to which a handshake must be sent that requests a reply; `None` if there is none.
     to_greet: Option<NonZeroU16>,
-    /// Time of the next report, at least `free`.
+    /// Time at which the next report must be sent; not earlier than `free`.
     due: Instant,
-    /// Time from which the share of the channel allows a report.
+    /// Time from which the telemetry's share of the data rate allows a report.
     free: Instant,
-    /// Time from which the own entry is part of a report.
+    /// Time from which this relay's own entry (its state) is part of a report.
     own_from: Instant,
-    /// Number of own entries, wrapping.
+    /// Number of entries that this relay has sent about itself, wrapping.
     count: u8,
-    /// True if entries have arrived since the last report.
+    /// True if entries of other relays have arrived since the last report.
     is_fed: bool,
-    /// True if the own control state begins an alarm that has not been reported.
+    /// True if this relay's control state begins an alarm that has not been reported.
     is_alarmed: bool,
-    /// True if an entry that begins an alarm is stored and has not been sent.
+    /// True if a stored entry (state of another relay) begins an alarm and has not been sent.
     stores_alarm: bool,
 }
 
-/// State of the relay for its own entry: the number of an entry's state, setpoint and agreed position.
+/// State that this relay reports about itself: a number for its condition, setpoint and agreed position.
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
@@ -168,8 +175,8 @@ impl Reporting {
         self.power_w = power_w;
     }
 
-    /// Takes the control state. A change is reported as soon as the share of the channel allows, the beginning of an alarm
-    /// earlier.
+    /// Records the drone's control state. A change is reported as soon as the telemetry's share of the data rate
+    /// allows it. The beginning of an alarm is reported earlier.
     pub(crate) fn handle_control(&mut self, control: u16) {
         let before = core::mem::replace(&mut self.control, control);
         if before == control {
@@ -181,14 +188,14 @@ impl Reporting {
         }
     }
 
-    /// Records a frame of node `from`, to whichever node.
+    /// Records that a frame of node `from` was received, whatever its destination.
     pub(crate) fn handle_frame(&mut self, now: Instant, from: u16) {
         for watched in self.watched.iter_mut().filter(|it| it.to == Some(from)) {
             watched.heard = now;
         }
     }
 
-    /// Schedules a Watch for node `from` at `side`, which could not verify an earlier one.
+    /// Schedules a Watch (request for reports) for node `from` at `side`. The node could not verify an earlier Watch.
     pub(crate) fn handle_session(&mut self, now: Instant, member: &Member, side: Side, from: u16) {
         let distance = from.abs_diff(member.node);
         let watched = self.at(side.other());
@@ -198,8 +205,8 @@ impl Reporting {
         }
     }
 
-    /// Handles a Watch or a Report from node `from` at `side`. Returns false if an entry is of a relay that is not
-    /// behind `from`.
+    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry
+    /// belongs to a relay from which no report can come by way of `from`.
     pub(crate) fn handle(
         &mut self,
         now: Instant,
@@ -215,8 +222,9 @@ impl Reporting {
         true
     }
 
-    /// Returns the next Watch or Report with its side and its destination; `None` if none is due. It is sent `wait` later
-    /// than it is due, because an agreement needs the channel.
+    /// Returns the next Watch (request for reports) or Report, with its side and its destination. `None` if none is
+    /// due. During an agreement on positions the message is delayed by `wait`, because the agreement needs the
+    /// channel.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -266,7 +274,7 @@ impl Reporting {
         None
     }
 
-    /// Returns the next node to which a handshake is due that requests a reply.
+    /// Returns the next node to which a handshake must be sent that requests a reply; `None` if there is none.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         let mut watched = self.watched.iter_mut();
         watched.find_map(|watched| watched.to_greet.take().map(NonZeroU16::get))
@@ -277,17 +285,17 @@ impl Reporting {
         self.checked = now;
     }
 
-    /// Returns true if a Watch or a Report may be due.
+    /// Returns true if a Watch (request for reports) or a Report may be due at `now`.
     pub(crate) fn is_due(&self, now: Instant, wait: Duration) -> bool {
         self.times(wait).any(|at| at <= now)
     }
 
-    /// Returns the time of the next Watch or Report.
+    /// Returns the time of the next Watch (request for reports) or Report; `None` if there is none.
     pub(crate) fn next_timeout(&self, wait: Duration) -> Option<Instant> {
         self.times(wait).filter(|at| *at > self.checked).min()
     }
 
-    /// Returns the times at which a Watch or a Report is due.
+    /// Returns the times at which a Watch (request for reports) or a Report is due.
     fn times(&self, wait: Duration) -> impl Iterator<Item = Instant> {
         let times = self.watched.iter().flat_map(move |watched| {
             let hand_on = (watched.hand_on != 0).then(|| watched.hand_on_at + wait);
@@ -302,9 +310,11 @@ const fn earlier(at: Instant, span: Duration) -> Instant {
     Instant::from_micros(at.as_micros().saturating_sub(span.as_micros()))
 }
 
-/// Returns true if a change of the control state, each from 1 or 0 if unknown, begins an alarm.
+/// Returns true if the change of the control state from `before` to `now` begins an alarm. Each state is a number
+/// from 1; 0 stands for unknown.
 ///
-/// The autopilot is not received or has no position any more, or the relay no longer controls the drone.
+/// An alarm begins if the autopilot is no longer received, or has no position any more, or if the relay no longer
+/// controls the drone.
 const fn begins_alarm(before: u16, now: u16) -> bool {
     const SILENT: u16 = State::Silent as u16 + 1;
     const ENGAGED: u16 = State::Engaged as u16 + 1;
@@ -324,7 +334,7 @@ const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
     }
 }
 
-/// Returns the neighbour at `side`, or Tx or Rx beyond the last relay; `None` while there is neither.
+/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one; `None` while there is neither.
 fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
     let end = beyond(member, side, 1);
     match neighbours.at(side).node() {
@@ -334,9 +344,10 @@ fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
 }
 
 impl Watched {
-    /// Ends the watch 60 s after the last request, and forgets destinations.
+    /// Ends the reports 60 s after the last request for them, and drops silent destinations.
     ///
-    /// A destination is forgotten if it has sent no request for 25 s, or as a relay nothing at all for 2.5 s.
+    /// A destination is dropped if it has sent no request for 25 s. A destination that is a relay is also dropped if
+    /// it has sent no frame for 2.5 s.
     fn expire(&mut self, now: Instant, member: &Member) {
         let is_unheard =
             now >= self.heard + UNHEARD && self.to.is_some_and(|to| is_relay(member, to));
@@ -347,7 +358,8 @@ impl Watched {
         }
     }
 
-    /// Returns the time of the next report; `None` while nobody watches. The beginning of an alarm does not `wait`.
+    /// Returns the time of the next report; `None` while no ground station requests reports. A report is delayed by
+    /// `wait`, unless it begins an alarm.
     fn report_at(&self, wait: Duration) -> Option<Instant> {
         let mut at = self.due.max(self.free) + wait;
         let ahead = earlier(self.free, AHEAD);
@@ -451,8 +463,9 @@ impl Reporting {
         true
     }
 
-    /// Stores an entry if it is newer than that of the same relay. If the store is full, the oldest entry that was sent, or
-    /// else the oldest one, is dropped. Returns true if the entry begins an alarm.
+    /// Stores an entry if it is newer than the stored entry of the same relay. If the store is full, the oldest entry
+    /// that was already sent is dropped; if none was sent, the oldest entry. Returns true if the entry begins an
+    /// alarm.
     fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
         let mut stored = Stored {
             entry,
@@ -582,11 +595,12 @@ impl Reporting {
         (entries > 0).then_some(report)
     }
 
-    /// Returns the time between two reports for each byte of the first one. Reports of all relays then take an eleventh of
-    /// the data rate.
+    /// Returns the time between two reports, divided by the length of the first report in bytes. With this time the
+    /// reports of all relays take an eleventh of the data rate.
     ///
-    /// The data rate is at least a sweep in a `hop_time`. A shared channel has at least 2350 bytes for each relay in a `probe_after`, see
-    /// [`ChannelLoad`](crate::ChannelLoad): relays may also take a tenth of these, each in proportion to its load.
+    /// The data rate is at least one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes for
+    /// each relay in a `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). Relays may take a tenth of these
+    /// bytes, each in proportion to its load.
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
         let hop = (settings.hop_time.as_micros() * 106 / 1_200).clamp(1, 1 << 24);
@@ -609,7 +623,7 @@ fn micros(span: Duration) -> u32 {
     u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
 }
 
-/// Returns the number of relays up to the end of the chain at `side`, this one included.
+/// Returns the number of relays from this relay to the end of the chain at `side`, including this relay.
 const fn from_end(member: &Member, side: Side) -> u16 {
     match side {
         Side::Upstream => member.node,
@@ -617,9 +631,11 @@ const fn from_end(member: &Member, side: Side) -> u16 {
     }
 }
 
-/// Returns the assumed bytes that a relay sends in a period. `distance` is its distance from the station, in numbers.
+/// Returns the number of bytes that a relay is assumed to report in each period. `distance` is the difference between
+/// its number and the station's number.
 ///
-/// These are its own entry, and those of the relays four, eight and so on numbers farther from the station.
+/// These bytes are the relay's own entry (its state), and the entries of the relays that are 4, 8, 12 and so on
+/// numbers farther from the station.
 const fn load(member: &Member, distance: u16) -> u32 {
     let behind = member.all.saturating_sub(distance) / CANDIDATES;
     SHARE * (behind as u32 + 2)
@@ -632,7 +648,8 @@ const fn all_loads(member: &Member) -> u32 {
     SHARE * (2 * all + fours * (2 * fours).saturating_sub(2) + rest * fours)
 }
 
-/// Returns the time between two reports of a relay. On wires it is that of the relay nearest to the station, which has the most to send.
+/// Returns the time between two reports of a relay. On wires the result is the time of the relay nearest to the
+/// station, because this relay has the most to send.
 fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     let bytes = match member.settings.wiring {
         Wiring::Pair => 28 * (u32::from(member.all) + 1), // an eighth is in reserve
@@ -641,7 +658,8 @@ fn period(member: &Member, side: Side, byte: Duration) -> Duration {
     byte.times(bytes).max(LEAST_PERIOD)
 }
 
-/// Returns the age in tenths of a second, rounded. It includes 20 ms for the transmission.
+/// Returns the age at `now` of a state of the time `at`, in tenths of a second, rounded. It includes 20 ms for the
+/// transmission.
 fn age(now: Instant, at: Instant) -> u8 {
     let tenths = micros(now.since(at)).saturating_add(70_000) / 100_000;
     u8::try_from(tenths).unwrap_or(u8::MAX)

@@ -39,8 +39,8 @@ pub enum Sample {
     /// [`Listen`](crate::sensing::Listen). It excludes the signals of the chain, and includes the receiver's noise,
     /// which the relay subtracts (`MissionConfig::noise_w`).
     Heard {
-        /// Position of the drone at the measurement. Each coordinate differs from that of Tx by at most 100 times the
-        /// distance from Tx to Rx.
+        /// Position of the drone at the measurement. Each coordinate differs from the coordinate of Tx by at most 100
+        /// times the distance from Tx to Rx.
         at: Placement,
         /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
         power_w: f32,
@@ -51,8 +51,9 @@ pub enum Sample {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// Mean interference power measured at Rx, on the ground. The firmware gives the value to the last relay of the view. It may also give
-    /// it to the three relays before that one, each of which uses it when it is the last relay.
+    /// Mean interference power measured at Rx, on the ground. The firmware gives the value to the last relay of the
+    /// view. It may also give the value to the three relays before the last relay. Such a relay uses the value once
+    /// it is the last relay itself.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
@@ -65,7 +66,8 @@ pub enum Sample {
 }
 
 impl Sample {
-    /// Returns true for measurements from which an unknown interferer is estimated. They need `Settings::listen`.
+    /// Returns true for measurements from which an unknown interferer is estimated. Such measurements need
+    /// `Settings::listen`.
     pub(crate) const fn is_heard(self) -> bool {
         matches!(
             self,
@@ -94,8 +96,8 @@ impl Meter {
         }
     }
 
-    /// Adds a sample; returns true if it was accepted. `at` is relay 1's setpoint, by which a measured SIR of the
-    /// first hop is converted to interference; `None` at other relays.
+    /// Adds a sample; returns true if it was accepted. `at` is relay 1's setpoint, needed to convert a measured SIR
+    /// of the first hop to interference; `None` at other relays.
     pub(crate) fn take(
         &mut self,
         mission: &Mission,
@@ -164,11 +166,12 @@ pub(super) struct SensorState {
     pub(super) left_out: u16,
     /// Node whose sensor was found faulty, by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
-    /// State of the leader's search for a faulty sensor. It leaves out one relay's measurements after the other.
+    /// State of the leader's search for a faulty sensor. The search leaves out the measurements of one relay after
+    /// the other.
     pub(super) trial: Trial,
     /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
-    /// True if the last collected measurements contradict each other, and the faulty sensor was not found.
+    /// True if the last collected measurements contradict each other, but the faulty sensor was not found.
     pub(super) contradicted: bool,
     /// True if this relay measures nothing where the other relays' measurements predict interference.
     pub(super) deaf: bool,
@@ -180,7 +183,7 @@ pub(super) struct SensorState {
     pub(super) is_distributed: bool,
     /// Amount and expected error of the measurements from which the current estimate was made.
     pub(super) known: Knowledge,
-    /// Reason why the last collected measurements gave no estimate; `None` if they gave one.
+    /// Reason why the last collected measurements gave no estimate; `None` if they gave an estimate.
     pub(super) unfit: Option<Unfit>,
     /// Interval between two collections of measurements along the chain, as a multiple of `Listen::every`.
     pub(super) wait: u32,
@@ -277,8 +280,8 @@ impl Sensing {
         }
     }
 
-    /// Returns the reason why the last measurements gave no estimate. `None` if they gave one, and at other relays
-    /// than the leader.
+    /// Returns the reason why the last measurements gave no estimate. `None` if they gave an estimate, and always
+    /// `None` at other relays than the leader.
     pub(crate) const fn unfit(&self) -> Option<Unfit> {
         match self.sensor() {
             Some(sensor) => sensor.unfit,
@@ -382,8 +385,8 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Returns the changes from `before` to these findings. A faulty ground station is node 0 (Tx) or node `all` + 1
-    /// (Rx), where `all` is the number of relays.
+    /// Returns the changes from the findings `before` to these findings. A faulty ground station is node 0 (Tx) or
+    /// node `all` + 1 (Rx), where `all` is the number of relays.
     #[inline(never)] // called from several places
     pub(super) fn since(&self, before: &Self, member: &Member) -> Sensed {
         let off = if self.off != before.off && self.off != 0 {
@@ -406,7 +409,7 @@ impl Findings {
 /// Adds the power that a ground station (Tx or Rx) has measured to that station's `average`. Returns false if the
 /// power is not above the noise.
 ///
-/// `heard_w` is the measured power less the receiver noise, W; `None` if it is not above the noise.
+/// `heard_w` is the measured power minus the receiver noise, W; `None` if the power is not above the noise.
 fn take_level(
     average: &mut Average,
     now: Instant,

@@ -27,7 +27,7 @@ pub(crate) struct Steering {
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: first place, start, duration, and time of the next step.
+/// Motion to a new agreed position: position at its start, time of its start, duration, and time of the next step.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from: Placement,
@@ -39,10 +39,11 @@ struct Motion {
 /// Stepwise motion of the setpoint to a new agreed position. All relays of a chain thus arrive at the same time.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call, and the place to fly to now. That place approaches the agreed position in steps.
+    /// Agreed position at the last call, and the position to fly to now. The position to fly to approaches the agreed
+    /// position in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
-    /// Motion to the agreed position; `None` once the place to fly to is there.
+    /// Motion to the agreed position; `None` once the position to fly to has reached the agreed position.
     motion: Option<Motion>,
 }
 
@@ -53,7 +54,8 @@ impl Way {
         motion: None,
     };
 
-    /// Moves the place to fly to by the steps that are due toward the position `agreed`, and returns it.
+    /// Advances the position to fly to at `now`, and returns it; `None` without an agreed position. If the agreed
+    /// position `agreed` has changed, the position to fly to moves there in small steps within the time `span`.
     fn advance(
         &mut self,
         now: Instant,
@@ -84,7 +86,7 @@ impl Way {
         self.wanted
     }
 
-    /// Moves the place to fly to by the steps of the current motion that are due.
+    /// Moves the position to fly to by those steps of the current motion that are due at `now`.
     fn step(&mut self, now: Instant) {
         let (Some(motion), Some(to)) = (&mut self.motion, self.agreed) else {
             return;
@@ -179,7 +181,7 @@ impl Steering {
         matches!(&self.way[..], [way] if way.motion.is_some())
     }
 
-    /// Returns the place to fly to if the motion stops now; `None` before the first agreement.
+    /// Returns the position to fly to if the motion stops now; `None` until the chain has agreed.
     pub(crate) fn stopped(&self) -> Option<Placement> {
         self.way.first()?.wanted
     }
@@ -218,8 +220,8 @@ impl Steering {
         }
     }
 
-    /// Records at `now` that the drone follows the setpoints if `flown` is true, else that it does not. Returns true
-    /// if that is a change for the guard.
+    /// Records at `now` if the drone follows the setpoints: yes if `flown` is true. Returns true if this is a change
+    /// for the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -250,9 +252,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint. They are no longer in the air. `others` is
-    /// true if other relays of the view at that side are not lost. If none of these was received, the guard does not
-    /// move toward that side.
+    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air.
+    /// `others` is true if some relays of the view at this side are not lost. Until the guard has received such a
+    /// relay, it does not move the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -291,7 +293,7 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that agreements that come faster than the motion's duration do not put off its end.
+    /// Checks that the motion ends in time although new agreements arrive faster than its duration.
     #[test]
     fn frequent_agreements_do_not_put_off_the_arrival() {
         let span = Duration::from_millis(20_000);

@@ -33,7 +33,7 @@ use crate::sir::{Sender, square};
 
 /// Hop from Rx to the last relay: the first hop of data from Rx to Tx.
 pub(super) struct FromRx {
-    /// Hop from Rx in a mirrored frame: x is the distance from Rx.
+    /// Hop from Rx in a mirrored coordinate frame: x is the distance from Rx.
     hop: Hop,
     reverse: f32,
     distance_m: f32,
@@ -71,8 +71,9 @@ impl FromRx {
 
     /// Returns the SIR margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
     ///
-    /// `target` determines the required SIR. The factor D, the distance from Tx to Rx, makes the margin a length like
-    /// the other slacks. It is below 0 if the hop misses `target`, and continuous in `target`.
+    /// `target` determines the required SIR. The factor D, the distance from Tx to Rx, makes the margin a length,
+    /// like the slack of a chain. The margin is below 0 if the hop misses `target`. It is a continuous function of
+    /// `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -82,8 +83,8 @@ impl FromRx {
     }
 
     /// Returns the largest x in [`least_m`, `x_m`] at which the last relay receives Rx well enough, m. The backward
-    /// SIR has to meet `target`. `None` if there is no such x. Only for an `x_m` at which the last relay misses the
-    /// target.
+    /// SIR has to meet `target`. `None` if there is no such x. Call it only if the last relay misses the target at
+    /// `x_m`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -98,8 +99,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay is placed farther from Rx if it otherwise receives Rx too weakly. At x = 650 m,
-    /// where the search begins, a strong interferer at x = 700 m prevents that. Rx is at x = 1000 m.
+    /// Checks that the last relay is placed farther from Rx if its SIR from Rx is otherwise too low. The search
+    /// begins at x = 650 m. There, a strong interferer at x = 700 m makes this SIR too low. Rx is at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -19,11 +19,12 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target SIR at the lower end of the ladder's middle gap, linear. With 16 targets it is the eighth. It is the only target if the
-    /// ladder has one target.
+    /// Target SIR at the lower end of the ladder's middle gap, linear. With 16 targets it is the eighth target. In a
+    /// ladder with a single target it is this target.
     anchor: f32,
-    /// Code of the width of the middle gap between two targets, relative to the lower one. It is a float of 5
-    /// exponent and 3 mantissa bits. Code 0: `anchor` is the only target.
+    /// Code of the relative width of the gap between the two middle targets. The width is the difference of the two
+    /// targets divided by the lower target. The code is a float of 5 exponent and 3 mantissa bits. Code 0: `anchor`
+    /// is the only target.
     gap: u8,
     /// Code of the growth of the gaps between targets from the middle of the list to its ends. Each gap is 1 +
     /// `growth` / 16 times the next one toward the middle.
@@ -34,8 +35,8 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// Returns a ladder (list of targets) with the single SIR `target`, above 0. The last relay commits the chain to
-    /// it if it is met.
+    /// Returns a ladder (list of targets) with the single SIR `target`, above 0. If the chain meets `target`, the
+    /// last relay commits the chain to it.
     pub const fn single(target: f32) -> Self {
         Self {
             anchor: target,
@@ -45,14 +46,14 @@ impl Ladder {
         }
     }
 
-    /// Returns the same targets, for a plain pass if `plain` is true. In it every relay takes the farthest x that
-    /// meets the target.
+    /// Returns the same targets, for a plain pass if `plain` is true. In a plain pass every relay takes the farthest
+    /// x that meets the target.
     pub const fn plainly(self, plain: bool) -> Self {
         Self { plain, ..self }
     }
 
-    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In others a
-    /// relay may stay short of it to help the next relay.
+    /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In any other
+    /// pass a relay may stay short of this x to help the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }
@@ -106,8 +107,8 @@ impl Ladder {
         }
     }
 
-    /// Decodes a list of targets; `None` if it is invalid. It is valid if all targets are normal f32s above zero, and
-    /// the encoding is unique. A single target (`gap` 0) must have `growth` 0.
+    /// Decodes a ladder (list of targets); `None` if it is invalid. A ladder is valid if all targets are normal f32s
+    /// above zero, and the encoding is unique. A single target (`gap` 0) must have `growth` 0.
     pub fn from_parts(anchor: f32, gap: u8, growth: u8) -> Option<Self> {
         let ladder = Self {
             anchor,
@@ -128,7 +129,8 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true if there is a single target. The last relay commits the chain to it if it is feasible.
+    /// Returns true if the ladder has a single target. If this target is feasible, the last relay commits the chain
+    /// to it.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
@@ -172,8 +174,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns the highest target of a ladder over the lower of its two middle targets. The other half has the same
-/// ratio. `gap` and `growth` are the codes in a [`Ladder`].
+/// Returns a ladder's highest target divided by the lower of its two middle targets. The higher middle target divided
+/// by the lowest target gives the same ratio. `gap` and `growth` are the codes in a [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -188,8 +190,8 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative width of the gap between two targets. It is (1 + m / 8) 2^(e - 25), encoded by the byte
-/// `code`. m are the low three bits, e the other five.
+/// Returns the relative width of the gap between two targets, encoded by the byte `code`. The width is (1 + m / 8)
+/// 2^(e - 25). m is the number in the low three bits of `code`, e the number in the other five bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }

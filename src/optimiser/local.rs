@@ -29,8 +29,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals on each side of the interferer at whose ends the search evaluates hops. For traffic in
-/// both directions only.
+/// Number of equal intervals of x on each side of the interferer. The search evaluates both hops at the ends of the
+/// intervals. Only for traffic in both directions.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -45,14 +45,14 @@ pub enum Local {
     Fine,
     /// Search on the paper's grid of positions, with `columns` times `rows` evaluations of both hops.
     Grid {
-        /// Number of positions of the grid along x, including those of the neighbours, 2 to 255.
+        /// Number of positions of the grid along x, including the positions of the neighbours, 2 to 255.
         columns: u8,
         /// Number of altitudes (rows) in the grid of candidate positions, 2 to 255.
         rows: u8,
     },
 }
 
-/// Neighbour of the relay that searches its best position: the other end of one of its two hops.
+/// Neighbour of the relay that searches its best position, as an end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
@@ -63,23 +63,25 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Hops of a relay: from the node toward Tx to it, and from it to the node toward Rx. The relay may be anywhere.
+/// Hops of a relay: from the node toward Tx to the relay, and from the relay to the node toward Rx. The relay may be
+/// anywhere.
 ///
-/// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from the
-/// node toward Tx are A q / l, with the gain A, and backward `returned` / l. Those of the hop to the node toward Rx are
-/// `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the required ratio of
-/// backward to forward SIR.
+/// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from
+/// the node toward Tx are A q / l, with the gain A, and backward `returned` / l. The SIRs of the hop to the node
+/// toward Rx are `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the
+/// required ratio of backward to forward SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the hop from the previous node. The hop's SIR is A times inverse interference over squared length.
+    /// Gain A of the hop from the previous node. The hop's SIR is A times the inverse interference, divided by the
+    /// squared length.
     gain: f32,
     /// SIR of the relay's signal at the next node toward Rx, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
-    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
 }
 
@@ -164,7 +166,8 @@ impl Hops {
 
     /// Returns the SIRs of the hops to and from the relay at `at`, linear, computed as in [`crate::sir`].
     ///
-    /// For traffic in both directions, each is the smaller one of the forward SIR and the backward SIR divided by r.
+    /// For traffic in both directions, each result is the smaller of two SIRs: the forward SIR, and the backward SIR
+    /// divided by r. r is the required ratio of backward to forward SIR.
     pub fn both(&self, at: Placement) -> (f32, f32) {
         let (x, h) = (at.x_m, at.altitude_m);
         let s = square(self.interferer.x_m - x) + square(self.interferer.y_m) + square(h);
@@ -185,13 +188,13 @@ impl Hops {
         REVERSE && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the SIR of the worse of both hops with the relay at `at`: the paper's local SIR.
+    /// Returns the SIR of the worse one of the two hops with the relay at `at`: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
     }
 
-    /// Returns true if the hop from the relay at `at` has a lower SIR than the hop to it.
+    /// Returns true if the hop from the relay at `at` has a lower SIR than the hop to this relay.
     fn is_out_worse(&self, at: Placement) -> bool {
         let (incoming, outgoing) = self.both(at);
         incoming > outgoing
@@ -225,7 +228,7 @@ pub struct LocalSearch {
     best_row: (f32, f32),
     /// Best position found so far if it is better than the relay's current position; else `None`.
     found: Option<Placement>,
-    /// Linear SIR of the worse hop at the position found, or at the current position if none is better.
+    /// Linear SIR of the worse hop at the position found, or at the current position if no better position is found.
     best_sir: f32,
     /// Number of evaluations at the current altitude, counted for traffic in both directions only.
     evaluations: u16,
@@ -234,7 +237,8 @@ pub struct LocalSearch {
 impl LocalSearch {
     /// Starts the search of a relay at `at` for the position with the largest SIR of its two hops, `hops`.
     ///
-    /// It reaches up to `explore_m` metres above and below. `band` is the lowest and the highest allowed altitude, m.
+    /// The search reaches up to `explore_m` metres above and below the present altitude. `band` is the lowest and the
+    /// highest allowed altitude, m.
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
@@ -258,8 +262,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. An altitude
-    /// takes 24 evaluations, for traffic in both directions 194.
+    /// Continues the search by at most `budget` evaluations of both hops, plus the evaluations of one altitude. One
+    /// altitude takes 24 evaluations, or 194 for traffic in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
@@ -277,8 +281,8 @@ impl LocalSearch {
         Poll::Pending
     }
 
-    /// Records `at` as the best position if it is allowed and better than all before. Returns the SIR of its worse
-    /// hop, or -1 if it is not allowed.
+    /// Records `at` as the best position if it is allowed and better than all earlier positions. Returns the SIR of
+    /// the worse hop at this position, or -1 if the position is not allowed.
     fn weigh(&mut self, at: Placement) -> f32 {
         self.record(at, self.hops.worse(at))
     }
@@ -295,8 +299,9 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns the altitude at the fraction `part`, 0 to 1, of the range that the current round tries, m. It is
-    /// at most the highest altitude of that range, in spite of rounding.
+    /// Returns an altitude in the range that the current round tries, m. `part` is the altitude's place in this
+    /// range: 0 is the lowest altitude, 1 the highest. The result never exceeds the highest altitude, in spite of
+    /// rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -331,7 +336,7 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the best x at `altitude_m`. For traffic in one direction both hops usually have equal SIRs there.
+    /// Searches the best x at `altitude_m`. For traffic in one direction both hops usually have equal SIRs at this x.
     /// Returns the SIR of the worse hop at the best x found, or -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
@@ -359,8 +364,9 @@ impl LocalSearch {
 
     /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
     ///
-    /// The best of evenly spaced x is improved by steps that halve. A maximum where the SIRs of both hops are equal may
-    /// be narrower than the spacing, so the first two such x are searched by bisection.
+    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where
+    /// the SIRs of both hops are equal may be narrower than the spacing, so the first two x with equal SIRs are
+    /// searched by bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {
@@ -438,8 +444,8 @@ mod tests {
     use crate::place::Placement;
 
     /// Returns a search by a relay between two neighbours 100 m apart, for the tests. `altitude_m` is the relay's
-    /// altitude, and `beside_m` that of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
-    /// altitudes, m.
+    /// altitude, and `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band` the
+    /// allowed altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {

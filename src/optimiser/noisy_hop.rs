@@ -39,7 +39,7 @@ use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum ratio of a hop's target SIR to its gain; with a larger one no hop is short enough. The limit keeps all
+/// Maximum ratio of a hop's target SIR to its gain; with a larger ratio no hop is short enough. The limit keeps all
 /// numbers finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
@@ -53,8 +53,8 @@ pub(super) const HALVINGS: u8 = 32;
 /// with noise meets its target.
 const TURNS: u8 = 5;
 
-/// Rounding error of the margin of a hop with noise, relative to what the target requires. A target that is missed by
-/// at most this counts as met.
+/// Rounding error of the margin of a hop with noise, relative to the value that the target requires. A target that is
+/// missed by at most this error counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of the hop length below which the search for the maximum length ends.
@@ -64,10 +64,11 @@ const CLOSE: f32 = 5e-7;
 /// hop along x at which it meets the target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
-    /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times inverse interference over squared
-    /// length.
+    /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times the inverse interference, divided by
+    /// the squared length.
     pub(super) ratio: f32,
-    /// Difference rho - 1, where rho is the hop's target SIR over its gain. It is computed without cancellation.
+    /// Difference rho - 1, where rho is the hop's target SIR divided by its gain. The difference is computed without
+    /// cancellation.
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
@@ -76,9 +77,9 @@ pub(super) struct NoisyHop {
     /// Squared distance b^2 of the receiver from the sender perpendicular to x, m^2.
     pub(super) across_squared: f32,
     /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the
-    /// interferer, b from the receiver to the sender. It is computed without cancellation.
+    /// interferer, b from the receiver to the sender. The difference is computed without cancellation.
     pub(super) base: f32,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2, above 0.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,
 }
 
@@ -98,7 +99,7 @@ impl NoisyHop {
 
     /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error. g, m^2, is
     /// at least 0 if the hop meets its target SIR. `d` is along x, m, at most the length at which the noise alone
-    /// prevents that.
+    /// prevents that the target is met.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -166,8 +167,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if none does. It is a
-    /// root of the margin g, which is 0 or above at lengths that meet the target.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if none does. This
+    /// length is a root of the margin g, which is 0 or above at lengths that meet the target.
     ///
     /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
@@ -192,8 +193,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target. It is the root of the margin g,
-    /// which is 0 or above at lengths that meet the target.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. This length is the root of the
+    /// margin g, which is 0 or above at lengths that meet the target.
     ///
     /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
@@ -220,7 +221,7 @@ impl NoisyHop {
     }
 }
 
-/// Returns `x_m` - `d`, m, rounded down so far that the result is at least `d` below `x_m`.
+/// Returns `x_m` - `d`, m, rounded down. The result is at least `d` smaller than `x_m`, in spite of rounding.
 pub(super) fn before(x_m: f32, d: f32) -> f32 {
     let place = x_m - d;
     if x_m - place < d {
@@ -249,8 +250,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the length, m, at which a noise-free hop begins to meet its target as it gets longer. `None` if there is
-/// none; the length may be negative. The hop's margin to its target is 0 there, and rises.
+/// Returns the length, m, from which a hop without noise meets its target as it gets longer. `None` if there is no
+/// such length; the length may be negative. The hop's margin to its target is 0 there, and rises.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;

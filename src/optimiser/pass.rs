@@ -27,8 +27,7 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only for data in both
-/// directions.
+/// Maximum number of positions that the last relay tries to receive Rx well enough, with data in both directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of points of an interference field that one call evaluates. One target may need more.
@@ -75,8 +74,8 @@ pub struct Link<'a> {
     /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
     /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// x that this relay takes for every target that its hop meets there, m. Only for fitted slots (time slots as long
-    /// as each hop needs); else `None`.
+    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets at this x. `None` unless
+    /// the mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
@@ -87,7 +86,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
 }
 
 /// Returns the x at which a pass starts: that of Tx, or of Rx in an interference field, m.
-pub(crate) fn origin(mission: &Mission) -> f32 {
+pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
         Heading::TowardTx => mission.config().distance_m,
@@ -95,11 +94,11 @@ pub(crate) fn origin(mission: &Mission) -> f32 {
 }
 
 impl<'a> Link<'a> {
-    /// Appends to `reaches` this relay's reaches for those `targets` that have none in the list yet.
+    /// Appends to `reaches` this relay's reaches for all `targets` whose reach is not in the list yet.
     ///
-    /// `targets` rises, and entry i of each list belongs to target i. `from` has the reaches of the previous relay of
-    /// the pass, m. The list ends before the first target that cannot be met. Work for each target: one computation
-    /// of a hop; in an interference field, up to three for each point of the field.
+    /// `targets` is in ascending order, and entry i of each list belongs to target i. `from` has the reaches of the
+    /// previous relay of the pass, m. The list ends before the first target that cannot be met. Work for each target:
+    /// one computation of a hop; in an interference field, up to three for each point of the field.
     pub fn extend(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) {
         let done = reaches.len();
         let mut pairs = targets.iter().zip(from).skip(done);
@@ -143,7 +142,8 @@ impl<'a> Link<'a> {
     }
 
     /// Continues [`extend`](Self::extend) by bounded work; returns true once all reaches are computed. One call
-    /// computes 16 of them, or in an interference field as many as take 128 evaluations of its points, at least one.
+    /// computes 16 reaches. In an interference field it computes as many reaches as take 128 evaluations of the
+    /// field's points, but at least one.
     pub(crate) fn go_on(&self, targets: &[f32], from: &[f32], reaches: &mut PerTarget) -> bool {
         let points = self.mission.field().map_or(1, |field| field.points().len());
         let due = reaches.len() + (POINTS_AT_ONCE / points.max(1)).clamp(1, TARGETS);
@@ -152,14 +152,14 @@ impl<'a> Link<'a> {
         reaches.len() < due.min(all) || reaches.len() == all
     }
 
-    pub(crate) fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
+    pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
         let mut reaches = PerTarget::new();
         self.extend(&[target], &[from_m], &mut reaches);
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. It must
-    /// meet it in both directions, and two relays must be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
+    /// meet `target` in both directions, and two relays must be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -229,8 +229,8 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop from this relay for which its own x can be smallest. The hop's receiver is at x from `low` to
-    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop with which the x of this relay, its sender, is smallest. The hop's receiver is at x from `low`
+    /// to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -253,9 +253,10 @@ impl<'a> Link<'a> {
 
     /// Returns the chain's slack for `target`, m, and the x of this last relay, m.
     ///
-    /// `reach` is this relay's reach, and `from_m` that of the previous relay. `None` if Rx is out of reach from everywhere.
-    /// Toward Rx the slack is `reach` plus `d_max` less D. Toward Tx it is the maximum length of the first hop less this relay's x, at the
-    /// x that maximises it.
+    /// `reach` is this relay's reach, and `from_m` the reach of the previous relay. `None` if Rx is out of reach from
+    /// everywhere. For a pass toward Rx the slack is `reach` plus the maximum length of the last hop, minus D. For a
+    /// pass toward Tx the slack is the maximum length of the first hop minus this relay's x; the x is chosen so that
+    /// the slack is largest.
     pub fn ending(&self, target: f32, from_m: f32, reach: f32) -> Option<(f32, f32)> {
         let mission = self.mission;
         if mission.field().is_none() {
@@ -313,8 +314,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to this relay, and `slack`
-    /// returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if it would receive Rx too weakly there.
+    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to
+    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach`
+    /// if its SIR from Rx would be too low at `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -345,12 +347,11 @@ impl<'a> Link<'a> {
         (slack(reach).min(margin), reach)
     }
 
-    /// Returns the x that the relay before this one on the pass must take to meet `target`. This relay is at x =
-    /// `place`.
+    /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
-    /// `from_m` is the farthest x of the relay before it on the pass. `None` if that relay has no such position. The
-    /// search assumes that its possible positions are an interval, although there may be holes. Bounded by two reaches,
-    /// in an interference field by three for each of its points.
+    /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
+    /// position. The search assumes that its possible positions are an interval, although there may be holes. Bounded
+    /// by two reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -413,8 +414,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are that
-/// relay's reaches, and `from` those of the relay before it on the pass, m.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the
+/// reaches of this last relay, and `from` the reaches of the relay before it on the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -429,10 +430,11 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this target. `None` if the search
-    /// goes on.
+    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this
+    /// target. `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
-    /// Slack of the chain for each target that every hop can meet, m. It is 0 or more if the chain meets the target.
+    /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
+    /// target.
     pub slacks: PerTarget,
 }
 
@@ -467,9 +469,9 @@ impl Verdict {
     }
 }
 
-/// Returns the number of targets up to the highest one that is met (slack of 0 or more); 0 if none is. If every relay
-/// has the same altitude, all lower targets are met too. In a varying field, and with different altitudes, some may
-/// be missed, and the highest one still counts.
+/// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
+/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different
+/// altitudes, a lower target may be missed; it counts all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -478,20 +480,16 @@ pub(crate) fn met(slacks: &[f32]) -> usize {
 }
 
 /// Computation of a whole chain for one target, in one program and without messages.
-pub(crate) struct Walk<'a, F> {
-    pub(crate) mission: &'a Mission,
-    target: f32,
+#[derive(Debug)]
+pub struct Walk<'a, F> {
+    pub mission: &'a Mission,
+    pub target: f32,
     plain: bool,
     profile_of: &'a F,
 }
 
 impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
-    pub(crate) const fn new(
-        mission: &'a Mission,
-        target: f32,
-        plain: bool,
-        profile_of: &'a F,
-    ) -> Self {
+    pub const fn new(mission: &'a Mission, target: f32, plain: bool, profile_of: &'a F) -> Self {
         Self {
             mission,
             target,
@@ -501,11 +499,11 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     }
 
     /// Returns this chain with relays that all take their farthest x.
-    pub(crate) const fn plainly(&self) -> Self {
+    pub const fn plainly(&self) -> Self {
         Self::new(self.mission, self.target, true, self.profile_of)
     }
 
-    pub(crate) fn link(&self, index: u16) -> Link<'_> {
+    pub fn link(&self, index: u16) -> Link<'_> {
         let before = before(self.mission, index);
         Link {
             mission: self.mission,
@@ -522,7 +520,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
     /// Returns the relays' reaches in the order of the pass, up to a hop that misses the target.
     ///
     /// Each item has the index of a relay, the reach of the relay before it, m, and its own reach, m.
-    fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
+    pub fn reaches(&self) -> impl Iterator<Item = (u16, f32, f32)> {
         let mut reach = origin(self.mission);
         let relays = successors(Some(self.mission.leader()), |at| self.mission.after(*at));
         relays.map_while(move |at| {
@@ -532,28 +530,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Computes the reach of every relay, and calls `visit` with its index and reach, m.
-    ///
-    /// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
-    pub(crate) fn ends(&self, mut visit: impl FnMut(u16, f32)) -> Option<(f32, f32)> {
-        let reaches = self.reaches().inspect(|(at, _, reach)| visit(*at, *reach));
-        let (at, before_m, reach) = reaches.last()?;
-        let is_complete = at == last(self.mission);
-        is_complete.then(|| self.link(at).ending(self.target, before_m, reach))?
-    }
-
-    /// Returns true if the chain meets its target with relays at their reaches or required positions.
-    pub(crate) fn is_met(&self) -> bool {
-        self.closes() && (self.plainly().closes() || self.place(0).is_some())
-    }
-
-    /// Returns true if the reaches of a pass end within the last hop.
-    pub(crate) fn closes(&self) -> bool {
-        self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
-    }
-
     /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
-    /// belongs to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
+    /// belongs to no relay. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -584,7 +562,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
 
     /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
     /// to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
-    pub(crate) fn place(&self, index: u16) -> Option<f32> {
+    pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));
         }
@@ -605,12 +583,13 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.or(end)
     }
 
-    /// Computes the position of every relay, from the last one of the pass back. The last one is at x = `place`, m.
+    /// Computes the position of every relay, from the last relay of the pass back to the first. The last relay is at
+    /// x = `place`, m.
     ///
     /// `visit` gets the index of a relay, its x, and the index of the relay before it on the pass. It returns that
     /// relay's reach, m; for `None` the x at which the pass starts. The result is the x before the first relay. It is
     /// `None` if some relay cannot take its required position, or if `visit` returns `None`.
-    pub(crate) fn settle(
+    pub fn settle(
         &self,
         place: f32,
         mut visit: impl FnMut(u16, f32, Option<u16>) -> Option<f32>,

@@ -14,14 +14,15 @@ use crate::place::Placement;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// Ladder, the list of target SIRs, of the last sweep (pass along the chain). The target was committed in it.
+    /// Ladder, the list of target SIRs, of the last sweep (pass along the chain). The committed target is one of
+    /// them.
     pub ladder: Ladder,
     /// Index of the committed target SIR in the ladder, the list of targets.
     pub commit: u8,
     /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Upper bound, linear: no chain at these altitudes meets this target SIR. `None` with the paper's fixed step,
-    /// whose passes do not try all chains, and for traffic in both directions.
+    /// Upper bound of the SIR, linear: no chain at these altitudes meets this target SIR. `None` with the paper's
+    /// fixed step, whose passes do not try all chains, and for traffic in both directions.
     pub most: Option<f32>,
     /// Number of passes along the chain (sweeps) that the search took.
     pub sweeps: u32,
@@ -68,9 +69,9 @@ impl Planner {
 
     /// Computes at most `hops` hops of a pass along the chain; `Ok(Some(..))` once the chain is solved.
     ///
-    /// For a hop it computes the farthest x of one relay for each of at most 16 targets. In an interference field it
-    /// is as many of these x as take 128 evaluations of the field's points, at least one. `profile_of` returns the
-    /// profile of relay 1..=N, and must always return the same.
+    /// For a hop it computes the farthest x of one relay for each of at most 16 targets. In an interference field a
+    /// call computes as many of these x as take 128 evaluations of the field's points, but at least one. `profile_of`
+    /// returns the profile of relay 1..=N, and must always return the same.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left to try.
@@ -125,7 +126,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// If relays have to stay short of their farthest position, their positions are checked as in [`place`].
+/// Some relays may have to stay short of their farthest position; their positions are then checked as in [`place`].
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -193,10 +194,11 @@ pub fn place(
 }
 
 impl Mission {
-    /// Returns the position that relay `index` computes without messages. Every relay must have the mission's common profile.
+    /// Returns the position that relay `index` computes without messages. Every relay must have the mission's common
+    /// profile.
     ///
-    /// It equals the agreement by messages to the bit: `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`.
-    /// `None` if no target can be met.
+    /// This position is, to the bit, the position on which relays agree by messages:
+    /// `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`. `None` if no target can be met.
     pub fn silent_place(&self, index: u16) -> Option<Placement> {
         let common = |_| self.config().common;
         let agreed = solve(self, Schedule::Bracketed, common).ok()?;

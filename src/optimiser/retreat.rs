@@ -57,19 +57,19 @@ use crate::place::Station;
 use crate::root::sqrt;
 use crate::sir::{Sender, square};
 
-/// Relative rounding error by which the squared length of a backward hop may exceed its maximum.
+/// Relative tolerance, for rounding errors, on the maximum squared length of a hop toward Tx.
 const ROUNDING: f32 = 4e-6;
 
 /// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, from which a pass toward Tx computes the sender's x. It is prepared for
-/// many targets; the position of its receiver is known.
+/// Hop toward Rx in an interference field, whose receiver is at a known position. A pass toward Tx computes the
+/// sender's x from it, for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A of the hop, m^2: its SIR is A times `quiet` over the squared length. `quiet` is Upsilon = E[1/I] at the
-    /// receiver over the field's largest Upsilon, with the interference power I. For the hop to Rx A includes Upsilon
-    /// at Rx, and `quiet` is 1.
+    /// Gain A of the hop, m^2. The SIR of the hop is A times `quiet`, divided by the squared length. Upsilon = E[1/I]
+    /// is the mean inverse of the interference power I. `quiet` is Upsilon at the receiver divided by the field's
+    /// largest Upsilon. For the hop to Rx, A includes Upsilon at Rx, and `quiet` is 1.
     gain: f32,
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
@@ -77,15 +77,15 @@ pub struct Retreat<'a> {
     /// Smallest x that the sender of this hop may take, m from Tx.
     end_m: f32,
     to_rx: bool,
-    /// Backward hop from the receiver to the sender, and the interference at the sender. `None` for data in one
-    /// direction. Its gain is for the field's largest Upsilon = E[1/I], divided by r, the required ratio of backward
-    /// to forward SIR.
+    /// Backward hop from the receiver to the sender: its gain, and the interference at the sender. `None` for data in
+    /// one direction. The gain is for the field's largest Upsilon = E[1/I], and is divided by r, the required ratio
+    /// of backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
 impl<'a> Retreat<'a> {
-    /// Returns the hop from relay `index` to a relay at `altitude_m`, m, or to Rx if that is `None`. `own` has the
-    /// altitude and power of relay `index`.
+    /// Returns the hop from relay `index` to a relay at `altitude_m`, m. With `None` the hop leads to Rx. `own` has
+    /// the altitude and power of relay `index`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb_squared = square(own.cross_section.altitude_m - altitude_m.unwrap_or(0.0));
         let (gain, least_step) = match altitude_m {
@@ -108,8 +108,9 @@ impl<'a> Retreat<'a> {
 
     /// Returns this hop together with the backward hop, if the mission has traffic in both directions.
     ///
-    /// The backward hop is sent with `power_w`, or by Rx if that is `None`. Its receiver, the sender of this hop, has
-    /// measured `measured_per_w`: Upsilon, the mean inverse interference power, 1/W.
+    /// The sender of the backward hop has `power_w` watts; with `None` the sender is Rx. The receiver of the backward
+    /// hop is the sender of this hop. It has measured `measured_per_w`: Upsilon, the mean inverse interference power,
+    /// 1/W.
     pub(super) fn both_ways(
         self,
         mission: &'a Mission,
@@ -143,7 +144,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x of the receiver, m: the minimum step beyond the sender's smallest x.
+    /// Returns the smallest permitted x of the receiver, m. This is the sender's smallest permitted x plus the
+    /// minimum step.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -153,11 +155,11 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the x closest to Tx in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
+    /// Returns the smallest x in [end, `from_m`] from which the sender meets `target`; `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the receiver's x, m, from 0 to that of Rx. `quiet` is Upsilon =
-    /// E[1/I] at the receiver over the field's largest Upsilon, above 0; it is 1 at Rx. The result is rounded toward
-    /// the receiver. Constant work.
+    /// `target` is a linear SIR above zero. `from_m` is the receiver's x, from 0 to the x of Rx, m. `quiet` is above
+    /// 0: Upsilon = E[1/I] at the receiver divided by the field's largest Upsilon, and 1 at Rx. The result is rounded
+    /// toward the receiver. Constant work.
     pub fn reach(&self, target: f32, from_m: f32, quiet: f32) -> Option<f32> {
         let place = self.onward(target, from_m, quiet)?;
         match self.back() {
@@ -166,13 +168,11 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x of this hop's sender at which it receives the backward hop, m.
+    /// Returns the smallest x, m, at which this hop's sender receives the backward hop; `None` if there is none.
     ///
-    /// The x is at least `place` and below `most_m`. The backward hop is sent by this hop's receiver, at x = `from_m`.
-    /// `None` if there is no such x.
-    ///
-    /// `c` is the gain over the target for the field's largest Upsilon. Work: at most one root for each field point
-    /// from `place` to `from_m`.
+    /// The x is at least `place` and below `most_m`. This hop's receiver, at x = `from_m`, sends the backward hop.
+    /// `c` is the gain for the field's largest Upsilon, divided by the target. Work: at most one root for each field
+    /// point from `place` to `from_m`.
     #[inline(never)] // keeps a sweep of one direction small
     fn first(
         &self,
@@ -225,8 +225,9 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest x of the receiver, m, at which its backward hop meets `target`. The backward hop is
-    /// received by the sender, at `place`. Infinite for traffic in one direction.
+    /// Returns the largest x of the receiver, m, at which the backward hop meets `target`. The sender, at `place`,
+    /// receives the backward hop. The result is infinite for traffic in one direction, and -infinite if no x meets
+    /// `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -267,8 +268,8 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop with the smallest x of its sender that meets `target`, or `None`. The x of its receiver is
-    /// from `low` to `high`, m.
+    /// Returns the hop that meets `target` and whose sender has the smallest x; `None` if no hop meets it. The x of
+    /// the receiver is from `low` to `high`, m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -283,8 +284,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the one for data toward Rx
-    /// only.
+    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the longest hop for data
+    /// toward Rx only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,
@@ -330,11 +331,11 @@ impl<'a> Retreat<'a> {
         best
     }
 
-    /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the ratio of the receiver's Upsilon
-    /// to the field's largest.
+    /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the receiver's Upsilon divided by
+    /// the field's largest Upsilon.
     ///
-    /// Without `best_m` only the traffic toward Rx counts. With it both directions count, the x has to be smaller than
-    /// `best_m`, and is stored there.
+    /// Without `best_m` only the traffic toward Rx counts. With `best_m` both directions count; the sender's x has to
+    /// be smaller than `best_m`, and is then stored there.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -346,7 +347,7 @@ impl<'a> Retreat<'a> {
         Some(from_m)
     }
 
-    /// Returns the hop with the smallest x of its sender, by the search of [`least`] over the receiver's x.
+    /// Returns the hop with the smallest x of its sender, by the search of [`least`] for the receiver's x.
     #[inline(never)] // one copy for both directions and for one
     fn searched(
         &self,
@@ -365,8 +366,8 @@ impl<'a> Retreat<'a> {
 
     /// Returns the receiver's x, m, of the hops that just meet the target in both directions; at most two.
     ///
-    /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` are the forward and the
-    /// backward gain over the target.
+    /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
+    /// backward gain, each divided by the target.
     fn equal_limits(&self, gains: [f32; 2], from: Piece, to: Piece) -> [Option<f32>; 2] {
         let [c, back] = gains;
         let (rise, back_rise) = (c * to.slope, back * from.slope);
@@ -412,17 +413,17 @@ pub struct Step {
 /// Interference at a hop's receiver, as a function of the receiver's x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// Same interference at every x, as measured. The value is Upsilon, the mean inverse interference power, over the
-    /// largest Upsilon of the mission's field.
+    /// The interference is equal at every x, as measured. The value is the measured Upsilon, the mean inverse
+    /// interference power, divided by the largest Upsilon of the mission's field.
     Evenly(f32),
     /// Interference field of the mission, with receiver noise.
     In(InNoise<'a>),
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference at a receiver: as measured by it, else by the mission's field. `measured_per_w` is
-    /// Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field include the receiver
-    /// noise.
+    /// Returns the interference at a receiver: its measurement if there is one, otherwise the mission's field.
+    /// `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field
+    /// include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -478,13 +479,13 @@ struct Piece {
     slope: f32,
 }
 
-/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equal hops it is the
-/// one with the smallest x of the receiver.
+/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equally good hops the
+/// result is the hop with the smallest x of the receiver.
 ///
-/// `value` returns the sender's x for the receiver's x, y, and `quiet`, the ratio of Upsilon = E[1/I] at y to the
-/// field's largest. The result is y - sqrt(`c` quiet - s), with the sender's gain over the target `c` and the first
-/// of `squares`, s. It is `None` if the square under the root is below the second minus the first. Work: at most
-/// three values for each field point in between that a hop could reach.
+/// `value` returns the sender's x for the receiver's x, y, and for `quiet`, which is Upsilon = E[1/I] at y divided by
+/// the field's largest Upsilon. This sender's x is y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the
+/// target, and s is the first of `squares`. It is `None` if the square under the root is below the second of
+/// `squares` minus the first. Work: at most three values for each field point within reach of a hop.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

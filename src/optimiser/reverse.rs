@@ -54,9 +54,9 @@ const MOST_SQUARED: f32 = 1e18;
 /// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
-    /// Gain of the backward hop over r, the required ratio of backward to forward SIR. The hop's SIR is the gain
-    /// times inverse interference over squared length. For a hop to Tx the gain, m^2, includes the interference at
-    /// Tx.
+    /// Gain of the backward hop, divided by r, the required ratio of backward to forward SIR. The hop's SIR is the
+    /// gain times the inverse interference, divided by the squared length. For a hop to Tx the gain, m^2, includes
+    /// the interference at Tx.
     gain: f32,
     /// True if Tx is the receiver of this hop, false if a relay is.
     to_tx: bool,
@@ -64,7 +64,7 @@ pub struct Back {
     interferer_x_m: f32,
     /// Squared distance of the receiver from the interferer perpendicular to x, m^2.
     aside_squared: f32,
-    /// Receiver noise over the interferer's power received at 1 m: nu, 1/m^2.
+    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2.
     noise: f32,
 }
 
@@ -97,8 +97,8 @@ impl Back {
         })
     }
 
-    /// Returns a number from which the maximum length of a backward hop follows, for a receiver at `x_m`. The maximum length squared, m^2,
-    /// is this number divided by the target SIR of the forward direction.
+    /// Returns the squared maximum length of a backward hop times the forward target SIR, m^2. The receiver of the
+    /// backward hop is at `x_m`.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -107,15 +107,15 @@ impl Back {
         self.gain * in_noise(squared, self.noise)
     }
 
-    /// Returns the maximum length of the backward hop along x, m, for its receiver at `x_m`. `across_squared` is its
-    /// squared length across the line, m^2. `None` if no length meets the target.
+    /// Returns the maximum length of the backward hop along x, m, for its receiver at `x_m`. `across_squared` is the
+    /// squared length of the hop across the line, m^2. `None` if no length meets the target.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
     /// Returns the backward hop for `target` from a sender at `x_m`, as a function of its length along x.
-    /// `across_squared` is its squared length across the line, m^2.
+    /// `across_squared` is the squared length of the hop across the line, m^2.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -138,8 +138,9 @@ impl Back {
 
 /// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
 ///
-/// q is s / (1 + `noise` s). s is the squared distance from the interferer, m^2, and `aside_squared` its part across x.
-/// `None` if the noise alone prevents that at any distance.
+/// q is s / (1 + `noise` s). s is the squared distance from the interferer, m^2; `aside_squared` is the part of s
+/// across x. q is the inverse of interference plus noise. `None` if q is less than `needed` at any distance, because
+/// of the noise.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

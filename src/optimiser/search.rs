@@ -40,7 +40,7 @@ pub enum Schedule {
     },
 }
 
-/// Error: the chain meets no target SIR above 1e-12 of the upper bound.
+/// Error: the chain meets no target SIR, not even 1e-12 times the upper bound.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Infeasible;
@@ -58,11 +58,13 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit is the gap between two targets.
+/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit of the
+/// difference is the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Ratio of the bracket's widths after and before a pass, above which the pass counts as stalled. After such a pass the
-/// next targets are spread evenly over the bracket, and not around an interpolated optimum.
+/// Width of the bracket after a pass divided by its width before, above which the pass counts as stalled. The bracket
+/// is the interval that contains the best target. After such a pass the next targets are spread evenly over the
+/// bracket, and not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -75,17 +77,18 @@ pub struct Search {
     tolerance: f32,
     /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
     ceiling: f32,
-    /// First target of the fixed-step schedule, and upper bound of the bracketed one: gamma_0 of the paper.
+    /// First target of the fixed-step schedule, and upper bound of the bracketed schedule: gamma_0 of the paper.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the bracket before the last pass, `infeasible` / `feasible` - 1.
+    /// Relative width of the bracket before the last pass: `infeasible` / `feasible` - 1. The bracket is the interval
+    /// that contains the best target.
     width: f32,
     ladder: Ladder,
     tried: u32,
     /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule
-    /// has only such passes. They are also used after a relay could not take the x, short of its farthest, that
-    /// another relay required.
+    /// has only such passes. Plain passes are also used after a relay has refused a target. A relay refuses a target
+    /// if it cannot take the x that the next relay requires.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
     most: Option<f32>,
@@ -97,10 +100,12 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates a search by the leader of `mission` with the profile `leader`. Other relays may have profiles of their own.
+    /// Creates a search by the leader of `mission` with the profile `leader`. Other relays may have profiles of their
+    /// own.
     ///
     /// # Errors
-    /// [`Infeasible`] if a relay right above the receiver gives it no SIR: the interferer is at the receiver.
+    /// [`Infeasible`] if a relay right above the receiver gives the receiver an SIR of 0, because the interferer is
+    /// at the receiver.
     pub fn new(mission: &Mission, leader: Profile, schedule: Schedule) -> Result<Self, Infeasible> {
         let MissionConfig {
             distance_m, common, ..
@@ -157,8 +162,8 @@ impl Search {
         &self.ladder
     }
 
-    /// Replaces the next targets by `ladder`, which the leader expects to end the search. If it is for a plain pass,
-    /// in which every relay takes its farthest x, all later passes are plain.
+    /// Replaces the next targets by `ladder`, which the leader expects to end the search. If `ladder` is for a plain
+    /// pass, in which every relay takes its farthest x, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
@@ -281,7 +286,7 @@ impl Search {
 /// Lowers the targets `start` and `met` to include the traffic from Rx to Tx, and returns both.
 ///
 /// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a
-/// feasible target, becomes one that this hop and the backward hop from Rx meet, too.
+/// feasible target, becomes a target that this hop and the backward hop from Rx also meet.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -302,8 +307,9 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The cubic passes through the four points about
-/// the sign change. `None` if the cubic and the straight line disagree: the slack jumps there, and neither root is meaningful.
+/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The cubic curve passes
+/// through the four points next to the change of sign. `None` if the cubic curve and a straight line give very
+/// different roots: the slack then jumps, and neither root is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -340,12 +346,12 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 }
 
 /// Bisection for the highest target that all relays accept. A relay refuses a target if it cannot take the position
-/// that the next relay requires of it.
+/// that the next relay requires.
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
     /// Highest target that all relays accepted, with the list of targets (ladder) that proposes it again. `None`
-    /// before the first.
+    /// until a target is accepted.
     best: Option<(f32, Ladder)>,
     /// True once the bisection has ended. The best target found is then the result.
     over: bool,
@@ -354,9 +360,9 @@ struct StandTrials {
 impl Search {
     /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses a target if it cannot take the position that the next relay requires of it: it deletes the
-    /// commit from `verdict`, the result of the pass. This function finds by the slacks which target had been
-    /// committed.
+    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the
+    /// commit from `verdict`, the result of the pass. This function finds the refused target from the slacks in
+    /// `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();

@@ -59,7 +59,7 @@ pub enum RequiredPosition {
 }
 
 impl RequiredPosition {
-    /// Returns the required x, m. `reach_m` is the farthest x that meets the target.
+    /// Returns the required x of the previous relay, m. `reach_m` is its farthest x that meets the target.
     pub(crate) const fn or_reach(self, reach_m: f32) -> f32 {
         match self {
             Self::AtReach => reach_m,
@@ -82,21 +82,21 @@ pub struct Hop {
     /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is the receiver's distance from the
     /// interferer, b its distance from the sender.
     ///
-    /// The equation for the hop's maximum length contains it as a term that does not depend on the target. It is
+    /// The difference is a term of the equation for the hop's maximum length; it does not depend on the target. It is
     /// computed without cancellation as (Y - y0) (Y + y0 - 2y) + h0 (2h - h0). The interferer is at the lateral
     /// offset Y on the ground, the sender at the lateral offset y0 and altitude h0, the receiver at y and h.
     base: f32,
     /// Squared distance of receiver and sender perpendicular to x, m^2.
     across_squared: f32,
-    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     noise: f32,
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
     /// Largest x that the receiver of this hop may take, m from Tx.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m. They leave the relays from there to Rx their minimum
-    /// separation.
+    /// Maximum x of the receiver and of the sender, m. With these x the relays nearer to Rx have room for their
+    /// minimum separation.
     gathered_m: [f32; 2],
     /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
     back: Option<Back>,
@@ -133,8 +133,8 @@ impl Hop {
     }
 
     /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
-    /// altitude. The hop has no minimum length. `noise` is the noise over the interferer's power received at 1 m,
-    /// 1/m^2.
+    /// altitude. The hop has no minimum length. `noise` is the noise divided by the interferer's power received at 1
+    /// m, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -164,8 +164,8 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Returns this hop with its counterpart from Rx to Tx, if the mission has traffic in both directions. `power_w`
-    /// is the power of the relay that receives this hop, W.
+    /// Returns this hop together with the backward hop (direction from Rx to Tx), if the mission has traffic in both
+    /// directions. `power_w` is the power of the relay that receives this hop, W.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -189,7 +189,7 @@ impl Hop {
 
     /// Returns the largest x in [`from_m`, end] at which the receiver meets `target`, m. `None` if there is none.
     ///
-    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to that of Rx. The result is rounded
+    /// `target` is a linear SIR above zero, `from_m` the sender's x, from 0 to the x of Rx. The result is rounded
     /// toward the sender, so it meets the target as an f32. Constant work; with noise at most 96 evaluations of the
     /// hop, usually five.
     pub fn reach(&self, target: f32, from_m: f32) -> Option<f32> {
@@ -211,7 +211,7 @@ impl Hop {
     }
 
     /// Returns the largest x at which the receiver meets `target`, m, for traffic toward Rx only. The sender is at x
-    /// = `from_m`. `None` if there is none.
+    /// = `from_m`. `None` if no x meets `target`.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -262,11 +262,10 @@ impl Hop {
         rounded(from_m, d)
     }
 
-    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`]. `None` if
-    /// there is none.
+    /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`].
     ///
-    /// If the receiver has a position at least the minimum step beyond `from_m`, it is [`Hop::reach`] for a sender at
-    /// `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.
+    /// If the receiver has such a position at least the minimum step beyond `from_m`, the result is [`Hop::reach`]
+    /// for a sender at `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.
     pub fn outermost(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self
             .reach(target, from_m)
@@ -277,9 +276,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
-    /// `from_m`]. `back` is the backward hop. `place` is the largest x with the sender at `from_m`; the result is
-    /// larger if a sender farther back receives the backward hop better.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The x of the sender is in
+    /// [0, `from_m`]. `back` is the backward hop. `place` is the receiver's largest x if the sender is at `from_m`.
+    /// The result is larger than `place` if a sender at a smaller x receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -372,11 +371,11 @@ impl Hop {
         }
     }
 
-    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if it has no such
-    /// position.
+    /// Returns the position that the sender must take if the receiver is at x = `place`. `None` if the sender has no
+    /// permitted position.
     ///
-    /// `from_m` is the sender's farthest x that meets `target`. The required position is the allowed one closest to
-    /// the receiver, because it has the best SIR.
+    /// `from_m` is the sender's farthest x that meets `target`. The required position is the permitted position
+    /// closest to the receiver, because it has the best SIR.
     pub fn required_position(
         &self,
         target: f32,
@@ -420,11 +419,11 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. That makes
-    /// the result a smooth function, as the joint method requires.
+    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. Without
+    /// this step the result is a smooth function, as the joint method requires.
     ///
-    /// `None` if there is no such x. It is less than `from_m`, the sender's x, if the distance across the line is
-    /// longer than the hop may be.
+    /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance across the
+    /// line alone exceeds the hop's maximum length.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -477,8 +476,8 @@ impl Hop {
 /// Relative rounding error by which a hop's SIR may be below its target when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if that equals `from_m`, since two relays must not
-/// share an x.
+/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the rounded value equals `from_m`, because two
+/// relays must not have the same x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -516,14 +515,14 @@ impl Hop {
         !(self.nu() > 0.0)
     }
 
-    /// Returns the receiver noise over the interferer's power received at 1 m: nu, 1/m^2. Without the feature `noise`
-    /// it is the constant 0, so that the compiler drops the search in noise.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. Without the feature
+    /// `noise` the result is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }
 
     /// Returns the largest x at which the receiver meets `target`, m: [`Hop::reach`] for a hop with noise. `None` if
-    /// there is none.
+    /// no x meets `target`.
     #[inline(never)] // keeps a sweep without noise small
     pub(super) fn in_noise(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.in_silence(target, from_m)?;
@@ -580,7 +579,7 @@ mod tests {
         )
     }
 
-    /// Checks the maximum length of a first hop whose SIR rises with the length up to 45 m, and then falls. The
+    /// Checks the maximum length of a first hop whose SIR rises up to a length of 45 m, and then falls. The
     /// interferer is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22. The target is met only in an
     /// interval of lengths, which may be beyond the end of the hop's range.
     #[test]

@@ -738,8 +738,8 @@ impl Relay {
     /// Reports that the other node with this relay's node number is gone. See
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
-    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above that of the
-    /// other node. Takes constant time.
+    /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above the claim
+    /// number of the other node. The node with the larger claim number may have a setpoint. Takes constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }

@@ -45,8 +45,8 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of the measurements' errors, over the variance that the operator expects. Above it the search for
-/// a faulty relay starts.
+/// Maximum variance of the measurements' errors, divided by the variance that the operator expects. If the variance
+/// is larger, the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
 /// Squared deviation, in variances, above which a measurement shows a faulty relay. Without that relay, the fit's residual must be smaller

@@ -36,8 +36,8 @@ pub enum InterferenceEstimate {
     Source {
         /// Estimated position and power of the interfering transmitter.
         source: Interferer,
-        /// Interference power measured at the ground receiver, W. 0 if it has not measured; its interference is then
-        /// computed from the source and the path loss over the ground.
+        /// Interference power measured at the ground receiver, W. 0 if the receiver has not measured. The interference
+        /// at the receiver is then computed from the estimated source and the path loss along the ground.
         receiver_w: f32,
     },
 }
@@ -120,12 +120,12 @@ const ANOTHER: f64 = 64.0;
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of a moving interferer's track from the fit, over the fit's variance. Above it the
-/// position is not predicted from the track.
+/// Maximum squared deviation of a moving interferer's track from the fit, divided by the fit's variance. If the
+/// deviation is larger, the position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
 /// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
-/// measured positions over the variance of one position's error.
+/// measured positions divided by the variance of the error at one position.
 const LEARNED: f64 = 1.1;
 /// Number of refined estimates after which a chain with a stationary interferer counts as settled. The chain then gets no new estimate
 /// until the interference changes.
@@ -146,7 +146,7 @@ const GUESSED: f64 = 16.0;
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information in the measurements: number of positions over the variance of one position's error.
+    /// Information in the measurements: number of positions divided by the variance of the error at one position.
     information: f64,
     /// Expected mean square relative error of the current estimate.
     chance: f64,
@@ -173,10 +173,10 @@ pub(crate) struct Review {
     pub(crate) ends: EndsOff,
 }
 
-/// Decides if the measurements give a new estimate that replaces the current `estimate`.
+/// Compares the measurements with the current `estimate`, and returns the estimate to adopt, if any.
 ///
-/// `mission` is based on the current estimate. `sums` has the relays' measurements, and `levels` those of transmitter
-/// and receiver. `before` is the quality of the current estimate when it was adopted.
+/// `mission` is based on the current estimate. `sums` has the measurements of all relays, and `levels` the
+/// interference measured at Tx and at Rx. `before` is the quality that the current estimate had when it was adopted.
 pub(crate) fn review(
     mission: &Mission,
     estimate: &InterferenceEstimate,
@@ -436,8 +436,8 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Minimum squared deviation from the track, over its variance, that shows another interferer. The track then starts
-/// again.
+/// Minimum squared deviation from the track, divided by the track's variance, that shows another interferer. The
+/// track then starts again.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.
@@ -512,8 +512,8 @@ impl Track {
         at: None,
     };
 
-    /// Updates the track with a source found from measurements with the mean time `at`. `half_life` is that of the
-    /// measurements' weight.
+    /// Updates the interferer's track with a position found from measurements with the mean time `at`. `half_life` is
+    /// the half-life of the measurements' weight.
     pub(crate) fn update(&mut self, found: &FoundSource, at: Instant, half_life: Duration) {
         let half_life = half_life.as_micros() as f32 * 1e-6;
         let fits = [found.source.x_m, found.source.y_m]

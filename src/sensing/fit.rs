@@ -31,8 +31,8 @@ pub enum Unfit {
 /// Weight of the operator's expected error in the estimated variance, in measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D over the measured positions; D is the distance from Tx to Rx. Below it they do not
-/// show on which side of the line the source is.
+/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance
+/// the measurements do not show on which side of the line the source is.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -141,7 +141,8 @@ pub struct Fit {
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
-    /// Degrees of freedom: number of measured positions less the number of unknowns; 0 if that is negative.
+    /// Degrees of freedom: number of measured positions minus the number of unknowns; 0 if the difference is
+    /// negative.
     beyond: f64,
     count: f64,
 }
@@ -337,8 +338,9 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from the terms of a position to the inverse interference v = 1e-12 W / I there. I is that of
-/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
+/// Returns a function from the terms of a position to the inverse interference v = 1e-12 W / I there. I is the
+/// interference power of the mission's interferer. The function gives `None` without a known source, or outside of
+/// the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -356,7 +358,8 @@ const COARSE: i8 = 8;
 /// Number of grid steps from the middle to the edge of each finer grid of the search for a source.
 const FINE: i8 = 2;
 
-/// Number of finer grids in the search for a source. The steps of each are 0.4 times those of the previous grid.
+/// Number of finer grids in the search for a source. The steps of each grid are 0.4 times the steps of the previous
+/// grid.
 const FINER: u8 = 5;
 
 /// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on

@@ -63,8 +63,8 @@ pub struct Listen {
 }
 
 impl Default for Listen {
-    /// Returns settings for a stationary interferer: every 5 s, half-life 60 s, error 3 %. The error is that of a
-    /// thousand samples.
+    /// Returns settings for a stationary interferer: every 5 s, half-life 60 s, error 3 %. The mean of a thousand
+    /// samples has this error.
     fn default() -> Self {
         Self {
             every: Duration::from_millis(5_000),

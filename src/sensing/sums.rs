@@ -289,8 +289,9 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement `heard` at the position `at`: a power above 0, in units of [`UNIT_W`]. `expected` returns v
-    /// = 1e-12 W / I by the current estimate for the terms of a position.
+    /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units
+    /// of [`UNIT_W`]. `expected` returns the inverse power, 1e-12 W / I, that the current estimate predicts for the
+    /// terms of a position. It is needed for the weights of the measurements.
     pub(crate) fn add(
         &mut self,
         now: Instant,

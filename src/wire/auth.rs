@@ -131,7 +131,7 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {
-    /// Largest accepted frame counter of the sender, plus one; 0 before any.
+    /// Largest accepted frame counter of the sender, plus one; 0 if none was accepted.
     next: u32,
     /// Accepted frame counters, as bits: bit i stands for `next` - 1 - i.
     taken: u64,

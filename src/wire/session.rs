@@ -89,7 +89,7 @@ struct Peer {
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
-    /// Largest nonce that this node has sent; 0 before any.
+    /// Largest nonce that this node has sent; 0 if none was sent.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
@@ -453,8 +453,8 @@ impl Session {
     }
 
     /// Creates a table entry for `node` if there is none. If the table is full, it replaces an entry that is not
-    /// pinned: that of a node without proof of presence if possible, else the least recently used one. After four
-    /// billion entries it creates no more, because a nonce must not be used twice.
+    /// pinned: if possible the entry of a node without proof of presence, otherwise the least recently used entry.
+    /// After four billion entries the function creates no more, because a nonce must not be used twice.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;

@@ -19,8 +19,8 @@ pub struct Upload {
     /// Valid parameters of the uploaded mission. Its interference comes from a single interferer, because a mission
     /// with an interference field (known distribution along x) cannot be uploaded.
     config: MissionConfig,
-    /// Positions of Tx and Rx of this mission; `None` if relays must use those of their configuration. The positions
-    /// are valid, but each relay still checks that they fit the mission.
+    /// Positions of Tx and Rx of this mission; `None` if relays must use the positions of their configuration. The
+    /// positions are valid, but each relay still checks that they fit the mission.
     sites: Option<Sites>,
 }
 
@@ -31,7 +31,7 @@ pub struct Upload {
 pub enum UploadError {
     /// The version of the upload is 0, which identifies the mission loaded before flight.
     Version,
-    /// The number of relays differs from that of the mission loaded before flight.
+    /// The number of relays differs from the number in the mission loaded before flight.
     Relays,
     /// The mission loaded before flight, or the uploaded one, has an interference field. A field is a known
     /// distribution of the interference along x.
@@ -148,7 +148,7 @@ impl Upload {
         &self.config
     }
 
-    /// Positions of Tx and Rx in the upload; `None` if relays must use those of their configuration.
+    /// Positions of Tx and Rx in the upload; `None` if relays must use the positions of their configuration.
     pub const fn sites(&self) -> Option<Sites> {
         self.sites
     }

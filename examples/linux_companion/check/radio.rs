@@ -38,7 +38,7 @@ const REMEMBERED: usize = 64;
 /// Number of damaged frames from which on the data rate is suspected.
 const DAMAGED: u32 = 5;
 
-/// Age from which on what was heard of a neighbour does not count.
+/// Age from which on data received from a neighbour are too old for the check.
 const OLD: Duration = Duration::from_millis(10_000);
 
 /// Time added to the longest period of the lease renewals while the check only listens.

@@ -44,7 +44,7 @@ impl std::fmt::Debug for Draw<'_> {
 }
 
 impl<'s> Draw<'s> {
-    /// Creates a generator that reads `source`.
+    /// Creates a generator of random messages. It takes its random bytes from `source`.
     pub fn new(source: &'s mut dyn FnMut() -> u8) -> Self {
         Self { source }
     }
@@ -73,7 +73,8 @@ impl<'s> Draw<'s> {
         self.hinted(layout, &mut |_, _| None)
     }
 
-    /// Draws fields for a message. `hint` may choose a value; all others are within the permitted ranges.
+    /// Draws random values for all fields of a message. For each number, `hint` may return a value, even one outside
+    /// the permitted range. If `hint` returns `None`, the value is random and within the range.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
         obey_rules(&layout.name, &mut fields);

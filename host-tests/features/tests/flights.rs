@@ -22,7 +22,8 @@ const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
 /// Expected CRC-32C of all bytes that the relays send, when they are connected by wires.
 ///
-/// With `departures` lease renewals say that all relays are in place; no other feature changes a byte.
+/// With the feature `departures` each lease renewal contains a flag that all relays are in place. No other feature
+/// changes a byte.
 const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
     0x7b9b_6625
 } else {

@@ -22,7 +22,7 @@ pub const OPTIMA: [(u16, f64); 12] = [
     (100, 40.441_345_0),
 ];
 
-/// Scenario of a reference case, in SI units. The fields have the names of the file.
+/// Scenario of a reference case, in SI units. Each field is named like its key in `data/reference.json`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Params {
     /// Transmit power of Tx, watts.

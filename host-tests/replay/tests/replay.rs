@@ -79,7 +79,8 @@ fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown
     }
 }
 
-/// Clock of a simulated node: offset, s, drift, and a step from some time on, s.
+/// Clock of a simulated node with errors: an offset, s, a relative drift, and a step. The step is the time, s, at
+/// which the clock jumps, and by how much, s; `None` for no step.
 #[derive(Clone, Copy, Default)]
 struct Clock {
     offset: f64,

@@ -36,7 +36,7 @@ pub struct Ground<'a> {
     terrain: &'a Terrain,
     axis: Axis,
     step_m: f64,
-    /// Error of the heights, m.
+    /// Assumed error of the terrain's heights away from Tx and Rx, m.
     error_m: f64,
     /// Antennas of Tx and Rx, with their heights.
     pub ends: [Node; 2],
@@ -128,21 +128,23 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the terrain with an error of its heights: profiles and the highest ground are higher by it.
+    /// Returns the terrain with an assumed error of its heights: the ground counts as higher by `error_m`.
     ///
-    /// From Tx and from Rx on the error grows over 100 m, because their antennas stand on the same ground.
+    /// The error is 0 at Tx and at Rx, because their antennas stand on the same ground. It grows to `error_m` over
+    /// 100 m from there.
     #[must_use]
     pub const fn with_error_m(self, error_m: f64) -> Self {
         Self { error_m, ..self }
     }
 
-    /// Returns by how much the ground counts as higher at `x_m` along the line, m.
+    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by
+    /// this amount. It is 0 at Tx and Rx, and grows over 100 m from them.
     pub fn raise_m(&self, x_m: f64) -> f64 {
         let from_site_m = x_m.min(self.axis.distance_m() - x_m);
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)
     }
 
-    /// Returns the largest distance of two points of a profile, m: a quarter of a cell.
+    /// Returns the largest distance of two points of a profile, m: a quarter of a cell of the elevation model.
     pub const fn step_m(&self) -> f64 {
         self.step_m
     }
@@ -179,12 +181,12 @@ impl<'a> Ground<'a> {
             .ok_or_else(|| format!("x = {x_m:.1} m, y = {y_m:.1} m is too far from the line"))
     }
 
-    /// Returns the height of the ground, m above the mean sea level.
+    /// Returns the height of the ground above the mean sea level, m.
     ///
-    /// The place is `x_m` along the line and `y_m` beside it.
+    /// The position is `x_m` along the line and `y_m` beside it.
     ///
     /// # Errors
-    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    /// A line that names the position: the elevation files do not cover it, or have no height there.
     pub fn height_m(&self, x_m: f64, y_m: f64) -> Result<f64, String> {
         let there = |error| format!("x = {x_m:.1} m, y = {y_m:.1} m: {error}");
         height_at(self.terrain, self.point(x_m, y_m)?).map_err(there)

@@ -2,12 +2,12 @@
 
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use uav_relay::planning::fleet::{self, Fewest};
-use uav_relay::{Mission, MissionConfig, Placement, Profile};
+use uav_relay::{Mission, MissionConfig, Profile};
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::random::{self, count, log_uniform};
 use uav_relay_oracle::reference::Relay;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
+use uav_relay_tools::fewest::{self, Fewest};
 
 use super::{ROUNDING, chain, round};
 
@@ -170,7 +170,7 @@ fn identical_relays_in_a_field_are_optimal() {
         let n = rng.random_range(1..=40);
         link.relays = vec![link.relays[0]; n];
         let mission = of_stochastic_link(&link, 0.0).unwrap();
-        let best = f64::from(fleet::best_of_equals(&mission, mission.config().common).unwrap());
+        let best = f64::from(fewest::best_of_equals(&mission, mission.config().common).unwrap());
         if let Some(optimum) = link.iid_optimum() {
             assert!(
                 (best / optimum - 1.0).abs() < 5e-6,
@@ -215,19 +215,16 @@ fn different_relays_in_a_field_are_not_called_proven() {
     let found = Fewest::of(&mission, 1000.0, profile_of).unwrap();
     assert!(!found.proven && found.relays > 2);
     let mission = mission.with_relays(found.relays).unwrap();
-    let mut places = vec![Placement::default(); usize::from(found.relays)];
-    assert!(mission.places_for(1000.0, profile_of, &mut places));
+    let places = fewest::places(&mission, 1000.0, profile_of).unwrap();
     assert!(
         places
             .windows(2)
             .all(|pair| pair[1].x_m - pair[0].x_m >= 4.0)
     );
-    // A list that is too short is not written.
-    assert!(!mission.places_for(1000.0, profile_of, &mut places[1..]));
     let config = MissionConfig {
         relays: 1,
         ..*mission.config()
     };
     let alone = Mission::try_new(config).unwrap();
-    assert!(!alone.places_for(1000.0, profile_of, &mut places));
+    assert!(fewest::places(&alone, 1000.0, profile_of).is_none());
 }

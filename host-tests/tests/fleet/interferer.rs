@@ -3,11 +3,11 @@
 use chacha20::ChaCha8Rng;
 use host_tests::placing::profile_of;
 use rand::{Rng, RngExt, SeedableRng};
-use uav_relay::planning::fleet::{Fewest, Most};
 use uav_relay::{Mission, Profile};
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, count, log_uniform};
 use uav_relay_oracle::reference::Link;
+use uav_relay_tools::fewest::{Fewest, Most};
 
 use super::{ROUNDING, chain, round};
 

@@ -1,10 +1,10 @@
 //! Values of an independent program, and errors of the printed rules.
 
-use uav_relay::planning::fleet::Fewest;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::mission::of_stochastic_link;
 use uav_relay_oracle::reference::stochastic::StochasticLink;
 use uav_relay_oracle::reference::{Link, Relay};
+use uav_relay_tools::fewest::Fewest;
 
 use super::chain;
 use super::field::field;

@@ -5,7 +5,8 @@ mod interferer;
 mod known;
 
 use host_tests::placing::xs;
-use uav_relay::{Mission, Placement, Profile};
+use uav_relay::{Mission, Profile};
+use uav_relay_tools::fewest;
 
 /// Relative loss of SIR that is tolerated because relays' positions are rounded to f32.
 pub(crate) const ROUNDING: f64 = 1e-4;
@@ -22,10 +23,6 @@ pub(crate) fn chain(
     profile_of: impl Fn(u16) -> Profile,
 ) -> Vec<f64> {
     let mission = mission.with_relays(relays).unwrap();
-    let mut places = vec![Placement::default(); usize::from(relays)];
-    assert!(
-        mission.places_for(target as f32, profile_of, &mut places),
-        "{target} {mission:?}"
-    );
-    xs(&places)
+    let places = fewest::places(&mission, target as f32, profile_of);
+    xs(&places.unwrap_or_else(|| panic!("{target} {mission:?}")))
 }

@@ -41,7 +41,7 @@ const MEETING_MS: u64 = 200_000;
 /// Time of observation after two settled chains have come into range, ms.
 const MET_MS: u64 = 60_000;
 
-/// Medium between two relays with the same index and the other relays.
+/// Medium that connects two relays with the same index to each other and to the other relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Medium {
     /// A shared channel, on which the two relays with the same index receive each other.
@@ -76,9 +76,8 @@ struct Case {
 /// Durations measured in one simulated chain with two relays of the same index, ms.
 #[derive(Clone, Copy, Debug, Default)]
 struct Durations {
-    /// Longest time in which both duplicates have setpoints, from `LIMIT_MS` after their first frame on.
-    ///
-    /// The frame is the first one that goes from one duplicate to the other.
+    /// Longest time in which both duplicates have setpoints. It counts from `LIMIT_MS` after the first frame that one
+    /// duplicate receives from the other.
     both: u64,
     /// Longest time in which both duplicates have setpoints, from the start of the second duplicate.
     both_at_all: u64,

@@ -26,7 +26,7 @@ const LISTENING: &str = "[geometry]\naltitude_m = 30\nmin_separation_m = 4\n[pow
     rx = { lat_deg = 47.41, lon_deg = 8.55, amsl_m = 431.0 }\n\
     [listen]\nevery_s = 60\nhalf_life_s = 1e12\nrelative_error = 0.1\n";
 
-/// Section of a scenario file with the true interferer, which the relays are not told.
+/// Section of a scenario file with the true interferer. The relays do not read this section.
 ///
 /// Only the noise values that the simulated radios report depend on this interferer.
 const SOURCE: &str = "[[interferer]]\npower_w = 80\nx_m = 900\ny_m = 350\n";

@@ -142,7 +142,7 @@ impl Figures {
         most
     }
 
-    /// Prints the figures; `most_bytes` is the most that telemetry took of a link, in bytes per second.
+    /// Prints the figures. `most_bytes` is the largest number of telemetry bytes per second on one link.
     fn print(&self, name: &str, most_bytes: f64) {
         let per_relay: Vec<String> = self
             .ages_s

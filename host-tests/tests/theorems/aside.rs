@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use chacha20::ChaCha8Rng;
 use rand::SeedableRng;
 use rayon::prelude::*;
-use uav_relay::planning::single::aside::{self, AsideCase};
-use uav_relay::planning::single::{Found, theorems};
 use uav_relay_oracle::random::{self, count, log_uniform};
 use uav_relay_oracle::recorded::optimum;
 use uav_relay_oracle::reference::joint::Corridor;
+use uav_relay_tools::single::aside::{self, AsideCase};
+use uav_relay_tools::single::{Found, theorems};
 
 use super::ALLOWED;
 use super::lateral_scene::LateralScene;

@@ -1,8 +1,8 @@
 //! Known values: of an independent program, counterexamples to the printed theorems, degenerate cases.
 
-use uav_relay::planning::single::theorems;
 use uav_relay_oracle::cases;
 use uav_relay_oracle::reference::Link;
+use uav_relay_tools::single::theorems;
 
 use super::scene::Scene;
 

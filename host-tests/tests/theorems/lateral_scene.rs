@@ -2,11 +2,11 @@
 
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
-use uav_relay::planning::single::Found;
 use uav_relay::{Band, Mission, MissionConfig};
 use uav_relay_oracle::random::{self};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::{Place, sir};
+use uav_relay_tools::single::Found;
 
 use super::scene::Scene;
 

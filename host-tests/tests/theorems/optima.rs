@@ -2,8 +2,8 @@
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use uav_relay::planning::single::{Found, theorems, without_interferer};
 use uav_relay_oracle::random::{self, count, log_uniform};
+use uav_relay_tools::single::{Found, theorems, without_interferer};
 
 use super::ALLOWED;
 use super::scene::Scene;

@@ -1,12 +1,12 @@
 //! Single relay and interferer, with SIRs that share no formula with the crate.
 
 use rand::{Rng, RngExt};
-use uav_relay::planning::single::Found;
 use uav_relay::{Band, Mission, MissionConfig};
 use uav_relay_oracle::cases::Case;
 use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
+use uav_relay_tools::single::Found;
 
 /// Scene with a single relay: the reference chain, rounded to f32, and the range of altitudes.
 pub(crate) struct Scene {

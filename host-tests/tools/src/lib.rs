@@ -3,6 +3,8 @@
 //! | module | content |
 //! | --- | --- |
 //! | [`plan`] | how many relays a link needs and where they go, computed without messages |
+//! | [`fewest`] | number of relays for a target SIR, and their positions |
+//! | [`single`] | the best position of one relay: Theorems 1 to 3, and Algorithm 3 |
 //! | [`multi_interferer`] | the best chain against the sum of several interferers |
 //! | [`image`] | flash images as `.bin`, `.hex` and `.uf2` |
 //! | [`provision`] | the configuration block of a drone |
@@ -16,9 +18,11 @@
 )]
 
 pub mod baseline;
+pub mod fewest;
 pub mod figures;
 pub mod image;
 pub mod listening;
 pub mod multi_interferer;
 pub mod plan;
 pub mod provision;
+pub mod single;

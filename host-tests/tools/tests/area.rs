@@ -53,7 +53,7 @@ fn nearest_on(outline: &[[f64; 2]], at: [f64; 2]) -> Option<[f64; 2]> {
     on_edge.min_by(|a, b| far(a).total_cmp(&far(b)))
 }
 
-/// Returns true if the polygon winds around `at`. Not the method of the planner.
+/// Returns true if the polygon contains `at`, by its winding number. The planner uses another method.
 fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
     let angle = |i: usize| {
         let [x, y] = outline[i % outline.len()];
@@ -745,7 +745,7 @@ fn the_error_of_the_location_is_that_of_fits() {
     }
 }
 
-/// Checks the report and the map of the location against the simulated searches.
+/// Checks the report and the map of how well relays locate an interferer, against simulated searches.
 #[test]
 fn the_command_says_from_where_relays_locate_the_interferer() {
     let folder = tempfile::tempdir().unwrap();

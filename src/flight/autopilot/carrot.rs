@@ -41,19 +41,19 @@ const TOP_PER_S: f32 = 0.5;
 /// behind, but never stops for good.
 const LEAST_PART: f32 = 0.1;
 
-/// Factor on the acceleration limit for motion across the direction to a new setpoint. The moving target loses its
-/// speed across that direction with twice the acceleration of [`Pace`].
+/// Factor on the acceleration limit for the velocity across the direction to a new setpoint.
 ///
-/// The target does not turn at once, because the drone would overshoot it and come back. Its velocity in other
-/// directions is gone within [`Pace::stopping_time`].
+/// When the setpoint changes, the moving target still has its old velocity. The component across the new direction is
+/// reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`]. The target does not turn at
+/// once, because the drone would then overshoot the target and come back.
 const TURN_PART: f32 = 2.0;
 
 /// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone lags
 /// behind the moving target, so that the drone then has up to 0.5 m left.
 const SETTLED_M: f32 = 0.25;
 
-/// Time from a new setpoint until the drone reacts, ms. 200 are for the way to the flight controller, and 1000 for
-/// the drone's lag.
+/// Assumed time from a new setpoint until the drone reacts, ms: 1200. The transmission to the flight controller takes
+/// 200 ms of this, and the drone's lag 1000 ms.
 const BEHIND_MS: u64 = 1_200;
 
 /// Time in which the speed of the moving target near the setpoint halves, ms. It is ln 2 / k: the speed is k times
@@ -92,7 +92,8 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. It is 0.1 to 20, or 0 for the default.
+    /// Returns the default acceleration with the speed limit `speed_m_s`, m/s. `speed_m_s` is 0.1 to 20, or 0 for the
+    /// default speed limit.
     pub fn of_speed(speed_m_s: f32) -> Self {
         let mut pace = Self::default();
         if speed_m_s > 0.0 {
@@ -317,8 +318,8 @@ const REFUSED_AFTER: u8 = 6;
 /// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
-/// Maximum difference of a standing target from the one that an ArduCopter reports, 1e-7 degrees. For a moving target
-/// it is [`NEAR_M`] metres plus its path in [`NEAR_S`] seconds.
+/// Maximum difference of a standing target from the target that an ArduCopter reports, 1e-7 degrees. For a moving
+/// target the maximum is [`NEAR_M`] metres plus the path of the target in [`NEAR_S`] seconds.
 const ACCEPTED_WITHIN: u32 = 20;
 const NEAR_M: f32 = 3.0;
 const NEAR_S: f32 = 1.0;
@@ -365,8 +366,8 @@ impl Target {
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the sent one; returns true, once, if they differ. They count as
-    /// different only after the target was sent for some time, and several reports differ.
+    /// Compares the autopilot's reported target with the sent target. Returns true, once, if they differ. They count
+    /// as different only after the target was sent for some time, and several reports differ.
     ///
     /// While the target moves, the report may lag behind it by the time between two messages.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {

@@ -99,8 +99,8 @@ pub struct Autopilot {
     release: Option<(Release, Instant)>,
     /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if he can.
     wait: (Option<WaitReason>, Instant),
-    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` before
-    /// any. An inner `None` reports that he can.
+    /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
+    /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
     reported_wait: Option<(Option<WaitReason>, Instant)>,
     /// True while the firmware reports that the relay is ready to control the drone.
     ready: bool,
@@ -914,7 +914,7 @@ impl Autopilot {
         (is_news, position)
     }
 
-    /// Replaces this link's line from Tx to Rx by that of the relay's mission, if the two differ.
+    /// Replaces this link's line from Tx to Rx by the line of the relay's mission, if the two lines differ.
     #[inline(never)] // its stack frame is released
     fn follow(&mut self, relay: &Relay, now: Instant) {
         let loaded = self.loaded.first().copied();

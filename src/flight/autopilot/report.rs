@@ -255,7 +255,7 @@ impl Report {
         None
     }
 
-    /// Sets the numbers to send to the operator; `None` for unknown ones. They are the SIR, dB, and the relay's position.
+    /// Sets the numbers to send to the operator: the SIR, dB, and the relay's position. `None` for an unknown number.
     pub(super) fn values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         let [x, y, h] = match place {
             Some(place) => [place.x_m, place.y_m, place.altitude_m].map(Some),
@@ -322,7 +322,7 @@ pub enum AutopilotEvent {
     Found(Kind),
     /// The autopilot has restarted.
     Restarted,
-    /// The control state has changed to this one: see [`State`].
+    /// New control state of the drone: see [`State`].
     State(State),
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
@@ -339,8 +339,8 @@ pub enum AutopilotEvent {
     /// Report of the autopilot that the drone is outside of the autopilot's fence.
     FenceBreached,
     /// Drone so far from the line Tx to Rx that it has no position in the mission's coordinates. Check that the
-    /// configured positions of Tx and Rx are those of this flight. Reported once on the ground and at most once in 10
-    /// s in the air.
+    /// configured positions of Tx and Rx belong to this flight. This event is reported once on the ground and at most
+    /// once in 10 s in the air.
     OffLine(OffLine),
     /// The link accepted an operator's command that reports the lost relays of one side as landed. The command came over MAVLink.
     /// [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for the relay.

@@ -54,7 +54,7 @@ pub(super) struct Observed {
 }
 
 impl State {
-    /// Returns the control state that follows this one after `observed`.
+    /// Returns the next control state. It follows from this state and the observations `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
             is_received: there,

@@ -613,10 +613,10 @@ const DRIFT: u32 = 10;
 
 /// Conversion from the autopilot's clock to the relay's clock.
 ///
-/// It uses the minimum difference between the two clocks, that of the message with the least delay. A message can be
-/// late because the link is slow, and it can seem late because the autopilot's clock has lost time. A minimum that is
-/// never renewed takes the second for the first for good. A minimum that is renewed within 4 s to 8 s of messages
-/// corrects this, and a late message then counts as late for that long.
+/// The conversion uses the minimum difference between the two clocks, because this difference belongs to the message
+/// with the least delay. A message can be late because the link is slow, and it can seem late because the autopilot's
+/// clock has lost time. If the minimum were never renewed, every message would count as late for good once the
+/// autopilot's clock has lost time. Therefore the minimum is renewed within 4 s to 8 s of messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
     known: Option<Anchor>,
@@ -624,8 +624,8 @@ pub(super) struct RemoteClock {
 
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    /// Minimum of the relay's clock less the autopilot's clock, µs, in each half of the time window. The first is of
-    /// the previous half, the second of the present one.
+    /// Minimum of the relay's clock minus the autopilot's clock, µs, in each half of the time window. The first
+    /// number is for the previous half, the second for the present half.
     least: [i64; 2],
     since: Instant,
     messages: u8,
@@ -802,9 +802,10 @@ mod clock_tests {
         Instant::from_millis(ms)
     }
 
-    /// Simulates messages of a flight, and returns the age that each message seems to have, ms.
+    /// Simulates messages over a link with delays. Returns the age of each message by [`RemoteClock`], ms.
     ///
-    /// `clock_ms` returns the autopilot's clock at a time, and `delay` the link's delay at a time.
+    /// The autopilot sends a message every 200 ms for 80 s. `clock_ms` returns the autopilot's clock at a time, and
+    /// `delay` the link's delay at a time; all of them are in ms.
     fn ages(clock_ms: impl Fn(u64) -> u64, delay: impl Fn(u64) -> u64) -> heapless::Vec<u64, 512> {
         let mut clock = RemoteClock::default();
         let mut all = heapless::Vec::new();

@@ -48,8 +48,8 @@ pub struct Address {
     pub component: u8,
 }
 
-/// Returns the checksum of a frame from the bytes `covered`, those after the start byte. `known` has the CRC seed of
-/// the message.
+/// Returns the checksum of a frame. `covered` has the bytes after the start byte. `known` has the CRC seed of the
+/// message.
 pub fn checksum(covered: &[u8], known: Known) -> u16 {
     let mut digest = CRC.digest();
     digest.update(covered);
@@ -128,9 +128,9 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows: messages of this crate, and those whose payload may contain frames.
+/// Messages that the parser knows: messages of this crate, and messages whose payload may contain frames.
 ///
-/// The parser skips the latter as a whole, so that it does not find a frame inside.
+/// The parser skips a message with such a payload as a whole, so that it does not find a frame inside.
 const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::SYS_STATUS, 124, 31),
@@ -168,7 +168,7 @@ const TABLE: [Known; 31] = [
     known(385, 147, 133),
 ];
 
-/// Returns the properties of the message `id`; `None` for an unknown one.
+/// Returns the properties of the message `id`; `None` for an unknown message.
 pub fn find_known(id: u32) -> Option<Known> {
     TABLE.into_iter().find(|known| known.id == id)
 }

@@ -76,9 +76,9 @@ pub enum Outgoing<'a> {
     NamedValue {
         /// Time since the companion's start, ms.
         boot_ms: u32,
-        /// Name of the number, at most ten bytes; a longer one is truncated.
+        /// Name of the number, at most ten bytes; a longer name is truncated.
         name: &'a str,
-        /// Value of the number.
+        /// Value of the plotted quantity that `name` names.
         value: f32,
     },
 }

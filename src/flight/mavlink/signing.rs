@@ -38,8 +38,8 @@ const UNIT_US: u32 = 10;
 /// Seconds from 1970-01-01 to 2015-01-01, where signature timestamps start.
 const BEGIN_S: u64 = 1_420_070_400;
 
-/// Number of senders whose timestamps are remembered. There can be several, because an autopilot forwards frames that
-/// others have signed.
+/// Number of senders whose timestamps are remembered. There can be several senders, because an autopilot forwards
+/// frames that other systems have signed.
 const SENDERS: usize = 8;
 
 /// Sender of signed frames, with the minimum timestamp of its next frame, which prevents replays. If [`SENDERS`]
@@ -88,7 +88,7 @@ pub struct Signing {
     /// Timestamp of this link at the time `at`, in units of 10 µs.
     stamp: u64,
     at: Instant,
-    /// Timestamp in the signature of the last sent MAVLink frame.
+    /// Timestamp in the signature of the last sent MAVLink frame, in units of 10 µs.
     sent: u64,
     senders: [Sender; SENDERS],
 }

@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Test helper: reports the relay to its guard at `place`, long after the guard's last setpoint.
+    /// Test helper: reports the position `place` of the relay to its guard, long after the guard's last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);
@@ -19,8 +19,8 @@ impl One {
     }
 }
 
-/// Returns a message of a neighbour that knows this relay's association (session), for the tests. It has the fence
-/// number `number`, and `x_m` as the neighbour's x and agreed x.
+/// Returns a message of a neighbour that knows this relay's association (session), for the tests. The message has the
+/// fence number `number`, and `x_m` as the neighbour's x and agreed x.
 fn answer(one: &mut One, side: Side, x_m: f32, number: u16) -> Fence {
     let echo = one.sent(side).association;
     Fence {
@@ -111,8 +111,8 @@ fn relays_within_the_error_are_in_order_if_they_may_pass() {
     }
 }
 
-/// Checks that two neighbours in the wrong order along x halt the relay between them. Each of the two may seem to be
-/// on the correct side of that relay, within the errors of the reports.
+/// Checks that two neighbours in the wrong order along x halt the relay between them. Within the errors of the
+/// reports, each of the two neighbours may seem to be on the correct side of this relay.
 #[test]
 fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     for (up_m, down_m, halts) in [(101.5, 98.5, true), (101.5, 100.5, false)] {
@@ -137,8 +137,8 @@ fn two_neighbours_out_of_order_halt_the_relay_between_them() {
     }
 }
 
-/// Checks that a relay on its way that receives a halt request stops where it was last reported. It continues when
-/// the halt ends or expires.
+/// Checks that a relay on its way that receives a halt request stops at its last reported position. The relay
+/// continues when the halt ends or expires.
 #[test]
 fn a_relay_that_halts_on_its_way_stops_there() {
     for forgotten in [false, true] {
@@ -177,7 +177,7 @@ fn a_relay_that_halts_on_its_way_stops_there() {
     }
 }
 
-/// Checks that a relay that halts on its way into the geofence stops outside, at its position. A neighbour may be at
+/// Checks that a relay that halts on its way into the geofence stops at its position outside. A neighbour may be at
 /// the nearest position inside.
 #[test]
 fn a_relay_that_halts_outside_the_geofence_stops_there() {
@@ -252,7 +252,7 @@ fn a_halt_outlasts_a_reboot_of_its_requester() {
     }
 }
 
-/// Checks that a drone that its pilot gives back on the wrong side of a neighbour halts the chain.
+/// Checks that the chain halts if a pilot gives a drone back on the wrong side of a neighbour.
 #[test]
 fn a_relay_flown_again_out_of_order_requests_a_halt() {
     for side in [Side::Upstream, Side::Downstream] {
@@ -395,7 +395,7 @@ fn a_relay_out_of_order_with_one_that_fell_silent_stays() {
     }
 }
 
-/// Checks that a neighbour in manual control whose reported position is in order causes no halt.
+/// Checks that a neighbour in manual control causes no halt if its reported position is in order.
 #[test]
 fn a_reported_position_in_manual_flight_avoids_a_halt() {
     for (x_m, halts) in [(None, true), (Some(90.0), true), (Some(130.0), false)] {
@@ -423,8 +423,8 @@ fn a_reported_position_in_manual_flight_avoids_a_halt() {
     }
 }
 
-/// Checks that a fence message from before a reboot is not taken for the position of its sender. A message with a
-/// fence number has the x of the fence (limit of x), which may be far from the sender.
+/// Checks that a late fence message, sent before a reboot, is not taken as the position of its sender. A message with
+/// a fence number has the x of the fence (limit of x), which may be far from the sender.
 #[test]
 fn an_old_fence_gives_no_position_of_its_owner() {
     for (number, is_wrong) in [(0, true), (7, false)] {

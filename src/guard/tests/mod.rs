@@ -33,8 +33,8 @@ fn at(x_m: f32) -> Placement {
     Placement::on_line(x_m, 50.0)
 }
 
-/// Returns the first message of a neighbour for the tests, at `x_m`, with the agreed x `target_m`. It does not know
-/// this relay's association (session) number yet.
+/// Returns the first message of a neighbour for the tests, at `x_m`, with the agreed x `target_m`. This neighbour
+/// does not know this relay's association (session) number yet.
 fn fence(association: u16, x_m: f32, target_m: f32) -> Fence {
     Fence {
         association,
@@ -66,7 +66,7 @@ impl One {
         one
     }
 
-    /// Test helper: reports the relay to its guard at `x_m`, long after the guard's last setpoint.
+    /// Test helper: reports the x `x_m` of the relay to its guard, long after the guard's last setpoint.
     fn is_at(&mut self, x_m: f32) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, at(x_m));
@@ -141,8 +141,8 @@ fn setpoints_stay_in_the_geofence_and_bad_input_is_counted() {
     assert_eq!(one.guard.steer(one.now), Some(cut));
 }
 
-/// Checks rule 1: a relay stays beyond the fence (limit of x) of its upstream neighbour. It does so even if the
-/// downstream neighbour started too close.
+/// Checks rule 1: a relay stays beyond the fence (limit of x) of its upstream neighbour. This holds even if the
+/// downstream neighbour started too close to the relay.
 #[test]
 fn a_relay_between_two_fences_keeps_its_promise() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 100.0);
@@ -194,7 +194,7 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// Checks that a relay does not approach relays beyond a removed neighbour before it hears one of them.
+/// Checks that a relay does not approach relays beyond a removed neighbour until it has received one of them.
 #[test]
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);
@@ -465,7 +465,7 @@ fn relays_in_the_wrong_order_stay() {
 }
 
 /// Checks that a restarted relay is recognised, and its late old messages are ignored. The restarted relay does not
-/// know the fence (limit of x) that it announced. Its neighbour keeps to that fence until the two have exchanged
+/// know the fence (limit of x) that it announced. Its neighbour respects this fence until the two have exchanged
 /// messages.
 #[test]
 fn a_restart_is_distinguished_from_late_messages() {
@@ -508,8 +508,8 @@ fn a_restart_is_distinguished_from_late_messages() {
 
 /// Checks that a relay out of order with its downstream neighbour keeps the upstream one in place.
 ///
-/// Its message asks that neighbour to halt. A flag says that the x in the message, otherwise a permission, permits no
-/// move.
+/// Its message requests a halt from the upstream neighbour. Usually the x in a message permits a move. A flag in this
+/// message states that the x permits no move.
 #[test]
 fn a_relay_out_of_order_grants_nothing() {
     let mut one = One::new([Some(1), Some(3)], 100.0, 150.0);
@@ -573,7 +573,7 @@ fn a_relay_out_of_order_grants_nothing() {
 
 /// Checks that a relay counts as held up after five reminders without a change of its setpoint.
 ///
-/// The same setpoint, computed anew, does not start the count again; another one does.
+/// The same setpoint, computed anew, does not start the count again; another setpoint does.
 #[test]
 fn a_setpoint_that_stays_for_five_reminders_is_held_up() {
     let mut own = Own::new(config(), 1, Instant::ZERO);

@@ -10,7 +10,7 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::Instant;
 
-/// Three relays in a row, 100 m apart. The tests put the middle one under its pilot's manual control.
+/// Three relays in a row, 100 m apart. The tests put the middle drone under manual control of its pilot.
 struct Row {
     all: [One; 3],
 }
@@ -152,7 +152,7 @@ fn a_relay_on_its_way_stops_before_a_drone_in_its_way() {
     assert_eq!(row.setpoint(0), Some(40.0 + APART));
 }
 
-/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. Beside means
+/// Checks that a relay beside a drone in manual control moves sideways, up or down only away from it. "Beside" means
 /// closer than the separation along x.
 #[test]
 fn no_relay_moves_across_toward_a_drone_beside_it() {
@@ -215,9 +215,9 @@ fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// Checks that the hold reason tells that a restarted neighbour does not fly to setpoints. The neighbour's companion
-/// computer restarted, and its pilot has not engaged setpoint control again. The limit of x of the neighbour's old
-/// association (session) still holds.
+/// Checks the hold reason if a restarted neighbour does not fly to setpoints: it names this neighbour. The
+/// neighbour's companion computer restarted, and its pilot has not engaged setpoint control again. The limit of x of
+/// the neighbour's old association (session) still holds.
 #[test]
 fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();
@@ -235,8 +235,8 @@ fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     assert_eq!(reason, Some(HoldReason::NotFlown));
 }
 
-/// Checks that a relay reports a silent neighbour in setpoint control that makes no room. It does so after five
-/// reminders, and not while the relay itself moves.
+/// Checks that a relay reports a silent neighbour in setpoint control that makes no room. The report comes after five
+/// reminders (seconds), and not while the relay itself moves.
 #[test]
 fn a_relay_that_stands_for_long_reports_pending() {
     let mut row = Row::new();
@@ -284,8 +284,8 @@ fn a_relay_flown_again_begins_as_after_a_start() {
     assert_eq!(row.all[0].guard.hold_reason(Side::Downstream), None);
 }
 
-/// Checks that the notice of a relay that leaves its association (session) is repeated. This ends when the neighbour
-/// has started a new one. That holds even if the pilot has given the drone back.
+/// Checks that the notice of a relay that leaves its association (session) is repeated. The repetition ends when the
+/// neighbour has started a new association. It does not end because the pilot gives the drone back.
 #[test]
 fn lost_messages_are_repeated() {
     let mut row = Row::new();

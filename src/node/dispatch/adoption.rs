@@ -17,7 +17,8 @@ use crate::time::{Duration, Instant};
 use crate::wire::digest::MissionId;
 
 impl Node {
-    /// Handles the decision on a view proposal. If it is accepted, starts the new view (membership) with its mission.
+    /// Handles the decision on a view proposal. If the proposal is accepted, starts the new view (list of members)
+    /// with its mission.
     pub(super) fn adopt_view(&mut self, now: Instant, decided: ProposalOutcome) {
         let Some(proposed) = self.layers.view.proposed() else {
             return;
@@ -89,8 +90,8 @@ impl Node {
 
     /// Replaces the active mission by the stored `mission` with the identifier `id`. `now` is `None` after a start.
     ///
-    /// If the new mission has other positions of Tx and Rx, all relay positions become invalid: there is no setpoint
-    /// until the next agreement, and the guard starts again.
+    /// If the new mission has other positions of Tx and Rx, all relay positions become invalid: the relay has no
+    /// setpoint until the next agreement, and the guard (collision avoidance) starts again.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();
@@ -111,7 +112,7 @@ impl Node {
 
 impl Node {
     /// Returns the agreed position, changed as `Settings::without_quorum` requires if there is no quorum. `None`
-    /// before the first agreement.
+    /// until the chain has agreed.
     fn wanted_place(&self) -> Option<Placement> {
         let agreed = self.layers.round.agreed_place()?;
         Some(if self.layers.view.has_no_quorum() {
@@ -147,8 +148,8 @@ impl Node {
         self.steer(now);
     }
 
-    /// Records that the drone follows the setpoints from now on if `flown` is true, else that it does not. Returns
-    /// true if that is a change for the guard (collision avoidance).
+    /// Records if the drone follows the setpoints from now on: yes if `flown` is true. Returns true if this is a
+    /// change for the guard (collision avoidance).
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.steering.handle_control(now, flown);
         if is_news {
@@ -158,7 +159,7 @@ impl Node {
     }
 
     /// Handles the report that the lost relays at `side` are not in the air any more. The guard (collision avoidance)
-    /// then no longer avoids them, only the other relays of the view at that side.
+    /// then no longer avoids these lost relays. It still avoids the other relays of the view at this side.
     pub(crate) fn clear_lost(&mut self, now: Instant, side: Side) {
         let Member { index, mission, .. } = &self.member;
         let in_view = match side {
@@ -182,8 +183,8 @@ impl Node {
         self.steering.setpoint(self.wanted_place())
     }
 
-    /// Returns the position of the next node at `side`: a relay's agreed position, or that of Tx or Rx. `None` if it
-    /// is unknown.
+    /// Returns the position of the next node at `side`: the agreed position of a relay, or the position of Tx or Rx.
+    /// `None` if the position is unknown.
     pub(crate) fn place_toward(&self, side: Side) -> Option<Placement> {
         if !self.layers.neighbours.at(side).has_no_peer() {
             return self.steering.neighbour_place(side);

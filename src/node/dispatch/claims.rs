@@ -49,10 +49,10 @@ impl Node {
     }
 
     /// Handles a claim message of node `from`, by which nodes with the same node number detect each other. Returns
-    /// false if frames are signed, because handshakes replace claims then.
+    /// false if frames are signed, because signed handshakes then take the place of claims.
     ///
-    /// A claim of node `from` to its own number is sent back to it as an echo. An echo that arrives here shows a
-    /// claim to this relay's number, and is compared with this relay's own claim.
+    /// If node `from` claims its own number, its claim is sent back to it as an echo. An echo that arrives here shows
+    /// a claim to this relay's number, and is compared with this relay's own claim.
     pub(super) fn on_claim(&mut self, now: Instant, side: Side, from: u16, claim: Claim) -> bool {
         if self.member.settings.auth.is_some() {
             return false;
@@ -102,8 +102,9 @@ impl Node {
         neighbour.or_else(|| self.searches().then_some((side, self.member.node)))
     }
 
-    /// Returns the relay's new claim number if all authentication sessions must be restarted; else `None`. The new
-    /// sessions count their nonces from this number.
+    /// Returns the relay's new claim number if all authentication sessions must be restarted; else `None`. By the
+    /// claim number two nodes with the same node number decide which of them is active. The new sessions count their
+    /// nonces from this number.
     pub(crate) fn poll_sessions(&mut self) -> Option<u32> {
         self.duplicate.poll_sessions()
     }
@@ -114,9 +115,9 @@ impl Node {
 
     /// Returns the number of the lease renewal that requires a handshake after `message`.
     ///
-    /// `None` if `message` requires none.
-    /// On a shared channel this is so once in each lease renewal. From the handshake another node with the same
-    /// number detects this relay, even if the chain sends nothing else.
+    /// `None` if `message` requires no handshake. On a shared channel one message of each lease renewal requires a
+    /// handshake. From the handshake another node with the same number detects this relay, even if the chain sends
+    /// nothing else.
     pub(crate) fn handshake_of(&self, message: &Message) -> Option<u16> {
         let number = match message {
             Message::Pulse(pulse) if self.layers.neighbours.at(self.back()).has_no_peer() => {
@@ -145,7 +146,7 @@ impl Node {
     }
 
     /// Makes this passive relay active again, as after a restart. It leaves its view, because the other node with its
-    /// number may have changed that view meanwhile.
+    /// number may have changed this view in the meantime.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

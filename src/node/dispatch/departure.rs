@@ -28,8 +28,8 @@ use crate::wire::message::{Hello, Requests};
 /// Maximum distance of a drone in place from its setpoint along x, y and altitude, m.
 const IN_PLACE_M: f32 = 3.0;
 
-/// Time after which an ordered departure counts as blocked, in units of `dead_after`. The neighbours then do not receive each
-/// other. It is requested again after the same time.
+/// Time after which an ordered departure counts as blocked, in units of `dead_after`. The reason is that the two
+/// neighbours do not receive each other. The departure is requested again after the same time.
 const BLOCKED_AFTER: u32 = 4;
 
 /// State of a relay that leaves the chain or waits outside of it.
@@ -54,41 +54,43 @@ pub enum Departure {
     Blocked,
     /// Spare outside of the chain, which the leader may call.
     Spare,
-    /// Relay outside of the chain: it holds its place, and the others close up.
+    /// Relay outside of the chain: it holds its place, and the other relays close the gap.
     Outside,
     /// Relay outside of the chain: the drone may fly away.
     Free,
 }
 
-/// Departure of this relay, and what it knows of spares.
+/// Departure of this relay from the chain, and its knowledge of spares (relays that wait outside).
 #[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Leaving {
     requested: bool,
     /// Time at which the drone's endurance ends; `None` if unknown.
     lasts_until: Option<Instant>,
-    /// Time at which this relay went outside of the chain; `None` inside.
+    /// Time at which this relay went outside of the chain; `None` while it is inside.
     outside_since: Option<Instant>,
     /// True for each side at which the chain ended with this relay when it went outside.
     ended: [bool; 2],
-    /// True for each side whose neighbour has selected the relay beyond this one.
+    /// True for each side whose neighbour has selected the relay beyond this relay.
     passed: [bool; 2],
     /// True for a spare, also for one that has requested to leave since.
     spare: bool,
     free: bool,
     /// True while the drone has no endurance for a return to the chain.
     spent: bool,
-    /// Time of the first order to leave since the request; `None` before.
+    /// Time of the first order to leave since the request; `None` without an order.
     ordered_at: Option<Instant>,
-    /// Last reported position of the drone; `None` before any.
+    /// Last reported position of the drone; `None` until a position is reported.
     place: Option<Placement>,
-    /// Position to arrive at; `None` before the first agreement, and while the setpoint moves.
+    /// Position at which the drone counts as in place. `None` until the chain has agreed, and while the setpoint
+    /// moves.
     goal: Option<Placement>,
-    /// Spare that was received last, and when.
+    /// Spare (relay that waits outside) from which a frame was received last, and the time of this frame.
     heard_spare: Option<(u16, Instant)>,
-    /// Relay outside of the chain, on this side, that has to be told when it may leave.
+    /// Relay outside of the chain, on this side, that must be informed when it may leave.
     waiting: Option<(Side, u16)>,
-    /// Bits, by side and distance, of the relays that the firmware knows to be free to leave.
+    /// Relays that may leave and that were reported to the firmware. One bit mask for each side, with a bit for each
+    /// distance.
     told: [u8; 2],
 }
 
@@ -115,7 +117,7 @@ impl Leaving {
         self.place = Some(place);
     }
 
-    /// Records the adoption of a view: an order of the view before has ended.
+    /// Records the adoption of a view: an order from the previous view has ended.
     pub(crate) const fn end_order(&mut self) {
         self.ordered_at = None;
         self.passed = [false; 2];
@@ -137,7 +139,7 @@ impl Leaving {
 }
 
 impl Layers {
-    /// Returns the reason why this relay cannot leave the chain now; `None` if it can.
+    /// Returns the reason why this relay cannot leave the chain now; `None` if it can leave.
     fn departure_refusal(&self, now: Instant, member: &Member) -> Option<Departure> {
         let Member {
             node,
@@ -171,7 +173,7 @@ impl Layers {
         }
     }
 
-    /// Updates the requests of this relay to the leader, for the next renewal.
+    /// Updates the requests of this relay to the leader, for the next lease renewal.
     pub(super) fn update_requests(&mut self, now: Instant, member: &Member) {
         let Leaving {
             requested,
@@ -195,8 +197,8 @@ impl Layers {
 }
 
 impl Node {
-    /// Requests to leave the chain. `endurance_s` is the remaining endurance of the drone, s; `None` if unknown. A relay that
-    /// has not taken part in anything since its start goes outside at once.
+    /// Requests to leave the chain. `endurance_s` is the remaining endurance of the drone, s; `None` if unknown. A
+    /// relay that has taken no part in the protocol since its start leaves the chain at once.
     pub(crate) fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
         let leaving = &mut self.layers.leaving;
         leaving.lasts_until =
@@ -252,8 +254,8 @@ impl Node {
         leaving.requested.then_some(leaving.free)
     }
 
-    /// Makes this relay a spare outside of the chain. No effect if it has taken part in anything since its start, leads,
-    /// has requested to leave, or has two wires.
+    /// Makes this relay a spare outside of the chain. The call has no effect if the relay has taken part in the
+    /// protocol since its start, is the leader, has requested to leave, or has two wires.
     pub(crate) fn wait_as_spare(&mut self, now: Instant) {
         let leaving = &self.layers.leaving;
         let may = self.searches() && self.layers.round.is_fresh() && !leaving.requested;
@@ -302,7 +304,7 @@ impl Node {
         leaving.spare = spare;
     }
 
-    /// Joins the chain again, as a relay that was lost; no effect inside.
+    /// Joins the chain again, like a lost relay that comes back. No effect if this relay is inside the chain.
     fn come_back(&mut self, now: Instant) {
         let leaving = &mut self.layers.leaving;
         if leaving.outside_since.take().is_none() {
@@ -321,8 +323,8 @@ impl Node {
         }
     }
 
-    /// Returns this relay to the chain if it is outside and could not become free for too long. Without a later view
-    /// the relay is still needed.
+    /// Returns this relay to the chain if it has waited outside too long for the permission to fly away. If no later
+    /// view was agreed on, the chain still needs this relay.
     pub(super) fn return_if_expired(&mut self, now: Instant) {
         let Leaving {
             outside_since,
@@ -343,23 +345,23 @@ impl Node {
         }
     }
 
-    /// Returns true if `node` is between this relay and its neighbour at `side`, or beyond the end.
+    /// Returns true if `node` is between this relay and its neighbour at `side`, or beyond this end of the chain.
     fn is_beside(&self, side: Side, node: u16) -> bool {
         let own = self.member.node;
         let neighbour = self.layers.neighbours.at(side).node();
         neighbour == 0 || node.abs_diff(own) < neighbour.abs_diff(own)
     }
 
-    /// Returns true if node `to` at `side`, outside of the chain, may leave. The view without it is agreed on and its
-    /// relays are in place.
+    /// Returns true if node `to` at `side`, outside of the chain, may leave. It may leave once the view without it is
+    /// agreed on, and the relays of this view are in place.
     pub(super) fn frees(&self, side: Side, to: u16) -> bool {
         let lease = &self.layers.lease;
         let complete = lease.is_whole() && lease.until().is_some() && lease.orders().in_place;
         complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
     }
 
-    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. It is raised once until that
-    /// node is a neighbour again.
+    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. The event is raised once;
+    /// again only after the node has been a neighbour again.
     pub(super) fn on_freed(&mut self, side: Side, to: u16) {
         let bit = mask(to.abs_diff(self.member.node));
         if let Some(told) = self.layers.leaving.told.get_mut(side as usize)
@@ -370,12 +372,12 @@ impl Node {
         }
     }
 
-    /// Returns true if node `to` at `side`, outside of the chain, is called to join it.
+    /// Returns true if node `to` at `side`, outside of the chain, is called by the leader to join the chain.
     pub(super) fn calls(&self, side: Side, to: u16) -> bool {
         self.layers.lease.orders().joiner == to && self.is_beside(side, to)
     }
 
-    /// Updates the position at which this relay counts as in place; `wanted` is the place to fly to.
+    /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to.
     pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
         // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
         let is_held = [Side::Upstream, Side::Downstream]
@@ -435,8 +437,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Handles the part of a hello of node `from` that concerns relays outside of the chain. Returns true if nothing else
-    /// in the hello counts: this relay or the sender is outside.
+    /// Handles the part of a hello of node `from` that concerns relays outside of the chain. Returns true if the rest
+    /// of the hello must be ignored, because this relay or the sender is outside of the chain.
     pub(super) fn on_departure(
         &mut self,
         now: Instant,

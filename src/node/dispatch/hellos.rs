@@ -11,7 +11,8 @@ use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 
-/// Mission fields of a hello: the newest stored mission, and flags for active and refused.
+/// Mission fields of a hello: the newest mission that the relay has stored, and two flags: the mission is active, the
+/// mission was refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -86,7 +87,7 @@ impl Node {
         }
     }
 
-    /// Returns the mission fields of a hello, for the stored mission or a newer one that was refused.
+    /// Returns the mission fields of a hello, for the stored mission, or for a newer mission that was refused.
     fn mission_state(&self) -> MissionState {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         if let Some(refused) = self.layers.update.refused_mission(active) {
@@ -110,8 +111,9 @@ impl Node {
     /// Returns true if this relay could be inserted between node `other` and the neighbour of `other`. Node `other`
     /// is at `side`, and its neighbour must be on the opposite side of this relay.
     ///
-    /// One more condition must hold: this relay and that neighbour receive each other; or this relay is linked to a
-    /// nearer node, and both are inserted together; or this relay's link crosses the link of `other`.
+    /// In addition one of three conditions must hold. Either this relay and the neighbour of `other` receive each
+    /// other. Or this relay is linked to a nearer node, and both are inserted together. Or this relay's link crosses
+    /// the link of `other`.
     fn is_between(&self, now: Instant, side: Side, other: u16) -> bool {
         let own = self.member.node;
         let beyond = self
@@ -131,8 +133,8 @@ impl Node {
         fits && (far.is_two_way(distance, now, settings) || far.links_within(distance) || crosses)
     }
 
-    /// Returns the number of relays that a neighbour reaches through this relay. They are this one and those at
-    /// `far`, its other side.
+    /// Returns the number of relays that a neighbour reaches through this relay. These are this relay, and the relays
+    /// on its other side, `far`.
     fn relays_through(&self, far: Side) -> u16 {
         // A relay that has just started belongs to no part of the chain. One that was left out keeps its count of the relays of
         // the old view, although no neighbour selects it.
@@ -223,7 +225,7 @@ impl Node {
     }
 
     /// Records if node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly does
-    /// not.
+    /// not receive this relay.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -236,8 +238,9 @@ impl Node {
         }
     }
 
-    /// Selects node `from` as the neighbour on `side` if there is none, or if the node is better. A nearer node is
-    /// better, or one that leads to more relays. A node that does not receive this relay is not selected.
+    /// Selects node `from` as the neighbour on `side` if this side has no neighbour, or if the node is better than
+    /// the neighbour. A node is better if it is nearer, or if it leads to more relays. A node that does not receive
+    /// this relay is not selected.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);
@@ -290,8 +293,8 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). Retransmits unanswered
-    /// messages if that is new, because the neighbour can answer now.
+    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). If this has just
+    /// become true, retransmits unanswered messages, because the neighbour can answer now.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

@@ -224,8 +224,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a valid signed frame of node `from` at `side`. If it is the `first` one of a session, messages that
-    /// the node could not verify before are sent again.
+    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first` is
+    /// true), messages that the node could not verify are sent again.
     pub(crate) fn on_authentic(&mut self, now: Instant, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
@@ -255,7 +255,7 @@ impl Node {
     }
 
     /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. If several
-    /// such handshakes come in a row, the node is reported to the firmware.
+    /// such handshakes are received in a row, the node is reported to the firmware.
     pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -290,8 +290,8 @@ impl Node {
         Side::back(self.member.mission.heading())
     }
 
-    /// Returns the side of node `sender`. `None` unless it is a neighbour, a possible neighbour, or a ground station
-    /// that may upload missions.
+    /// Returns the side of node `sender`. `None` unless the node is a neighbour, a possible neighbour, or a ground
+    /// station that may upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);
@@ -329,8 +329,8 @@ impl Node {
         self.member.settings.wiring == Wiring::Shared
     }
 
-    /// Handles a frame of node `from` received at port `through`. If the node is already received at the other port,
-    /// two nodes use the same number, which is reported.
+    /// Handles a frame of node `from` received at port `through`. If this node number is already received at the
+    /// other port, two nodes use the same number. This is reported to the firmware.
     pub(crate) fn on_received_at_both_ports(&mut self, now: Instant, through: Side, from: u16) {
         let Some(side) = self.side_of(from).filter(|side| *side != through) else {
             return;

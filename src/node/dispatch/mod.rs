@@ -81,7 +81,8 @@ fn seed_of(identity: Identity, seed: u32) -> u32 {
 }
 
 impl Node {
-    /// Creates a relay with valid `identity` and `settings`. It does nothing until [`begin`](Self::begin).
+    /// Creates a relay with valid `identity` and `settings`. The relay does nothing until [`begin`](Self::begin) is
+    /// called.
     ///
     /// The value consists of plain numbers only, so that the compiler can write it in place, without a copy on the
     /// stack.
@@ -260,7 +261,7 @@ impl Node {
         &self.member
     }
 
-    /// Returns the positions of Tx and Rx that the active mission has of its own. `None` if the configured positions
+    /// Returns the positions of Tx and Rx if the active mission states them. `None` if the configured positions
     /// apply.
     pub(crate) fn sites(&self) -> Option<Sites> {
         self.layers.update.sites()
@@ -346,8 +347,8 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// Returns the state that a protocol layer receives as an argument. It borrows only `member`, so that the layers
-    /// can be borrowed mutably at the same time.
+    /// Returns the state that a protocol layer receives as an argument. The state borrows only `member`, so that the
+    /// layers can be borrowed mutably at the same time.
     pub(super) fn context<'a>(&self, now: Instant, member: &'a Member) -> Context<'a> {
         let onward = Side::onward(member.mission.heading());
         Context {
@@ -359,9 +360,9 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` is early, and would leave out relays about to be linked. Assumed
-    /// for a short time after the sender became the neighbour, if the proposal has visited fewer relays than the last
-    /// one.
+    /// Returns true if a view proposal from `side` is early, and would leave out relays that are about to be linked.
+    /// This is assumed for a short time after the sender became the neighbour, if the proposal has visited fewer
+    /// relays than the previous proposal.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
@@ -379,15 +380,16 @@ impl Layers {
 pub(super) struct Telemetry {
     pub(super) events: Pending,
     pub(super) stats: Stats,
-    /// True if the end of the lease was reported to the firmware since the last accepted view. It is reported once
-    /// per view (membership of the chain).
+    /// True if the end of the lease was reported to the firmware since the last accepted view. The end is reported
+    /// once per view (agreed members of the chain).
     pub(super) lapse_reported: bool,
-    /// True if a missing quorum was reported to the firmware since the last accepted view. It is reported once per
-    /// view (membership of the chain).
+    /// True if a missing quorum was reported to the firmware since the last accepted view. The missing quorum is
+    /// reported once per view (agreed members of the chain).
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum after which relays drop their neighbour links first, in units of `dead_after`.
+/// Time without a quorum after which relays drop the links to their neighbours for the first time, in units of
+/// `dead_after`.
 const FIRST_RETENTION: u32 = 3;
 
 /// Time without a quorum after which relays drop their links again, in units of `dead_after`.
@@ -413,7 +415,7 @@ impl NoQuorumTimer {
 }
 
 impl Node {
-    /// Starts the timer for dropping links if there is no quorum on a shared channel, else stops it.
+    /// Starts the timer for dropping links if there is no quorum on a shared channel. Otherwise stops this timer.
     pub(super) fn update_no_quorum_timer(&mut self, now: Instant) {
         if !self.searches() || !self.layers.view.has_no_quorum() {
             self.no_quorum_timer = NoQuorumTimer::NONE;
@@ -488,8 +490,8 @@ impl Node {
         Some((side, to, Message::Fence { line_digest, fence }))
     }
 
-    /// Returns the next pending message of a view change, a lease renewal or an agreement on positions. It comes with
-    /// its side and its destination node. `None` if no such message is pending.
+    /// Returns the next pending message of a view change, a lease renewal or an agreement on positions. The result
+    /// includes the side and the destination node. `None` if no such message is pending.
     fn next_of_a_round(&mut self, now: Instant) -> Option<(Side, u16, Message)> {
         let (onward, back) = (self.onward(), self.back());
         let peer = |side| {

@@ -84,7 +84,7 @@ impl Node {
     }
 
     /// Returns true if an offer with the number `offer_number` answers a recent hello of this relay. Each hello has a
-    /// number, which the offer repeats. Any other offer is counted as stale.
+    /// number, and the offer repeats this number. An offer with another number is counted as stale.
     fn is_asked(&mut self, now: Instant, offer_number: u16) -> bool {
         let asked = self
             .layers
@@ -99,9 +99,9 @@ impl Node {
     /// Handles an offer of a mission from node `from` at `side`. Node `from` and this relay have loaded the same
     /// mission before flight.
     ///
-    /// An offer that repeats no recent number is answered by a hello, which the next offer can answer. After any
-    /// other offer a hello is sent only if this relay has stored or refused the mission, or has a newer one.
-    /// Otherwise the hello would trigger the same offer again.
+    /// An offer that repeats no recent number is answered by a hello; the next offer can repeat the number of this
+    /// hello. After any other offer a hello is sent only if this relay has stored or refused the mission, or has a
+    /// newer mission. Otherwise the hello would trigger the same offer again.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,
@@ -128,8 +128,8 @@ impl Node {
         }
     }
 
-    /// Stores `upload` if it is newer than the stored mission. If it does not fit the line from Tx to Rx or the
-    /// geofence, it is refused and counted instead, and reported once.
+    /// Stores `upload` if it is newer than the stored mission. If the mission does not fit the line from Tx to Rx or
+    /// the geofence, it is refused, counted, and reported once.
     fn store_upload(&mut self, now: Instant, upload: &Upload) {
         match self.layers.update.store_if_newer(&self.member, upload) {
             Offered::Stored => self.on_stored(now),
@@ -176,7 +176,7 @@ impl Node {
         self.layers.update.upload()
     }
 
-    /// Handles a neighbour's report that the mission `refused` is refused. The neighbour itself refuses it, or a
+    /// Handles a neighbour's report that the mission `refused` is refused. Either the neighbour refuses it, or a
     /// relay beyond the neighbour.
     pub(super) fn on_refused(&mut self, side: Side, refused: MissionId) {
         let is_held = refused == self.layers.update.latest() && refused != self.member.active;
@@ -193,8 +193,8 @@ impl Node {
         }
     }
 
-    /// Compares `holds`, the mission that node `from` at `side` has stored, with this relay's newest one. If `holds`
-    /// is older, schedules an offer; if it is newer, a hello that requests an offer.
+    /// Compares `holds`, the mission that node `from` at `side` has stored, with this relay's newest mission. If
+    /// `holds` is older, schedules an offer. If `holds` is newer, schedules a hello that requests an offer.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;
@@ -221,7 +221,7 @@ impl Node {
     }
 
     /// Returns the pending mission offer to the neighbour at `side`; `None` if no offer is pending. An offer must
-    /// answer a recent hello; without one, a hello that requests a hello is returned instead.
+    /// answer a recent hello; without a recent hello, the function returns a hello that requests a hello.
     pub(super) fn next_offer(&mut self, now: Instant, side: Side) -> Option<(Side, u16, Message)> {
         let neighbour = self.layers.neighbours.at(side);
         let (to, holds) = (neighbour.node(), neighbour.latest_mission);

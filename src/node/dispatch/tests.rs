@@ -78,8 +78,8 @@ pub(super) fn sent_messages(node: &mut Node) -> heapless::Vec<(u16, Message), 8>
     said
 }
 
-/// Returns a hello of a node that has selected relay 2 as its neighbour. `holds` is the newest mission that it has
-/// stored.
+/// Returns a hello of a node that has selected relay 2 as its neighbour. `holds` is the newest mission that the node
+/// has stored.
 pub(super) fn hello(node: &Node, holds: MissionId) -> Message {
     Message::Hello(Hello {
         mission: node.member.digest,
@@ -278,8 +278,8 @@ fn an_offer_for_other_relays_is_refused() {
     );
 }
 
-/// Checks that an offer of a node that is not this relay's neighbour is answered by one hello only. Offers and hellos
-/// between the two would otherwise never end.
+/// Checks that an offer of a node that is not this relay's neighbour is answered by one hello only. Otherwise the
+/// exchange of offers and hellos between the two nodes would never end.
 #[test]
 fn an_offer_of_an_unselected_node_is_answered_once() {
     let five = Mission::try_new(paper(5)).unwrap();
@@ -310,7 +310,7 @@ fn an_offer_of_an_unselected_node_is_answered_once() {
     );
 }
 
-/// Checks that an offer that arrives too late is answered by a hello only. A new offer that answers that hello is
+/// Checks that an offer that arrives too late is answered by a hello only. A new offer that answers this hello is
 /// accepted.
 #[test]
 fn an_offer_that_was_withheld_is_refused_and_counted() {
@@ -371,7 +371,7 @@ fn a_stored_upload_does_not_contain_the_offer_number() {
     assert_eq!(Upload::decode(&bodies[0][..LENGTH + 2]), None);
 }
 
-/// Returns a hello of node 1. `hears` is the bit mask of the nodes that it has received.
+/// Returns a hello of node 1. `hears` is the bit mask of the nodes from which node 1 has received frames.
 fn hello_of(node: &Node, hears: u8) -> Message {
     let Message::Hello(hello) = hello(node, node.layers.update.latest()) else {
         unreachable!();
@@ -439,8 +439,8 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
     }
 }
 
-/// Checks that a spare relay requests no view, whatever else happens, until it is called in. A spare waits outside of
-/// the chain.
+/// Checks that a spare relay requests no view, whatever else happens, until the leader calls it into the chain. A
+/// spare waits outside of the chain.
 #[test]
 #[cfg(feature = "departures")]
 fn a_relay_outside_proposes_nothing() {

@@ -123,8 +123,8 @@ impl Node {
             .is_solving(&self.layers.context(now, &self.member))
     }
 
-    /// Restarts the timers for silent neighbours and the first pass, after the joint method's computation. They must
-    /// not expire because of the time that all relays spend computing.
+    /// Restarts the timers for silent neighbours and the first pass, after the joint method's computation. The time
+    /// that all relays spend on the computation must not let these timers expire.
     fn on_solved(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             let neighbour = self.layers.neighbours.at_mut(side);

@@ -47,8 +47,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Returns the record of a node's gap-free reception after a frame from the node at `distance`. It restarts after
-    /// a silence of more than `gap`, or if `known` is of another node.
+    /// Returns the record of a node's gap-free reception after a frame from the node at `distance`. The record
+    /// restarts after a silence of more than `gap`, or if `known` is the record of another node.
     fn updated(known: Option<Self>, distance: u16, now: Instant, gap: Duration) -> Self {
         let since = match known {
             Some(known) if known.distance == distance && now.since(known.last) <= gap => {
@@ -69,7 +69,8 @@ impl Heard {
 struct Link {
     /// Time at which the link to the neighbour was last lost.
     lost_at: Instant,
-    /// Frames received since the last loss of the link: times of the first and last; `None` without any.
+    /// Frames received since the last loss of the link: times of the first and the last frame. `None` if there was no
+    /// frame.
     back: Option<Heard>,
     losses: u8,
     /// True if the last loss does not count as flapping, because the channel was bad.
@@ -113,7 +114,8 @@ impl Link {
         self.back.is_none_or(|back| now.since(back.since) < span)
     }
 
-    /// Records a loss of the link. `losses` is the number of recent losses before it. If `counted` is false, the number stays the same.
+    /// Records a loss of the link. `losses` is the number of recent losses before this loss. If `counted` is false,
+    /// this loss does not count.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -146,8 +148,8 @@ impl Damping {
         }
     }
 
-    /// Clears the record of lost links when the relay starts, at `now`. It works in place, because a copy would need
-    /// more stack than any other step of the start.
+    /// Clears the record of lost links when the relay starts, at `now`. The function works in place, because a copy
+    /// would need more stack than any other step of the start.
     pub(super) fn begin(&mut self, now: Instant) {
         for link in &mut self.links {
             *link = Link::new(now);
@@ -180,9 +182,9 @@ impl Damping {
         }
     }
 
-    /// Records a frame of the node `distance` relays away. A long silence before it is a loss of the link.
-    /// `searching_since` is the start of the search, `None` if this side has a neighbour. During a search, a link
-    /// counts as lost if its node has answered and then was silent for longer than `gap`.
+    /// Records a frame of the node `distance` relays away. A long silence before this frame counts as a loss of the
+    /// link. `searching_since` is the start of the search, `None` if this side has a neighbour. During a search, a
+    /// link counts as lost if its node has answered and then was silent for longer than `gap`.
     pub(super) fn record_hello(
         &mut self,
         distance: u16,
@@ -212,15 +214,15 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false until `probe_after` after that
-    /// time.
+    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false earlier
+    /// than `probe_after` after `since`.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
     }
 
-    /// Raises the loss counts of all links on this side to the count of the link lost last. These links were lost together, because all
-    /// cross the same gap in the chain.
+    /// Raises the loss counts of all links on this side to the count of the link that was lost last. These links were
+    /// lost together, because all of them cross the same gap in the chain.
     fn equalise_losses(&mut self, now: Instant, settings: &Settings) {
         let lost = self.links.iter();
         let lost = lost.filter(|link| link.recent(now, settings) > 0);
@@ -240,8 +242,8 @@ impl Damping {
         link.is_some_and(|link| link.is_held_down(now, settings))
     }
 
-    /// Returns true if a link on this side flaps slowly (is lost repeatedly, at long intervals). Its next loss should
-    /// then be detected early.
+    /// Returns true if a link on this side flaps slowly (is lost repeatedly, at long intervals). The next loss of
+    /// such a link should be detected early.
     pub(super) fn has_slow_flapping(&self, now: Instant, settings: &Settings) -> bool {
         let slow = settings.dead_after.times(SLOW_INTERVAL);
         let is_slow =
@@ -268,8 +270,8 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if it has been
-    /// received without gaps for `probe_after`, or for `more` if that is longer.
+    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node
+    /// has been received without gaps for long enough: for `probe_after` or `more`, whichever is longer.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,
@@ -310,8 +312,8 @@ mod tests {
         (Damping::new(now), now, Settings::default())
     }
 
-    /// Simulates a loss of the link to the nearest node for 40 s. Meanwhile this side searches for a neighbour, and the
-    /// nodes `heard` answer. They are given by their distances, in relays.
+    /// Simulates a loss of the link to the nearest node for 40 s. During this time this side searches for a
+    /// neighbour, and the nodes `heard` answer. `heard` has their distances, in relays.
     fn outage(side: &mut Damping, now: &mut Instant, heard: &[u16], settings: &Settings) {
         let search = *now;
         side.record_loss(1, true, search, settings);

@@ -54,7 +54,7 @@ impl ReportLimiter {
         nodes: 0,
     };
 
-    /// Returns true if the node `distance` relays away may be reported now, and marks it as reported. It may be
+    /// Returns true if the node `distance` relays away may be reported now, and marks it as reported. A node may be
     /// reported once a minute.
     pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
@@ -114,7 +114,7 @@ impl Hearing {
 }
 
 /// Pending hellos to the four nearest nodes on one side, as bit masks; bit 0 is the nearest node. One mask has all
-/// pending hellos, the other those that request an answer.
+/// pending hellos, the other mask the hellos that request an answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Hellos {
     due: u8,

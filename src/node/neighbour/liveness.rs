@@ -22,16 +22,16 @@ use crate::node::context::longest_lease;
 use crate::settings::Settings;
 use crate::time::{Duration, Instant};
 
-/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost. Exception: a silence of the
-/// maximum lease duration.
+/// Minimum number of unanswered heartbeat requests before a neighbour counts as lost. Exception: after a silence of
+/// the maximum lease duration it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the longest recent run of unanswered heartbeat requests. A neighbour counts as lost after that many, or
-/// after the maximum lease duration.
+/// Factor on the longest recent run of unanswered heartbeat requests. A neighbour counts as lost after this multiple
+/// of unanswered requests, or after the maximum lease duration.
 const MARGIN: u16 = 3;
 
-/// Returns the interval between heartbeat requests to a silent neighbour. It is a round trip through `all` relays,
-/// but short enough for sixteen requests between `probe_after` and `dead_after`.
+/// Returns the interval between heartbeat requests to a silent neighbour. The interval is a round trip through `all`
+/// relays, but short enough for sixteen requests between `probe_after` and `dead_after`.
 pub(crate) fn tick(settings: &Settings, all: u16) -> Duration {
     paced(settings, all, waiting(settings) / u64::from(MIN_REQUESTS))
 }
@@ -73,8 +73,8 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
     Duration::from_micros(micros)
 }
 
-/// Returns the silence of a neighbour after which a heartbeat is requested. It is `Settings::probe_after`, or the
-/// round trip through a chain of `all` relays if that is longer.
+/// Returns the silence of a neighbour after which a heartbeat is requested. This silence is the longer of two times:
+/// `Settings::probe_after`, and the round trip through a chain of `all` relays.
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)
@@ -85,19 +85,20 @@ const REMEMBERED_REQUESTS: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Liveness {
-    /// Latest time at which the neighbour is known to have been alive. At first the time of this relay's start.
+    /// Latest time at which the neighbour is known to have been alive. At first this is the time of this relay's
+    /// start.
     last_sign: Instant,
     lost: bool,
     /// True if a frame of the neighbour has been received since the start, or since the neighbour was lost.
     was_received: bool,
-    /// Number of the last heartbeat request to the neighbour, 0 before any.
+    /// Number of the last heartbeat request to the neighbour, 0 if none was sent.
     request_number: u16,
     /// Times of the last heartbeat requests, latest first.
     request_times: [Instant; REMEMBERED_REQUESTS],
     /// Number of heartbeat requests since the neighbour was last known to be alive.
     unanswered: u16,
-    /// Longest recent run of unanswered heartbeat requests before a reply. It is a measure of the channel's losses. The number starts at
-    /// [`MIN_REQUESTS`] and decays with each reply.
+    /// Longest recent run of unanswered heartbeat requests before a reply. This number measures the losses of the
+    /// channel. The number starts at [`MIN_REQUESTS`] and decays with each reply.
     longest: u16,
 }
 
@@ -129,9 +130,10 @@ impl Liveness {
         }
     }
 
-    /// Restarts the liveness record for another node as the neighbour. It keeps the longest run of unanswered
-    /// requests, which describes the channel. The unanswered requests to the previous node count as a run, unless the
-    /// link `was_down`, because then they measure an outage. If the link `flaps` slowly, all runs are dropped.
+    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is
+    /// kept, because it describes the channel. The unanswered requests to the previous node count as a run. But they
+    /// do not count if the link `was_down`, because they then measure an outage. If the link `flaps` slowly, all runs
+    /// are dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -207,8 +209,8 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, because computing relays send nothing. Returns
-    /// false, and does nothing, if the neighbour is lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, because relays send nothing while they compute.
+    /// Returns false, and does nothing, if the neighbour is lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {
             self.last_sign = now;
@@ -216,8 +218,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost; never before a silence of `dead`. `tick` is the time to the
-    /// next check.
+    /// Checks at `now` if the silent neighbour is lost. It is never lost before a silence of `dead`. `tick` is the
+    /// time to the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

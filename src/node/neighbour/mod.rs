@@ -90,8 +90,8 @@ impl Neighbours {
     }
 
     /// Returns the next pending heartbeat: its side, its destination, and two numbers; 0 means none. The first number
-    /// is that of a request to the neighbour, the second that of the neighbour's request which the heartbeat answers.
-    /// `None` if no heartbeat is pending.
+    /// is the number of this relay's request to the neighbour. The second number is the number of the neighbour's
+    /// request that the heartbeat answers. `None` if no heartbeat is pending.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(Side, u16, u16, u16)> {
         [Side::Upstream, Side::Downstream]
             .into_iter()

@@ -41,7 +41,7 @@ enum NeighbourState {
     NoPeer,
     /// Linked: this relay and the node have selected each other, by the node's last report.
     Linked,
-    /// Pairing: this relay has selected a node that has not, or no longer, selected this relay.
+    /// Pairing: this relay has selected a node, but this node has not selected this relay, or no longer.
     Pairing {
         since: Instant,
     },
@@ -57,12 +57,13 @@ pub(crate) struct Neighbour {
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
     /// End of the time after the selection of a neighbour in which no new view is requested. The relay beyond the
-    /// neighbour may select it at the same time, and one view change is enough for both.
+    /// neighbour may select the neighbour at the same time. One view change is enough for both selections.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
     pub(super) damping: Damping,
-    /// Node whose link was dropped because there was no quorum. 0 if none since a neighbour was last selected.
+    /// Node whose link was dropped because there was no quorum. 0 if no link was dropped since a neighbour was last
+    /// selected.
     dropped: u16,
     /// Previous neighbour, which a nearer node has replaced; 0 for none.
     replaced: u16,
@@ -75,14 +76,15 @@ pub(crate) struct Neighbour {
     /// Neighbours that the four nearest nodes on this side have selected in the direction of this relay. One entry
     /// for each of the four, the nearest first: the number of its neighbour; 0 for none.
     pub(super) selection: [u16; CANDIDATES as usize],
-    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` before any.
+    /// Time of the last frame on this side from a node that is not the selected neighbour. `None` if there was no
+    /// such frame.
     unselected_at: Option<Instant>,
     /// Nodes on this side of the relay from which it has recently received frames.
     pub(super) hearing: Hearing,
     /// Number of consecutive hellos of each node on this side that do not list this relay as received.
     pub(super) not_received: ConsecutiveCounts,
-    /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. Reports go to the firmware;
-    /// bit 0 is the nearest node.
+    /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. The reports are events for
+    /// the firmware. Bit 0 is the nearest node.
     reported_found: u8,
     /// Limiter of reports about nodes on this side that have another mission.
     pub(super) mismatches: ReportLimiter,
@@ -173,7 +175,7 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if this side has no neighbour, and the search for one has ended without success.
+    /// Returns true if this side has no neighbour, and the search for a neighbour has ended without success.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
@@ -189,7 +191,7 @@ impl Neighbour {
         self.liveness.is_present()
     }
 
-    /// Returns true if the selected neighbour is lost, and nothing has been received from it since.
+    /// Returns true if the selected neighbour is lost, and nothing has been received from it since the loss.
     pub(crate) const fn is_silent(&self) -> bool {
         self.liveness.is_silent()
     }
@@ -214,8 +216,7 @@ impl Neighbour {
         self.state == NeighbourState::Linked
     }
 
-    /// Records that the neighbour has selected this relay if `mutual` is true, else that it has not. Returns true if
-    /// that is a change.
+    /// Records if the neighbour has selected this relay: yes if `mutual` is true. Returns true if this is a change.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -237,8 +238,8 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, because computing relays send nothing. Returns
-    /// false, and does nothing, unless the neighbour is linked, a member of the view and not lost.
+    /// Restarts the measurement of the neighbour's silence at `now`, because relays send nothing while they compute.
+    /// Returns false, and does nothing, unless the neighbour is linked, a member of the view and not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
             && self.is_agreed()
@@ -262,7 +263,7 @@ impl Neighbour {
     ///
     /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, another node may be selected in
     /// place of a lost neighbour, as on a shared channel. `interval` is the time between heartbeat requests; `None`
-    /// for the usual one.
+    /// for the usual time.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -334,8 +335,9 @@ impl Neighbour {
 
     /// Returns the silence of a node after which the link to it counts as lost.
     ///
-    /// It is `dead_after`; but a side that receives no node sends hellos only every `dead_after`. A few lost frames
-    /// then cause a silence several times as long, so the limit is the maximum duration of a lease.
+    /// This silence is usually `dead_after`. But a side that receives no node sends hellos only every `dead_after`,
+    /// and a few lost frames then cause a silence several times as long. For such a side the result is the maximum
+    /// duration of a lease.
     fn longest_gap(&self, now: Instant, settings: &Settings) -> Duration {
         if self.has_no_peer() && !self.has_recent_unselected(now, settings) {
             longest_lease(settings)
@@ -390,13 +392,13 @@ impl Neighbour {
         self.hellos.schedule_all();
     }
 
-    /// Returns true if the link to `node` was dropped for want of a quorum. It returns false once another node has
+    /// Returns true if the link to `node` was dropped for lack of a quorum. The result is false once another node has
     /// been selected.
     const fn was_dropped(&self, node: u16) -> bool {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the selected neighbour and searches again. The reachable relays are too few for a quorum.
+    /// Drops the selected neighbour and searches again. Reason: the reachable relays are too few for a quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -408,9 +410,9 @@ impl Neighbour {
         }
     }
 
-    /// Selects `candidate` as the neighbour if there is none, or if it is better; returns true if so. A nearer node
-    /// is better, or one that leads to more relays. The candidate has sent a hello, receives this relay, and has
-    /// selected this relay, no node, or a node farther away.
+    /// Selects `candidate` as the neighbour if this side has no neighbour, or if the candidate is better. Returns
+    /// true if the candidate was selected. A node is better if it is nearer, or if it leads to more relays. The
+    /// candidate has sent a hello, receives this relay, and has selected this relay, no node, or a node farther away.
     pub(crate) fn consider_candidate(
         &mut self,
         candidate: Candidate,
@@ -497,28 +499,28 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, without the lost next node. For each of them
-    /// the selection is delayed, because a nearer node may still answer.
+    /// Returns the number of nodes between this relay and the candidate, without the lost next node. For each of
+    /// these nodes the selection is delayed, because a nearer node may still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
 
-    /// Returns true if the candidate should replace the selected neighbour. A nearer candidate must be `ready`, a
-    /// farther one must lead to more relays.
+    /// Returns true if the candidate should replace the selected neighbour. A nearer candidate must be `ready`; a
+    /// farther candidate must lead to more relays.
     pub(super) const fn is_better(self) -> bool {
         if self.nearer { self.ready } else { self.longer }
     }
 }
 
 impl Neighbour {
-    /// Returns true if the neighbour is another one than at the last decision on a view proposal. The change must be
+    /// Returns true if the neighbour has changed since the last decision on a view proposal. The change must be
     /// certain: the search has ended without success, or the new neighbour is linked.
     pub(crate) fn has_changed(&self, now: Instant) -> bool {
         let changed = self.node != self.agreed.counted();
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the selected neighbour is also the one in the agreed view (membership of the chain).
+    /// Returns true if the selected neighbour is also the neighbour in the agreed view (agreed members of the chain).
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
@@ -535,7 +537,7 @@ impl Neighbour {
         self.agreed.agree_with_proposer();
     }
 
-    /// Leaves the view: this side has no neighbour in an agreed view any more.
+    /// Leaves the view: this side no longer has a neighbour in an agreed view.
     pub(crate) const fn leave(&mut self) {
         self.agreed.agree(0);
     }
@@ -545,20 +547,20 @@ impl Neighbour {
         self.agreed.refuse(self.node);
     }
 
-    /// Records that a view proposal was granted, on the side to which it was forwarded. If the chain `ends` here,
-    /// this side has no neighbour in the view.
+    /// Records that a view proposal was granted, on the side to which it was forwarded. If `ends` is true, the chain
+    /// ends at this relay, and this side has no neighbour in the view.
     pub(crate) const fn agree(&mut self, ends: bool) {
         self.agreed.agree(if ends { 0 } else { self.node });
     }
 }
 
-/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is a membership
-/// of the chain.
+/// Neighbour on one side according to the last decisions on views: node numbers, 0 for none. A view is the agreed
+/// list of the chain's members.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgreedNodes {
     /// Neighbour in the agreed view (agreed members of the chain).
     in_view: u16,
-    /// Neighbour at the last decision on a view proposal, granted or refused.
+    /// Neighbour at the last decision on a view proposal, whether the proposal was granted or refused.
     counted: u16,
     /// Node from which the last view proposal was received; 0 if this relay made it.
     proposer: u16,
@@ -620,9 +622,9 @@ impl PendingHeartbeat {
     };
 }
 
-/// Number of consecutive hellos that do not list this relay as received before a node is reported.
-///
-/// Fewer may be due to a lost frame or two.
+/// Number of consecutive hellos without this relay in their list, after which their sender is reported. A hello lists
+/// the nodes that its sender receives. This relay receives the sender, but the sender does not seem to receive this
+/// relay. A smaller number may be due to a lost frame or two.
 const NOT_RECEIVED: u8 = 8;
 
 /// Number of consecutive handshakes of a node with another key after which the node is reported.
@@ -680,7 +682,8 @@ impl Neighbour {
         known.copied().unwrap_or(0)
     }
 
-    /// Records an intact frame of the node `distance` relays away. `taken` is true if it is the selected neighbour.
+    /// Records an intact frame of the node `distance` relays away. `taken` is true if this node is the selected
+    /// neighbour.
     pub(crate) fn record_frame(
         &mut self,
         distance: u16,
@@ -704,21 +707,21 @@ impl Neighbour {
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Records a report of the node `distance` relays away: `received` is true if it receives this relay. Returns
-    /// true at exactly [`NOT_RECEIVED`] reports in a row that it does not.
+    /// Records a report of the node `distance` relays away: `received` is true if the node receives this relay.
+    /// Returns true, once, when [`NOT_RECEIVED`] reports in a row state that the node does not receive this relay.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)
     }
 
     /// Returns true if the mission mismatch of the node `distance` relays away must be reported now.
     ///
-    /// It is reported at most once a minute for each node.
+    /// The mismatch is reported at most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
         self.mismatches.should_report(distance, now)
     }
 
-    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true at exactly
-    /// [`FORGED`] of them in a row.
+    /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true, once,
+    /// when [`FORGED`] such handshakes were received in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {
         self.forged.count(distance, true, FORGED)
     }
@@ -731,22 +734,23 @@ impl Neighbour {
 }
 
 impl Neighbour {
-    /// Records the number of a heartbeat request of the neighbour, 0 for none. The next heartbeat answers it.
+    /// Records the number of a heartbeat request of the neighbour, 0 for none. The next heartbeat answers this
+    /// request.
     pub(crate) const fn record_request(&mut self, number: u16) {
         if number != 0 {
             self.heartbeat.reply = number;
         }
     }
 
-    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if it is
-    /// too old.
+    /// Returns the time at which the heartbeat request `number`, to which a reply arrived, was sent. `None` if the
+    /// request is too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }
 
-    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is that of a
-    /// request to the neighbour, the second that of the neighbour's request which the heartbeat answers. `None` if no
-    /// heartbeat is pending.
+    /// Returns the pending heartbeat: its destination, and two numbers; 0 means none. The first number is the number
+    /// of this relay's request to the neighbour. The second number is the number of the neighbour's request that the
+    /// heartbeat answers. `None` if no heartbeat is pending.
     pub(crate) fn poll_heartbeat(&mut self, now: Instant) -> Option<(u16, u16, u16)> {
         let PendingHeartbeat { request, reply } = core::mem::take(&mut self.heartbeat);
         if !(request || reply != 0) || self.node == 0 {

@@ -49,9 +49,10 @@ pub(super) struct JointPlace {
 /// Time slots of this relay that are as long as its hops need; unused if all slots are equal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
-    /// x of this relay in its joint solution, m, and the shares of its slots there.
+    /// x of this relay in its joint solution, m, and its slots at this x, as shares of the frame. `None` without a
+    /// solution.
     pub(super) solved: Option<(f32, SlotShares)>,
-    /// Begin and end of its slots at the agreed positions, as shares of the frame.
+    /// Begin and end of this relay's slots at the agreed positions, as shares of the frame.
     pub(super) agreed: Option<SlotShares>,
 }
 
@@ -75,7 +76,8 @@ pub(crate) struct Computation {
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, collected by a message along the chain.
     pub(super) seats: Seats,
-    /// Position that the joint method has computed for this relay in this view; `None` before it has.
+    /// Position that the joint method has computed for this relay in this view; `None` until the position is
+    /// computed.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude of the position that the chain has agreed on for this relay.
     pub(super) cross_section: CrossSection,
@@ -92,7 +94,7 @@ pub(crate) struct Computation {
     pub(super) sensing: Sensing,
     pub(super) target: Option<f32>,
     /// Upper bound of the worst hop's SIR for any positions at the configured altitudes, linear. `None` at other
-    /// relays than the leader, and until it is known.
+    /// relays than the leader, and until the bound is known.
     pub(super) bound: Option<f32>,
 }
 
@@ -183,7 +185,8 @@ impl Computation {
         self.meter.restart();
     }
 
-    /// Returns the shares of this relay's slots at the agreed positions; `None` unless they were fitted.
+    /// Returns the shares of this relay's slots at the agreed positions; `None` unless the slots were fitted (each
+    /// slot as long as its hop needs).
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         self.fitted.first()?.agreed
     }
@@ -199,8 +202,8 @@ impl Computation {
         self.began = true;
     }
 
-    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if there
-    /// is one. `last` is true if no other algorithm follows.
+    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if
+    /// `ladder` is `Some`. `last` is true if no other algorithm follows.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -210,8 +213,8 @@ impl Computation {
         self.search_by(context, Schedule::Bracketed, ladder, last, false)
     }
 
-    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if no target is feasible
-    /// at those of the joint method.
+    /// Starts the search for the target SIR at the configured lateral offsets and altitudes. This search follows if
+    /// no target is feasible at the lateral offsets and altitudes of the joint method.
     pub(super) fn search_configured(&mut self, context: &Context<'_>) -> Result<(), Infeasible> {
         self.search_by(context, Schedule::Bracketed, None, true, true)
     }
@@ -328,7 +331,8 @@ impl Computation {
     }
 
     /// Returns this relay's lateral offset, altitude and power for a sweep. A sweep is a pass along the chain that
-    /// tries target SIRs. Offset and altitude are the joint method's if `chosen` is true, else the configured ones.
+    /// tries target SIRs. If `chosen` is true, offset and altitude are from the joint method, otherwise they are the
+    /// configured values.
     pub(super) fn station_for(&self, chosen: bool) -> Station {
         let given = self.profile.on_line();
         match self.chosen {
@@ -340,7 +344,7 @@ impl Computation {
         }
     }
 
-    /// Returns the number of completed rounds of Algorithm 2, and the SIR after the last one. `None` except at the
+    /// Returns the number of completed rounds of Algorithm 2, and the SIR after the last round. `None` except at the
     /// leader.
     pub(crate) const fn rounds(&self) -> Option<(u16, f32)> {
         match &self.task {
@@ -373,9 +377,10 @@ pub(crate) enum LeaderTask {
     /// offsets and altitudes stay as they are.
     Searching {
         search: Search,
-        /// True if the method of the settings ends with this search, and no other algorithm follows.
+        /// True if this search is the last step of the configured method; no other algorithm follows.
         last: bool,
-        /// True while the relays search at the configured altitudes. Reason: the joint method's altitudes have no feasible target.
+        /// True while the relays search at the configured altitudes. They do so because no target is feasible at the
+        /// joint method's altitudes.
         given: bool,
     },
     /// Algorithm 2 is running: the state of its rounds.
@@ -451,7 +456,7 @@ impl LeaderTask {
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true if the configured altitudes are used because those of the joint method failed.
+    /// true if the configured altitudes are used because the altitudes of the joint method failed.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -484,10 +489,10 @@ pub(crate) struct SweepPass {
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// x of this relay for the target SIR that was committed, m; `None` if none was committed.
+    /// x of this relay for the target SIR that was committed, m; `None` if no target was committed.
     place: Option<f32>,
-    /// x that the previous relay must take for the target SIR that was committed, m. `None` if it takes the farthest
-    /// x that meets the target.
+    /// x that the previous relay must take for the target SIR that was committed, m. `None` if the previous relay
+    /// takes the farthest x that meets the target.
     required_x_m: Option<f32>,
 }
 
@@ -511,8 +516,8 @@ impl SweepPass {
         }
     }
 
-    /// Starts a sweep with the data of its sender, the node before this relay on the pass. `behind` describes that
-    /// relay, `None` if the node is Tx or Rx; `from` has its farthest x for each target, m.
+    /// Starts a sweep with the data of its sender, the node before this relay on the pass. `behind` describes the
+    /// sender; `None` if it is Tx or Rx. `from` has the sender's farthest x for each target, m.
     pub(crate) fn begin(&mut self, behind: Option<Behind>, from: &PerTarget) {
         self.fingerprint = fingerprint(behind, from);
         self.behind = behind;
@@ -524,10 +529,10 @@ impl SweepPass {
         self.required_x_m = None;
     }
 
-    /// Continues the computation of this relay's farthest x for each target. The last relay also decides the verdict,
-    /// which says if a target is committed. Returns true when the computation is complete.
+    /// Continues the computation of this relay's farthest x for each target. The last relay also decides the verdict:
+    /// the result of the sweep, and the committed target if any. Returns true when the computation is complete.
     ///
-    /// Work: at most 16 targets; in a field of interference 128 of its points, or one target.
+    /// Work: at most 16 targets; in a field of interference 128 points of the field, or one target.
     pub(crate) fn advance(&mut self, link: Link<'_>) -> bool {
         let link = self.link(link);
         let targets = self.ladder.targets();
@@ -573,7 +578,7 @@ impl SweepPass {
     }
 
     /// Stores this relay's x for the committed target SIR, `place`, m. Computes from it the x that the previous relay
-    /// must take. If that relay has no such x, the commitment is revoked.
+    /// must take. If the previous relay has no such x, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
@@ -597,8 +602,8 @@ impl SweepPass {
         }
     }
 
-    /// Returns the target SIR that was committed, and the farthest x, m, at which this relay meets it. `None` if none
-    /// was.
+    /// Returns the target SIR that was committed, and the farthest x, m, at which this relay meets it. `None` if no
+    /// target was committed.
     fn committed(&self) -> Option<(f32, f32)> {
         let commit = usize::from(self.verdict.commit?);
         Some((
@@ -650,7 +655,7 @@ pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
     })
 }
 
-/// State of one relay in a pass of the token of Algorithm 2.
+/// State of one relay while the token of Algorithm 2 travels along the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
     /// Action of this pass of Algorithm 2: look, move or stop.
@@ -660,7 +665,7 @@ pub(crate) struct TurnPass {
     /// Position and power of the previous relay, from which the hop to this relay starts; `None` for Tx.
     pub(super) before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay or a later one has moved in this pass of Algorithm 2.
+    /// True if this relay or a later relay has moved in this pass of Algorithm 2.
     pub(crate) any: bool,
     /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,
@@ -690,7 +695,7 @@ impl TurnPass {
     /// Continues the search: evaluates `budget` positions, and then the rest of the last grid row.
     ///
     /// Returns `Ready` at the end of the search: with a position that is better than the relay's present one, or with
-    /// `None` if there is none.
+    /// `None` if there is no better position.
     pub(crate) fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {
         let Some(search) = &mut self.search else {
             return Poll::Ready(None);
@@ -724,7 +729,8 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the profile of relay `index`: its own if it was collected, else the mission's common one.
+    /// Returns the profile of relay `index`: its own profile if it was collected, otherwise the mission's common
+    /// profile.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);

@@ -29,8 +29,8 @@ impl Computation {
         self.seat(context) != Seat::common(context.mission())
     }
 
-    /// Returns true if the leader's next pass must collect the relays' profiles (altitude and power). It must if a
-    /// relay's profile differs from the common one, and not all profiles are known.
+    /// Returns true if the leader's next pass must collect the relays' profiles (altitude and power). This is so if a
+    /// relay's profile differs from the common profile, and not all profiles are known.
     pub(super) fn must_gather(&self, context: &Context<'_>) -> bool {
         let told = matches!(&self.pass, PassKind::Sweep(sweep_pass) if sweep_pass.own);
         let leads = context.index() == context.mission().leader();
@@ -43,7 +43,7 @@ impl Computation {
     }
 
     /// Starts a pass from the leader along the chain that collects the relays' altitudes and powers. Only a relay
-    /// whose profile (altitude and power) differs from the mission's common one adds its profile to the message.
+    /// whose profile (altitude and power) differs from the mission's common profile adds its profile to the message.
     pub(super) fn begin_gathering(&mut self, context: &Context<'_>) -> Action {
         let after = self.seats.known.unwrap_or(0);
         self.gather(context, after, OwnSeats::new())
@@ -130,14 +130,13 @@ impl Computation {
         Action::Answer { agreed: false }
     }
 
-    /// Returns true while this relay has yet to compute its position by the joint method.
+    /// Returns true until this relay has computed its position by the joint method.
     pub(super) fn is_solving(&self, context: &Context<'_>) -> bool {
         let partial = self.seats.is_partial(context.mission().relays());
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues this relay's joint solution of the chain in advance. Called while it waits for a pass (message along
-    /// the chain).
+    /// Continues to solve the chain by the joint method while this relay waits for a pass (message along the chain).
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);
@@ -163,7 +162,7 @@ impl Computation {
     }
 
     /// Continues this relay's solution of the chain by the joint method. Returns the predicted target SIR, linear,
-    /// once it is complete.
+    /// once the solution is complete; `None` before.
     ///
     /// If there is no solution, this relay uses its configured lateral offset and altitude, and the target is 0.
     #[inline(never)]

@@ -137,8 +137,8 @@ impl Round {
         }
     }
 
-    /// Carries out `next`, the action of the agreement on positions. Returns the effects, among them the sensing
-    /// results that differ from `before`.
+    /// Carries out `next`, the action of the agreement on positions. Returns the effects on the other layers. They
+    /// include the sensing results that differ from `before`.
     fn proceed_with(&mut self, context: &Context<'_>, next: Action, before: Findings) -> Effects {
         let effects = self.proceed(context, next);
         if !SENSING {
@@ -248,7 +248,7 @@ impl Round {
         self.computation.load(profile);
     }
 
-    /// Discards the agreed position; there is none until the next agreement.
+    /// Discards the agreed position. The relay has no agreed position until the next agreement.
     pub(crate) fn discard_agreed_place(&mut self) {
         self.computation.discard_agreed_place();
     }
@@ -272,7 +272,8 @@ impl Round {
         reachable.then_some(message)
     }
 
-    /// Returns the pending reply to the previous relay and marks it as sent. `None` if that relay is not `reachable`.
+    /// Returns the pending reply to the previous relay and marks it as sent. `None` if no reply is pending, or if the
+    /// previous relay is not `reachable`.
     pub(crate) fn poll_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),
@@ -299,7 +300,7 @@ impl Round {
     }
 
     /// Returns true until this relay has taken part in a pass or a view. A pass is a message along the chain, a view
-    /// its membership.
+    /// the agreed list of the chain's members.
     pub(crate) fn is_fresh(&self) -> bool {
         self.computation.phase() == Phase::Idle
     }
@@ -312,7 +313,8 @@ impl Round {
         self.computation.is_untouched()
     }
 
-    /// Returns the agreed position; `None` before an agreement. The guard may limit the setpoint on the way there.
+    /// Returns the agreed position; `None` before an agreement. The guard (collision avoidance) may limit the
+    /// setpoint on the way to this position.
     pub(crate) const fn agreed_place(&self) -> Option<Placement> {
         self.computation.agreed_place
     }
@@ -347,17 +349,17 @@ impl Round {
 }
 
 /// Maximum number of hops that one call of [`Computation::work`] predicts, each for 16 target SIRs. If the
-/// interference varies along x, it predicts only part of one hop.
+/// interference varies along x, one call predicts only a part of one hop.
 const HOPS_AT_ONCE: u16 = 12;
 
 /// Maximum number of hops that one call of [`Computation::work`] predicts in a uniform field. A field is a known
-/// distribution of the interference. Its hops cost twice as much as with an interferer, for which the maximum is
-/// [`HOPS_AT_ONCE`].
+/// distribution of the interference. A hop in a field takes twice as much computation as a hop with one interferer,
+/// for which the maximum is [`HOPS_AT_ONCE`].
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
-/// Choice of the next pass at the leader, and the computation before it.
+/// Choice of the leader's next pass, and the computation before this pass.
 impl Computation {
-    /// Continues this relay's part in the current pass, or the leader's preparation of the next one.
+    /// Continues this relay's part in the current pass, or the leader's preparation of the next pass.
     ///
     /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten
     /// relays of the joint method, or 624 positions of Algorithm 2.

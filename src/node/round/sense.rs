@@ -203,7 +203,7 @@ impl Computation {
     }
 
     /// Continues the leader's search for a faulty sensor with the measurements collected by a sensing pass. Returns
-    /// true if the search needs another pass; the estimate then stays as it is.
+    /// true if the search needs another pass; the estimate then stays unchanged.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {
@@ -270,9 +270,10 @@ impl Computation {
 
     /// Checks this relay's sensor by comparison with the measurements of all other relays.
     ///
-    /// A relay whose measurement is absurd excludes itself. A relay that measures nothing where the others expect
-    /// interference is marked as deaf. A relay that excluded itself earlier checks if its measurements fit again.
-    /// Unless it excludes itself now, it adds its own sums to the result.
+    /// A relay whose measurement is absurd excludes itself. A relay that measures nothing, although the measurements
+    /// of the other relays predict interference at its position, is marked as deaf. A relay that excluded itself
+    /// earlier checks if its measurements fit again. Unless it excludes itself now, it adds its own sums to the
+    /// result.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,

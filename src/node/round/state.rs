@@ -30,7 +30,7 @@ pub enum Phase {
     Waiting,
     /// The last pass (message along the chain) has ended without an agreement on positions.
     Answered,
-    /// The chain has agreed on the positions, and this relay holds its own.
+    /// The chain has agreed on the positions, and this relay holds its own position.
     Holding,
     /// The leader has found that no target SIR is feasible. All relays keep their positions.
     Infeasible,
@@ -78,7 +78,7 @@ pub(crate) enum Arrival {
 }
 
 impl Arrival {
-    /// Returns the action for a pass message that is not new; `None` for a new one, which must be handled.
+    /// Returns the action for a pass message that is not new; `None` for a new message, which must be handled.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -90,11 +90,12 @@ impl Arrival {
 }
 
 /// Maximum number of passes by which a late message may be behind the current pass. A pass is a message along the
-/// chain. One farther behind is foreign: its leader has restarted.
+/// chain. A message that is farther behind is foreign: its leader has restarted.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of 64
-/// as its number; no other pass has. A relay can join a first pass without knowledge of earlier passes.
+/// Divisor of the numbers of first passes. The number of a first pass is a multiple of 64: the first pass of a view,
+/// or after a leader's start. No other pass has such a number. A relay can join a first pass without knowledge of
+/// earlier passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -176,15 +177,15 @@ impl RoundState {
         }
     }
 
-    /// Accepts a new pass along the chain, with `number`, as the current one.
+    /// Accepts a new pass along the chain, with the number `number`, as the current pass.
     pub(crate) const fn accept(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received pass message by its `number`. `same` is true if its content equals that of the current
-    /// pass.
+    /// Classifies a received pass message by its `number`. `same` is true if the message has the same content as the
+    /// current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones; it requests a new view.
@@ -213,7 +214,7 @@ impl RoundState {
         }
     }
 
-    /// Returns true if `number` is that of the current pass, and its result has not arrived yet.
+    /// Returns true if `number` is the number of the current pass, and the result of this pass has not arrived yet.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
@@ -224,8 +225,8 @@ impl RoundState {
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass has started since the earlier state `before`. In that state the result of the last
-    /// pass was known.
+    /// Returns true if a new pass has started since the earlier state `before`. In the state `before` the result of
+    /// the last pass was known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }

@@ -100,8 +100,8 @@ impl Computation {
         Action::Stale
     }
 
-    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay agrees on its position for that target. Otherwise
-    /// the leader continues its search.
+    /// Handles the result of a sweep of target SIRs. If a target is committed, this relay takes its position for this
+    /// target. Otherwise the leader continues its search.
     pub(super) fn conclude_sweep(&mut self, context: &Context<'_>) -> Action {
         let PassKind::Sweep(sweep_pass) = &self.pass else {
             return Action::Stale;

@@ -125,13 +125,13 @@ impl ViewChange {
         self.proposed.filter(|_| self.circulation.is_outstanding())
     }
 
-    /// Returns the last view proposal that this relay has voted on; `None` before any.
+    /// Returns the last view proposal that this relay has voted on; `None` if there is none.
     pub(crate) const fn proposed(&self) -> Option<Proposed> {
         self.proposed
     }
 
-    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` before any. Ranks
-    /// count from 1 at the leader.
+    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` without a proposal.
+    /// Ranks count from 1 at the leader.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
@@ -142,7 +142,7 @@ impl ViewChange {
         self.refused
     }
 
-    /// Requests a view later than `proposal`, because the decision on `proposal` cannot arrive any more.
+    /// Requests a view later than `proposal`, because the decision on `proposal` can no longer arrive.
     pub(super) fn request_later_view(&mut self, context: &Context<'_>, proposal: ViewId) {
         if self.newest <= proposal
             && let Some(later) = proposal.next_by(context.member.node)
@@ -214,8 +214,9 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, on which `place` relays have voted before. `received` has their votes (`None` at
-    /// the proposer). Returns the effects; `None` if this relay has promised a later view (Paxos).
+    /// Votes on the proposed `view`, after the `place` relays that the proposal has already visited. `received` has
+    /// the votes of these relays; `None` at the proposer. Returns the effects on the other layers. `None` if this
+    /// relay has already promised (Paxos) this view or a later one.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -420,8 +421,8 @@ impl ViewChange {
         })
     }
 
-    /// Handles the next relay's reply that message `number` is in progress. Returns true if that is the outstanding
-    /// view proposal.
+    /// Handles the next relay's reply that message `number` is in progress. Returns true if `number` is the number of
+    /// the outstanding view proposal.
     pub(crate) fn on_busy(&mut self, context: &Context<'_>, number: u16) -> bool {
         let known = self
             .outstanding()
@@ -436,7 +437,7 @@ impl ViewChange {
 
 impl ViewChange {
     /// Handles the timers of retransmissions and view requests. `leads` is true if this relay has no neighbour toward
-    /// the leader. `fresh` is true if it has not taken part in any pass or view since its start.
+    /// the leader. `fresh` is true if this relay has not taken part in any pass or view since its start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -506,11 +507,11 @@ pub(crate) struct Proposed {
     pub(crate) rank: u16,
     /// Votes of the relays on the proposed view, including the vote of this relay.
     pub(super) poll: Poll,
-    /// Node to which the proposal was forwarded; `None` before. It is never sent to a second node, because two views
-    /// with the same identifier could result.
+    /// Node to which the proposal was forwarded; `None` until it is forwarded. The proposal is never sent to a second
+    /// node, because two views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view replaces. Before the decision it is the newest view known to be agreed on, which
-    /// may still be another one.
+    /// View that the decided view replaces. Before the decision this field has the newest view known to be agreed on;
+    /// the decided view may replace another view.
     pub(crate) base: View,
     /// Number of relays that the view proposal has reached; 0 until its decision is known.
     pub(super) reached: u16,
@@ -519,7 +520,7 @@ pub(crate) struct Proposed {
     pub(super) usable_in: u16,
 }
 
-/// Decision of the relays on a proposed view: accepted, or why not.
+/// Decision of the relays on a proposed view: accepted, or the reason of the refusal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ViewVerdict {
     pub(super) reached: u16,
@@ -545,9 +546,10 @@ pub(crate) struct ViewRequest {
     /// Number of requests for a new view that this relay has sent without a result.
     tries: u8,
     at: Option<Instant>,
-    /// Number of consecutive refusals of view proposals, for want of a quorum.
+    /// Number of consecutive refusals of view proposals, for lack of a quorum.
     refusals: u8,
-    /// Earliest time to which a new reason can advance the next view request after a refusal. `None` if it cannot.
+    /// Earliest time of the next view request after a refusal, if a new reason for a view arises. `None` if a new
+    /// reason does not advance the request.
     not_before: Option<Instant>,
     jitter: Jitter,
 }

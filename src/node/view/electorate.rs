@@ -57,7 +57,7 @@ pub(crate) struct Electorate {
     pub(super) accepted: Option<Successor>,
     /// View proposals that this relay has voted on and that may still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
-    /// Node number of the leader before any view change. Of two halves of the initial view, the one with this node
+    /// Node number of the leader before any view change. Of two halves of the initial view, the half with this node
     /// has the quorum.
     pub(super) initial_leader: u16,
 }
@@ -90,8 +90,8 @@ impl Electorate {
     }
 
     /// Votes on the view `proposal`, and returns the votes so far, including this one. `None` if this relay has
-    /// promised `proposal`, or a later view, before. `received` has the earlier votes (`None` at the proposer),
-    /// `other_leases` the remaining leases of other relays.
+    /// already promised `proposal` or a later view. `received` has the votes of earlier relays; `None` at the
+    /// proposer. `other_leases` has the remaining times of other relays' leases.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -139,7 +139,8 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. Casts no vote.
+    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. The function only
+    /// checks; it does not vote.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -152,8 +153,8 @@ impl Electorate {
         poll.is_some_and(|poll| decide(&poll, proposal, 1, all).is_none())
     }
 
-    /// Records the vote on the view `proposal` in the list of votes. If the list is full, it keeps the latest four
-    /// votes, including the new one, and the earliest four.
+    /// Records the vote on the view `proposal` in the list of votes. If the list is full, it keeps the earliest four
+    /// votes and the latest four votes, including the new vote.
     fn remember(&mut self, proposal: ViewId) {
         let full = self.voted.last() != Some(&ViewId::LOADED);
         let moves = if full { VOTES / 2 } else { VOTES };
@@ -200,7 +201,7 @@ impl Electorate {
         true
     }
 
-    /// Records that all members have accepted the view that this relay accepted last: it is agreed on.
+    /// Records that all members have accepted the view that this relay accepted last. This view is then agreed on.
     pub(crate) fn commit(&mut self) {
         if let Some(accepted) = self.accepted {
             self.learn(accepted.view);
@@ -214,8 +215,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. The maximum is `most`, which
-/// also stands for an unknown time.
+/// Returns the time until positions of the next view may be used, in tenths of a second. The result is at most
+/// `most`; `most` also stands for an unknown time.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

@@ -137,7 +137,7 @@ fn the_check_finds_the_fault_of_a_lost_record() {
 /// View with its number of members, as a pair that can be sorted.
 pub(super) type SizedView = (ViewId, u16);
 
-/// Message in a frame of the model, without mission and times.
+/// Message in a frame of the model. It has no mission and no times.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) enum Body {
     Proposal {
@@ -168,7 +168,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// View that the relay accepted last, its rank in that view, and the view's number of members.
+    /// View that the relay accepted last, the relay's rank in this view, and the number of members of this view.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -341,10 +341,11 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Broken rule, for a test: a relay that goes outside counts as agreed on by its neighbours at once.
+    /// Broken rule, for a test: when a relay leaves the chain, its neighbours at once count this departure as agreed
+    /// on.
     Inside,
-    /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that any of
-    /// them knows.
+    /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that one of
+    /// these relays knows.
     Everybody,
 }
 
@@ -434,7 +435,7 @@ impl Check {
         handed.fold(known, |members, frame| members | 1 << frame.from)
     }
 
-    /// Sends the pending messages of relay `at`: adds them to the model's frames under way. Records the decision in
+    /// Sends the pending messages of relay `at`: adds them to the model's frames in transit. Records the decision in
     /// `effects`, if any.
     pub(super) fn apply_effects(&self, chain: &mut Chain, at: usize, effects: Effects) {
         let (before, after) = (chain.before(at), chain.after(at));
@@ -561,7 +562,7 @@ impl Check {
         }
     }
 
-    /// Moves relay `at` out of the chain, as `Node::go_outside` does, or back.
+    /// Moves relay `at` out of the chain, as `Node::go_outside` does, or back into the chain.
     fn move_relay(&self, chain: &mut Chain, at: usize) {
         chain.outside ^= 1 << at;
         let change = &mut chain.relays[at].change;
@@ -587,8 +588,8 @@ impl Check {
 }
 
 impl Check {
-    /// Returns true if the agreed views form one sequence. Each of them replaces the initial view or another agreed
-    /// view, and no two of them replace the same view.
+    /// Returns true if the agreed views form one sequence. Each agreed view replaces the initial view or another
+    /// agreed view, and no two agreed views replace the same view.
     pub(super) fn is_one_chain(chain: &Chain) -> bool {
         let follows = |(id, _): &SizedView| {
             let decree = chain.decided.iter().find(|decree| decree.view.0 == *id);
@@ -613,8 +614,8 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Besides, the relays
-    /// that count as members of such a view must not be more than its number of relays.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. No such view may
+    /// have more member relays than its number of relays.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {
@@ -653,7 +654,7 @@ impl Check {
     }
 
     /// Returns true if the relays in the bit mask `there` are a quorum of the newest view that they know. They must
-    /// also be a quorum of every view decided on after it.
+    /// also be a quorum of every view that was decided later.
     pub(super) fn is_quorum(chain: &Chain, there: u8) -> bool {
         let known = |at: &usize| there >> at & 1 == 1;
         let agreed = (0..chain.relays.len()).filter(known);
@@ -672,8 +673,9 @@ impl Check {
 
     /// Returns the number of proposals until the relays in the bit mask `there` agree on a view.
     ///
-    /// The members of that view are exactly these relays. From this state on only the links between these relays work.
-    /// Frames under way are still delivered if `keeps_air` is true, else they are lost. `Some(0)` if the relays are no quorum; `None` if [`MAX_PROPOSALS`] are not enough.
+    /// The members of this view are exactly these relays. From this state on only the links between these relays
+    /// work. Frames in transit are still delivered if `keeps_air` is true, else they are lost. `Some(0)` if the
+    /// relays are no quorum; `None` if [`MAX_PROPOSALS`] are not enough.
     pub(super) fn proposals_needed(&self, chain: &Chain, there: u8, keeps_air: bool) -> Option<u8> {
         let mut chain = chain.clone();
         for (part, at) in chain.parts.iter_mut().zip(0..) {

@@ -34,7 +34,7 @@ pub struct ViewRecord {
 pub enum RecordError {
     /// The relay that wrote the record had loaded another mission.
     Base,
-    /// The relay has already started, so that its votes cannot be restored any more.
+    /// The relay has already started, so its votes can no longer be restored.
     Begun,
 }
 
@@ -43,8 +43,8 @@ error_texts!(RecordError {
     Begun => "the record of votes must be restored before the relay starts",
 });
 
-/// Writer of numbers of one, two or four bytes, least significant byte first. It needs a third of the flash that an
-/// iterator over all bytes would need.
+/// Writer of numbers of one, two or four bytes, least significant byte first. The writer needs a third of the flash
+/// that an iterator over all bytes would need.
 #[derive(Debug)]
 struct RecordWriter<'a>(core::slice::IterMut<'a, u8>);
 
@@ -113,8 +113,8 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the votes on views (acceptor state) in the record; `None` if it is of another mission. The loaded
-    /// mission has the digest `base`, `relays` relays and the leader `initial_leader`.
+    /// Returns the votes on views (acceptor state) in the record; `None` if the record belongs to another mission.
+    /// The loaded mission has the digest `base`, `relays` relays and the leader `initial_leader`.
     pub(super) fn electorate(
         &self,
         base: u16,

@@ -57,7 +57,8 @@ impl Relay {
         view.handle(&context, message)
     }
 
-    /// Makes this relay the last one that can be reached. It then decides the view proposal that awaits a decision.
+    /// Makes this relay the last relay that can be reached. This relay then decides the view proposal that awaits a
+    /// decision.
     pub(super) fn ends(&mut self) -> Effects {
         self.end = true;
         let context = context(&self.member, self.latest, true, self.now);
@@ -94,7 +95,7 @@ impl Relay {
         })
     }
 
-    /// Returns a decision of the next relay on `proposal`. `view` is the view that it accepts, `None` for a refusal.
+    /// Returns a decision of the next relay on `proposal`. `view` is the accepted view; `None` for a refusal.
     pub(super) fn decision(&self, proposal: ViewId, view: Option<View>) -> Message {
         Message::Decision(Decision {
             mission_id: self.latest,
@@ -191,8 +192,8 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a second proposal of the same view, but for another mission, is no duplicate. Its leader has restarted
-/// meanwhile and has received another mission.
+/// Checks that a second proposal of the same view, but for another mission, does not count as a duplicate. The leader
+/// has restarted in between, and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -303,8 +304,8 @@ fn the_leader_proposes_again_after_a_superseded_proposal() {
     assert!(relay.leads().began);
 }
 
-/// Checks that a refusal names the agreed view. From it, relays near the leader learn the newest view; otherwise they
-/// would be refused for ever.
+/// Checks that a refusal names the agreed view. From the refusal, relays near the leader learn the newest view.
+/// Otherwise their proposals would be refused for ever.
 #[test]
 fn a_refusal_names_the_agreed_view() {
     let view = View {
@@ -376,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores a decision on a view if it has stored a newer mission than the view's.
+/// Checks that a relay ignores a decision on a view if it has stored a newer mission than the mission of the view.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();

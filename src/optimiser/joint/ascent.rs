@@ -6,37 +6,40 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed moves that one iteration of the joint method tries, in this order. The next one
-/// is tried if the chain does not improve.
+/// Fractions of the relays' computed moves that one iteration of the joint method tries, in this order. If the chain
+/// does not improve with a fraction, the next fraction is tried.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: limit of a relay's move in one iteration, over its distance from the interferer. The same number
-/// limits the change of ln(target SIR).
+/// First *trust*: maximum move of a relay in one iteration, divided by its distance from the interferer. The same
+/// number is the maximum of the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust at which an improvement's final target is predicted. A smaller one makes the prediction too low.
+/// Minimum trust at which an improvement's final target is predicted. Trust limits the relays' moves. With a smaller
+/// trust the prediction would be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Trust below which the improvement of a chain ends without progress.
+/// Minimum trust (limit of the relays' moves). With a smaller trust the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain. The unit is the distance Tx to Rx. The
-/// computed rate is a divisor, so it must not be near 0; it is usually 0.5.
+/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain. The unit of length is the distance
+/// from Tx to Rx. The minimum is needed because the rate is a divisor; the rate is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of the target is raised, in ln(SIR). It is raised if the chain meets it, but not
-/// the upper bound of all chains.
+/// First amount by which the limit of the target is raised, in ln(SIR). The limit is raised if the chain meets it,
+/// but does not meet the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First cap on the chain's slack, over the distance Tx to Rx. With it slack cannot outweigh a penalty.
+/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. The limit keeps the slack from
+/// outweighing a penalty.
 const SPARE: f32 = 3e-3;
-/// Smallest cap on the chain's slack, over the distance Tx to Rx.
+/// Smallest upper limit on the chain's slack, divided by the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
 
 /// Weight of a negative slack relative to a positive slack, when two chains are compared.
 const SHORT: f32 = 2.0;
 
-/// Increase of ln(target SIR) below which an iteration counts as idle. Two in a row end a chain's improvement.
+/// Increase of ln(target SIR) below which an iteration counts as idle. Two idle iterations in a row end a chain's
+/// improvement.
 const CLOSE: f32 = 3e-6;
 
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
@@ -63,7 +66,7 @@ pub(crate) enum AscentStep {
     /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
     /// first.
     Again,
-    /// End the improvement of this chain, or repeat it with a lower cap on its slack if that may help.
+    /// End the improvement of this chain, or repeat it with a lower upper limit on the slack if this may help.
     Over,
 }
 
@@ -75,13 +78,13 @@ pub(crate) struct Ascent {
     /// if the chain is too short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If it misses the
-    /// bound, this limit is raised.
+    /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If the chain misses
+    /// the bound, this limit is raised.
     pub(crate) limit: f32,
     /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
     excess: f32,
-    /// Cap on the chain's slack, as a fraction of the distance from Tx to Rx. The cap is lowered if relays are too near the interferer,
-    /// because a large slack would outweigh the penalty for their positions.
+    /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. The limit is lowered if relays
+    /// are too near the interferer, because a large slack would outweigh the penalty for their positions.
     spare: f32,
     /// Penalty for relays too near the interferer, m. It is subtracted from the chain's slack.
     pub(crate) penalty: f32,
@@ -139,17 +142,19 @@ impl Ascent {
         }
     }
 
-    /// Returns the cap on the chain's slack, m. Slack above the cap does not count when chains are compared.
+    /// Returns the upper limit on the chain's slack, m. Slack above this limit does not count when chains are
+    /// compared.
     pub(crate) fn spare_m(&self) -> f32 {
         self.spare * self.distance_m
     }
 
-    /// Returns true if [`tighten`](Self::tighten) would lower the cap on the chain's slack (see there).
+    /// Returns true if [`tighten`](Self::tighten) would lower the upper limit on the chain's slack.
     pub(crate) fn may_tighten(&self) -> bool {
         !(self.spare < LEAST_SPARE || self.penalty <= LEAST_SPARE * self.distance_m)
     }
 
-    /// Lowers the cap on the chain's slack if relays are too near the interferer. Returns true if the cap was lowered.
+    /// Lowers the upper limit on the chain's slack if relays are too near the interferer. Returns true if the limit
+    /// was lowered.
     pub(crate) fn tighten(&mut self) -> bool {
         if !self.may_tighten() {
             return false;
@@ -158,8 +163,8 @@ impl Ascent {
         true
     }
 
-    /// Continues after the cap on the chain's slack was lowered; returns the next action. `slack` is the chain's slack under the new cap,
-    /// m.
+    /// Continues after the upper limit on the chain's slack was lowered; returns the next action. `slack` is the
+    /// chain's slack under the new limit, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -226,14 +231,14 @@ impl Ascent {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
 
-    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a chain is improved again,
-    /// with a lower cap on its slack.
+    /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a
+    /// chain is improved again, with a lower upper limit on its slack.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if this chain's improvement is predicted to end no higher than `sigma`, in ln(SIR). It can then
-    /// be dropped. `turn` is its next action. False if no prediction is possible.
+    /// Returns true if this chain's improvement is predicted to end no higher than `sigma`, in ln(SIR). Such a chain
+    /// can be dropped. `turn` is the next action of the improvement. False if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
         let end = self.sigma + (self.slack + gain).max(self.slack.min(0.0)) / -self.slope;
@@ -244,8 +249,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target that the chain is expected to just meet, in ln(SIR). `share` is the fraction of the
-    /// computed moves that it makes.
+    /// Returns the target that the chain is expected to just meet, in ln(SIR). `share` is the fraction of their
+    /// computed moves that the relays make.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -270,8 +275,8 @@ impl Ascent {
         sigma - slack.min(SHORT * slack) / self.slope
     }
 
-    /// Returns true if a trial chain is better than the current one. `slack` is the trial chain's slack, m, at the target `sigma`, as
-    /// ln(SIR).
+    /// Returns true if a trial chain is better than the current chain. `slack` is the trial chain's slack, m, at the
+    /// target `sigma`, as ln(SIR).
     pub(crate) fn is_gain(&self, sigma: f32, slack: f32) -> bool {
         if sigma >= self.limit && slack >= 0.0 && self.sigma < self.limit {
             return true;

@@ -54,8 +54,9 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, that leaves the relays after it their separation. `end_m` is that of the
-    /// relay before it, and `step` the minimum step between the two.
+    /// Returns the largest x of a relay, m, at which the relays after this relay still have room for their
+    /// separation. `end_m` is the largest x of the relay before it, m. `step` is the minimum step in x between these
+    /// two relays, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
@@ -77,9 +78,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         }
     }
 
-    /// Returns c, the target SIR over the sender's gain, for the hop to relay `index`. The gain is the sender's power
-    /// relative to the interferer's. c determines the hop's maximum length. With noise c includes the factor 1 +
-    /// noise / interference at the sender's position `from`, because the position of relay `index` is not chosen yet.
+    /// Returns c, the target SIR divided by the sender's gain, for the hop to relay `index`. The gain is the sender's
+    /// power divided by the interferer's power. c determines the hop's maximum length. With noise, c includes the
+    /// factor 1 + noise / interference at the sender's position `from`, because the position of relay `index` is not
+    /// chosen yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -87,8 +89,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude of relay `index`, m, if it is fixed. `None` if the relay may choose its altitude, or if
-    /// the mission allows one altitude only.
+    /// Returns the altitude at which relay `index` is held, m. `None` if the relay may choose its altitude. Also
+    /// `None` if the mission allows one altitude only, since no relay then differs from the others.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -99,8 +101,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. Before the
-    /// first and after the last of those relays the altitude is constant if `level` is true. Otherwise it falls to the
+    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. If `level` is
+    /// true, the altitude is constant before the first and after the last of these relays. Otherwise it falls to the
     /// band's lowest altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
@@ -117,15 +119,16 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns relay `index` with its hop from a sender at `from`. `room` has the relay's allowed lateral offsets and
-    /// altitudes.
+    /// Returns the input for the computation of relay `index`, which receives a sender at `from`. `room` has the
+    /// relay's permitted lateral offsets and altitudes.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the last hop's maximum length for `target` less its length, m, and the derivatives. This difference is the chain's slack.
-    /// The last relay is at `at`; the derivatives are by its coordinates.
+    /// Returns the slack of the chain for `target`, m, and the derivatives of the slack. The slack is the maximum
+    /// length of the last hop for `target`, minus the length of this hop. The last relay is at `at`; the derivatives
+    /// are with respect to its coordinates.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
         let most = site::last_most(self.mission, power_w, room);
@@ -137,8 +140,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (slack, outlook)
     }
 
-    /// Returns the upper bound of the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
-    /// the last hop.
+    /// Returns an upper bound on the chain's SIR, as ln(SIR). The bound is the smaller of the maximum SIRs of the
+    /// first and the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = self.seat(self.relays());
         let first = self.room(1);
@@ -147,8 +150,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the target, as ln(SIR), from which on every hop has a maximum length. It is just above the largest
-    /// gain of a hop: with a lower target a hop beyond the interferer could have any length.
+    /// Returns the lowest target, as ln(SIR), for which every hop has a maximum length. It is just above the largest
+    /// gain of a hop. With a lower target, a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -157,15 +160,16 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 }
 
-/// Gains of the hops of a chain in both directions. The SIR of a hop is its gain times the inverse interference at the
-/// receiver, over the squared length; at Rx and Tx the gain includes the interference.
+/// Gains of all hops of a chain, in both directions. The SIR of a hop is its gain, times the inverse interference at
+/// the receiver, divided by the squared length of the hop. For the receivers Rx and Tx, the gain already includes the
+/// interference.
 ///
-/// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as their logarithms.
+/// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as logarithms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
     /// Position (x, y, h) of the interferer.
     pub(super) source: Triple,
-    /// Receiver noise over the interferer's power received at the distance D (nu).
+    /// Receiver noise divided by the interferer's power received at the distance D (nu).
     pub(super) noise: f32,
     relay: f32,
     to_rx: f32,
@@ -185,7 +189,8 @@ impl Gains {
         from_rx: 0.0,
     };
 
-    /// Returns the gains for relays of `power_w` watts; each is stored as `stored` returns it.
+    /// Returns the gains for relays of `power_w` watts. `stored` converts each gain to its stored form, such as its
+    /// logarithm.
     pub(super) fn new(
         chain: &Chain<'_, impl SeatOf>,
         power_w: f32,
@@ -239,19 +244,21 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays in a segment, the part of the chain whose computed moves are in memory at a time.
+/// Number of relays in a segment. Only one segment of the chain has its computed moves in memory at a time.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state at the begin of one segment (ten relays): x of the previous relay, and derivatives. The derivatives are those of the
-/// chain's slack by the position of the segment's last relay.
+/// Stored state of the solver for one segment, which is ten consecutive relays of the chain. It has the x of the
+/// relay before the segment. It also has the derivatives of the chain's slack with respect to the position of the
+/// segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
+    /// First derivatives of the chain's slack with respect to the x, y and h of the segment's last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack with respect to the coordinates of the segment's last relay, 1/m. The
+    /// order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 
@@ -296,7 +303,8 @@ pub(super) fn last_of(mission: &Mission) -> u8 {
     u8::try_from(last).unwrap_or(u8::MAX)
 }
 
-/// Returns the relays of a segment: each with its number in the segment, from 0, and in the chain.
+/// Returns the relays of a segment. Each item has the relay's number within the segment, from 0, and its index in the
+/// chain.
 pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<Item = (usize, u16)> {
     let first = u16::from(segment) * SEGMENT_RELAYS;
     // Counted in u16 at both ends, since zipping two ranges backward may panic.
@@ -324,8 +332,8 @@ impl Seat {
         }
     }
 
-    /// Returns the profile of a relay with the altitude and power `own`. If `holds` is true, the relay keeps that
-    /// altitude.
+    /// Returns the profile of a relay with the altitude and power `own`. If `holds` is true, the relay keeps this
+    /// altitude; otherwise it may choose another altitude.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

@@ -26,11 +26,13 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions per relay that a pass combines: the current one and two on either side.
+/// Number of positions of each relay that a pass of the solver combines: the current position, and two positions on
+/// either side.
 const STATES: usize = 5;
-/// Moves of a relay that a pass tries, in units of the current step width. The first one is preferred among equals.
+/// Moves of a relay that a pass of the solver tries, in units of the current step width. Of equally good moves the
+/// first in this list is preferred.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits in which a relay's choice among the states of the relay before it is stored.
+/// Number of bits to store one choice among the five states of the previous relay.
 const BITS: usize = 3;
 
 /// Step width at which the search from one initial chain ends, in units of D.
@@ -60,13 +62,14 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Number of the initial chain that starts from the best one along the line. Used only if relays may leave the common
-/// altitude.
+/// Number of the initial chain that starts from the best chain along the line. This chain is used only if relays may
+/// leave the common altitude.
 const BEST: u8 = 8;
 /// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as two fractions. The first is of the largest lateral
-/// offset away from the interferer, the second of the altitude range above the common altitude.
+/// Lateral offset and altitude of further initial chains, as two fractions. The first number is a fraction of the
+/// largest lateral offset away from the interferer. The second number is a fraction of the altitude range above the
+/// common altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
 /// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
@@ -89,11 +92,13 @@ pub struct SlotShares {
     /// Begin and end of the slot in which this relay receives from the next node toward Rx. Empty, 1 and 1, in a
     /// mission of one direction.
     pub from_rx: [f32; 2],
-    /// Data rate of the whole chain to Rx, over the bandwidth, bit/s/Hz. The rate back is `reverse` times this.
+    /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
+    /// times this value.
     pub bits_per_hz: f32,
 }
 
-/// Position that is tried for a node, and the inverse interference there; 1 at Tx and Rx.
+/// Position that is tried for a node, and the inverse interference at this position. The inverse interference is 1 at
+/// Tx and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -117,8 +122,8 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains over the SNR gap, r (share of data back), and minimum separation. The gains are
-/// forward and backward.
+/// Hop between two nodes: its gains, r (share of data back), and minimum separation. `gains` has the forward and the
+/// backward gain, each divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -129,7 +134,7 @@ struct Hop {
 }
 
 impl Hop {
-    /// Returns the SINR over the SNR gap, linear, forward and backward.
+    /// Returns the forward and the backward SINR, linear, each divided by the SNR gap.
     fn sinrs(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
         let l = square(x) + square(y) + square(h) + SHORTEST;
@@ -137,8 +142,8 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times for one bit to Rx and for r bits back. Infinite if two relays are too close or in the wrong
-    /// order.
+    /// Returns the times for one bit to Rx and for r bits back. Both are infinite if two relays are too close or in
+    /// the wrong order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -167,8 +172,8 @@ enum Work {
     /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
     /// the next node to process: 1 for the first relay, N + 1 for Rx.
     Pass(u16),
-    /// Backward pass, from the last relay to the first: moves each relay as the best combination requires. The fields
-    /// are the next relay to move, and the index of its move in [`MOVES`].
+    /// Backward pass, from the last relay to the first: moves each relay as the best combination of moves requires.
+    /// The fields are the next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
     /// Summation of the hop times of the best chain, and search for its worst SIR. The field is the next node.
     Sum(u16),
@@ -181,10 +186,10 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. In the end their first two values are replaced by the sums of the hop times up to
-    /// each relay, toward Rx and back.
+    /// Positions of the best chain. At the end of the search the x and y of each relay are replaced by two sums of
+    /// hop times, from Tx up to this relay: toward Rx, and back.
     best_places: [Triple; RELAYS],
-    /// Best state of the previous relay for each of a relay's five states: three bits per choice.
+    /// Best state of the previous relay for each of a relay's five states: three bits per state.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
@@ -198,9 +203,9 @@ pub(super) struct Fitted<const RELAYS: usize> {
     time: f32,
     /// Total hop time of the chain before the current round of passes.
     before: f32,
-    /// Total hop time of the best chain found; 0 before the first.
+    /// Total hop time of the best chain found; 0 until a chain is found.
     best: f32,
-    /// Sums of the hop times of the solved chain, toward Rx and back.
+    /// Sum of all hop times of the solved chain, toward Rx and back to Tx.
     sums: [f32; 2],
     worst: f32,
 }
@@ -316,7 +321,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Returns the position of node `index` moved by `by` along the current coordinate. The node stays within its
+    /// Returns the position of node `index`, moved along the current coordinate by `by`. The node stays within its
     /// limits. Index 0 is Tx, and N + 1 is Rx.
     #[inline(never)]
     fn spot(&self, chain: &Chain<'_, impl SeatOf>, index: u16, by: f32) -> Spot {
@@ -414,8 +419,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the coordinate and the step width of the next pass. After the last one the chain is kept if it is the
-    /// best.
+    /// Selects the coordinate and the step width of the solver's next pass over the relays. A pass improves this one
+    /// coordinate of all relays. After the last pass from one initial chain, the function stores the chain if it is
+    /// the best so far, and goes on to the next initial chain.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
@@ -463,8 +469,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns two bounds of slots of hop `hop`, as shares of the frame. They are the end of its slot toward Rx, and
-    /// the begin of its slot back. For hop 0 these are 0 and 1; `hop` is at most N + 1.
+    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are shares of the
+    /// frame, 0 to 1. For hop 0 these are 0 and 1; `hop` is at most N + 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {

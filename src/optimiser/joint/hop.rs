@@ -42,9 +42,9 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop of maximum length, with which the joint method computes moves. Such a hop just
-/// meets its target SIR. So one coordinate of its end (the dependent one) is a function of three things: the other
-/// two coordinates w, the hop's start p, and the target SIR.
+/// Derivatives of the end of a hop that just meets its target SIR. The joint method computes the moves of relays with
+/// these derivatives. The condition makes one coordinate of the end dependent. It is a function of the other two
+/// coordinates w of the end, of the hop's start p, and of the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -54,19 +54,21 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate of the hop's end, by w and p. w are the other two coordinates
-    /// of the end, p is the start. There is a row for each coordinate of w, with a value for each coordinate of p.
+    /// Second derivatives of the dependent coordinate of the hop's end, with respect to w and p. w are the other two
+    /// coordinates of the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value
+    /// for each coordinate of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end by its other two, w_1 and w_2. The order is
-    /// w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end, with respect to the other two coordinates w_1
+    /// and w_2 of the end. The order is w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end by the target SIR in ln(SIR), m. The other two
-    /// coordinates of the end do not change.
+    /// Derivative of the dependent coordinate of the hop's end with respect to the target ln(SIR), m. The other two
+    /// coordinates of the end are constant.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Derivatives of a hop's end that is fixed. The end is at the x of Rx, or at the farthest x of the hop. All derivatives are 0.
+    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx, or at the hop's farthest
+    /// x.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -78,9 +80,9 @@ impl Reach {
 
     /// Returns the derivatives for the hop from `from` to `to`, with the interferer at `source`.
     ///
-    /// The points have the dependent coordinate of the hop's end first. `c` is target SIR over gain, and `noise` the
-    /// noise over the interferer's power received at 1 m, 1/m^2. Returns [`Reach::FIXED`] if the end is at the rim of
-    /// the positions that meet the target, where no coordinate depends on the others.
+    /// In all three points the dependent coordinate of the hop's end comes first. `c` is the target SIR divided by
+    /// the gain. `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. At the rim of the
+    /// positions that meet the target no coordinate depends on the others; the result is then [`Reach::FIXED`].
     pub(super) fn new(c: f32, noise: f32, source: Triple, from: Triple, to: Triple) -> Self {
         let ([x0, y0, z0], [x, y, z], [sx, sy, sz]) = (from, to, source);
         let (d, dy, dz) = (x - x0, y - y0, z - z0);
@@ -129,9 +131,9 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s), the inverse of interference plus noise. s is the squared
-/// distance from the interferer, m^2, and nu the noise over the interferer's power received at 1 m, 1/m^2; q has the
-/// unit of s.
+/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s). q is the inverse of interference plus noise, and has the
+/// unit of s. s is the squared distance from the interferer, m^2. nu is the noise divided by the interferer's power
+/// received at 1 m, 1/m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -176,7 +178,8 @@ impl Coordinate {
         self.restored(at)
     }
 
-    /// Returns a symmetric matrix with rows and columns reordered as by [`Coordinate::first`].
+    /// Returns a symmetric 3 x 3 matrix with its rows and columns reordered: the coordinate `self` first. The other
+    /// two coordinates follow in the order x, y, h.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.ordered(bend).map(|row| self.first(row))
     }
@@ -211,15 +214,18 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
     [a - x, b - y, c - z]
 }
 
-/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s and l are the squared distances of its end from
-/// the interferer and from the sender, m^2. `c` is the target over the gain, larger with noise.
+/// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s is the squared distance from the hop's receiver
+/// to the interferer, m^2. l is the squared length of the hop, m^2. `c` is the target divided by the gain; with noise
+/// it is larger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
-    /// Difference `c` - 1, computed without cancellation. `c` is target SIR over gain, increased by noise.
+    /// Difference `c` - 1, computed without cancellation. `c` is the target SIR divided by the gain, increased by
+    /// noise.
     pub(super) e: f32,
-    /// Constant in the condition s + `spare` >= `c` l for a hop to meet its target, m^2; 0 without noise. s and l are
-    /// the squared distances of the hop's end from the interferer and from the sender.
+    /// Constant in the condition s + `spare` >= `c` l for a hop to meet its target, m^2; 0 without noise. s is the
+    /// squared distance from the hop's receiver to the interferer, and l the squared length of the hop. `c` is the
+    /// target SIR divided by the gain.
     pub(super) spare: f32,
 }
 
@@ -228,11 +234,11 @@ impl Tangent {
         Self { c, e, spare: 0.0 }
     }
 
-    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is that of the hop's
-    /// end from the interferer, m^2. The result has the form of a condition without noise.
+    /// Returns the condition for a hop with noise, linearised at the squared distance `s`. `s` is the squared
+    /// distance from the hop's receiver to the interferer, m^2. The result has the form of a condition without noise.
     ///
-    /// `noise` is the noise over the interferer's power received at 1 m, 1/m^2, `c` is target SIR over gain, and `e`
-    /// is c - 1.
+    /// `noise` is the noise divided by the interferer's power received at 1 m, 1/m^2. `c` is the target SIR divided
+    /// by the gain, and `e` is c - 1.
     pub(super) fn new(noise: f32, c: f32, e: f32, s: f32) -> Self {
         let nus = noise * s;
         let w = 1.0 + nus;

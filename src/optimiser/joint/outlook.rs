@@ -15,24 +15,25 @@ use crate::sir::square;
 /// assumes that the relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
-    /// First derivatives of the slack by the relay's x, y and h, m per m.
+    /// First derivatives of the slack with respect to the relay's x, y and h, m per m.
     pub(crate) slope: Triple,
-    /// Second derivatives of the slack by the relay's x, y and h, 1/m; symmetric.
+    /// Second derivatives of the slack with respect to the relay's x, y and h, 1/m; symmetric.
     pub(crate) bend: [Triple; 3],
-    /// Derivative of the slack by the target in ln(SIR), m.
+    /// Derivative of the slack with respect to the target ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of their computed moves that this relay
-    /// and the relays toward Rx make.
+    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f, 0 to 1, is the fraction of the
+    /// computed moves that this relay and the relays toward Rx really make.
     pub(crate) linear: f32,
-    /// Coefficient b of that gain, m.
+    /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of the moves, as for
+    /// `linear`.
     pub(crate) square: f32,
 }
 
 impl Outlook {
     /// Returns the slack of a chain whose last relay is at `at`, m, and its derivatives.
     ///
-    /// The slack is `reach_m`, the maximum length of the last hop, less that hop's length. Rx is at x = `distance_m`;
-    /// an x beyond Rx counts as the x of Rx.
+    /// The slack is `reach_m`, the maximum length of the last hop, minus the length of this hop. Rx is at x =
+    /// `distance_m`; an x beyond Rx counts as the x of Rx.
     pub(crate) fn tail(reach_m: f32, distance_m: f32, at: Placement) -> (f32, Self) {
         let ahead = distance_m - at.x_m;
         let over = ahead < 0.0;
@@ -56,7 +57,8 @@ impl Outlook {
     }
 
     /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the missing
-    /// squared distance, m^2; `slope` and `by_target` are its derivatives by position and ln(target SIR).
+    /// squared distance, m^2; `slope` and `by_target` are the derivatives of `near` with respect to the position and
+    /// to ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -70,9 +72,9 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (chain's slack) of a hop's receiver to that of the hop's sender. Returns the receiver's policy: its move
-    /// in two coordinates, within [`low`, `high`], m, relative to its present position. The third coordinate, `axis`, then follows from the
-    /// hop's maximum length.
+    /// Converts the value function (chain's slack) of a hop's receiver to the value function of the hop's sender.
+    /// Returns the receiver's policy: its move in two coordinates, within [`low`, `high`], m, relative to its present
+    /// position. The third coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -153,13 +155,13 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 
 /// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
 ///
-/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on that of
-/// the sending relay, the next one toward Tx.
+/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the
+/// move of the sending relay, the next relay toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True to select the larger of two solutions for the relay's third coordinate. At both the hop has its maximum
-    /// length.
+    /// True to select the larger of two solutions for the relay's third coordinate. In both solutions the hop has its
+    /// maximum length.
     pub(super) rising: bool,
     /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
@@ -168,13 +170,14 @@ pub(crate) struct Policy {
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature of the value function, relative to its largest. A smaller one would be rounding noise.
+/// Minimum curvature of the value function, divided by the function's largest curvature. A smaller curvature would be
+/// a rounding error.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {
-    /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. Its move is within
-    /// [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh, hh), which
-    /// are made concave. `across` has its mixed derivatives by the sending relay's position.
+    /// Returns the policy that maximises a quadratic function of the relay's two free coordinates. The relay's move
+    /// is within [`low`, `high`], m. The function has the gradient `slope` and the second derivatives `bend` (yy, yh,
+    /// hh), which are made concave. `across` has the mixed derivatives with respect to the sending relay's position.
     pub(super) fn best(
         slope: [f32; 2],
         bend: [f32; 3],

@@ -19,8 +19,8 @@ const RIM: f32 = 0.999_99;
 /// Factor on the minimum separation in the joint method. Rounding then cannot violate the true separation.
 pub(super) const MARGIN: f32 = 1.0005;
 
-/// Number of Newton steps in the computation of a hop with noise. Each linearises the hop's condition at the latest
-/// result (see [`Tangent`]).
+/// Number of Newton steps in the computation of a hop with noise. Each step linearises the hop's condition at the
+/// result of the previous step (see [`Tangent`]).
 const TANGENTS: u8 = 3;
 
 /// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
@@ -30,7 +30,7 @@ const HALVINGS: u8 = 12;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
-    /// Receiver noise over the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
+    /// Receiver noise divided by the interferer's power received at 1 m (nu), 1/m^2; 0 without noise.
     pub(super) noise: f32,
     pub(super) sender: Sender,
     pub(super) room: Room,
@@ -72,7 +72,7 @@ impl<'a> Site<'a> {
     /// Returns the position of largest x that meets `target` with the lateral offset and altitude `wanted`.
     ///
     /// The sender is at x = `from_m`. If the hop cannot reach `wanted`, the closest lateral offset and altitude that
-    /// it can reach are used. `None` if no hop meets the target. The x is at most that of Rx.
+    /// it can reach are used. `None` if no hop meets the target. The x is at most the x of Rx.
     pub(crate) fn at(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let target = target.min(self.most);
         let at = self.within_reach(target, from_m, wanted)?;
@@ -84,7 +84,7 @@ impl<'a> Site<'a> {
     }
 
     /// Returns the position of largest x at the lateral offset and altitude `at` that meets `target`. The sender is
-    /// at x = `from_m`. `None` if there is none.
+    /// at x = `from_m`. `None` if no x meets `target`.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -98,10 +98,11 @@ impl<'a> Site<'a> {
 
     /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
-    /// The hop's end must not be before the sender in x. The search is on the straight line to `wanted` from the
-    /// allowed position closest to the middle of the reachable ones. `None` if no allowed position is reached. With
-    /// the sender at p, the interferer at m and c = target / gain > 1 the reachable positions form a ball: its centre
-    /// is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
+    /// The x of the hop's end must not be smaller than the x of the sender. The search starts at the permitted
+    /// position closest to the middle of the reachable positions, and goes along the straight line to `wanted`.
+    /// `None` if no allowed position is reached. With the sender at p, the interferer at m and c = target / gain > 1
+    /// the reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c -
+    /// 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -168,7 +169,8 @@ impl<'a> Site<'a> {
     }
 
     /// Returns the farthest position that the hop reaches on a straight path across the line Tx to Rx. The path leads
-    /// from the sender's lateral offset and altitude to those `wanted`; it is searched by bisection.
+    /// from the sender's lateral offset and altitude to `wanted`. The farthest position on the path is searched by
+    /// bisection.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -184,10 +186,10 @@ impl<'a> Site<'a> {
         Some(found)
     }
 
-    /// Returns the relay's new lateral offset and altitude after a part of its computed move.
+    /// Returns the relay's new lateral offset and altitude after a fraction of its computed move.
     ///
-    /// `policy` gives the move, of which the fraction `share` is made. The sender has moved by `change` and is at
-    /// `from`; the relay itself is still at `nominal`. The hop has to meet `target`.
+    /// `policy` gives the move, and `share` the fraction of the move. The sender has already moved by `change` to
+    /// `from`. The relay itself is still at `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -234,8 +236,8 @@ impl<'a> Site<'a> {
 
     /// Returns the third coordinate of the relay, m, at which the hop from `from` just meets `target`.
     ///
-    /// `at` are the relay's two free coordinates, m; `policy` says which two. `None` if no position with these just
-    /// meets the target.
+    /// `at` are the relay's two free coordinates, m; `policy` states which two. `None` if no position with these two
+    /// coordinates just meets the target.
     fn along(&self, policy: &Policy, target: f32, from: Placement, at: [f32; 2]) -> Option<f32> {
         let gain = self.sender.gain;
         let target = if gain.excess(target) > 0.0 {
@@ -265,8 +267,8 @@ impl<'a> Site<'a> {
 }
 
 /// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
-/// first; `a` and `b` are the other two of the end. There may be two solutions: `rising` selects the larger one.
-/// `None` if there is none.
+/// first; `a` and `b` are the other two coordinates of the end. There may be two solutions: `rising` selects the
+/// larger one. `None` without a solution.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -491,9 +493,10 @@ const EDGE: f32 = 2e-6;
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns by how much a relay at `to` is too near the interferer, in squared distance, m^2, or 0. The second
-    /// result is the weight of the penalty for that. The third is the derivative of the first by ln(target SIR). `c`
-    /// is the target SIR divided by the sender's gain.
+    /// Returns three numbers about a relay at `to` that may be too near the interferer. The first number is the
+    /// missing squared distance, m^2; 0 if the relay is far enough away. The second number is the weight of the
+    /// penalty for it. The third number is the derivative of the first with respect to ln(target SIR). `c` is the
+    /// target SIR divided by the sender's gain.
     ///
     /// A hop of maximum length from p to p' that ends near the interferer at m is short. It violates the minimum
     /// separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with the inverse q of interference plus noise.
@@ -521,8 +524,9 @@ impl Site<'_> {
 
     /// Computes the policy (the move) of the relay at `to`, and the value function of its sender at `from`.
     ///
-    /// `outlook` is the value function of the relay, and becomes that of the sender. The move is limited to `trust`
-    /// times the relay's distance from the interferer. Work: some 400 multiplications and two square roots.
+    /// `outlook` is the value function of the relay, and becomes the value function of the sender. The move is
+    /// limited to `trust` times the relay's distance from the interferer. Work: some 400 multiplications and two
+    /// square roots.
     pub(crate) fn weigh(
         &self,
         target: f32,
@@ -578,9 +582,9 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// It is the coordinate by which F changes most, of those that are not at a limit of their allowed range, `low`
-    /// to `high`. x is preferred. F is half the margin of the hop to its target: 0 for a hop of maximum length (see
-    /// `hop`). The second result is the derivative of F by the selected coordinate.
+    /// Of the coordinates that are not at a limit of their permitted range, `low` to `high`, it is the coordinate
+    /// with which F changes most. x is preferred. F is half the margin of the hop to its target: 0 for a hop of
+    /// maximum length (see `hop`). The second result is the derivative of F with respect to the selected coordinate.
     fn axis(
         &self,
         c: f32,

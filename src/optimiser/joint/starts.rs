@@ -17,21 +17,22 @@ pub(super) enum Start {
     /// Initial chain on a parabola from Tx to Rx. `aside` and `up` are the lateral offset and height of its middle,
     /// in units of half the distance from Tx to Rx.
     Arch { aside: f32, up: f32 },
-    /// Initial chain on a spiral about the interferer. It leads from Tx to Rx through a position right above or
-    /// beside the interferer.
+    /// Initial chain on a spiral about the interferer. The spiral leads from Tx to Rx through a position P right
+    /// above or beside the interferer.
     ///
-    /// `aside` and `up` are the direction of that position from the interferer. `far` is its distance from the
-    /// interferer, relative to the geometric mean of those of Tx and Rx.
+    /// `aside` and `up` are the direction from the interferer to P. `far` is the distance of P from the interferer,
+    /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
-    /// Initial chain on a parabola as `Arch`, computed without a minimum separation. Its highest target is then
-    /// searched with hops computed exactly as the relays compute them; a relay may stay short of its farthest
-    /// position.
+    /// Initial chain on a parabola as for `Arch`, but computed without a minimum separation. The solver then searches
+    /// the highest target of this chain. For the search it computes the hops exactly as the relays do in flight; a
+    /// relay may stay short of its farthest position.
     Through { aside: f32, up: f32 },
-    /// Initial chain for relays of which some have a fixed altitude: a parabola to the side. The altitudes of the
-    /// others are interpolated.
+    /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
+    /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
+    /// altitudes of the other relays are interpolated between the fixed altitudes.
     ///
-    /// `level` is true if the altitude is constant before the first and after the last fixed one, false if it goes
-    /// down to Tx and Rx.
+    /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
+    /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
     /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation. The relays
     /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
@@ -39,8 +40,8 @@ pub(super) enum Start {
     Turns,
     /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
     Near,
-    /// Initial chain with relay 1 at the x of Rx, high above it or far to its side. The lateral offsets and altitudes
-    /// of the other relays lead down from there in equal steps.
+    /// Initial chain with relay 1 at the x of Rx, high above Rx or far to the side of Rx. The lateral offsets and
+    /// altitudes of the other relays lead from there to Rx in equal steps.
     Far,
 }
 
@@ -81,11 +82,11 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral about the interferer. The logarithm of the distance from it changes linearly with the angle.
+/// Spiral about the interferer. The logarithm of the distance from the interferer changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,
-    /// Logarithm of the distance from the interferer at the end of the spiral, less that at its start.
+    /// Logarithm of the distance from the interferer at the end of the spiral, minus the logarithm at the start.
     rise: f32,
     length: f32,
 }
@@ -134,8 +135,9 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer. The relay that sends to it is at `from`. `c` is
-    /// target SIR over gain, which determines the length of the hop; `room` has the allowed ranges.
+    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer. The sender of the hop to
+    /// this relay is at `from`. `c` is the target SIR divided by the sender's gain; it determines the length of the
+    /// hop. `room` has the permitted ranges.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -194,8 +196,8 @@ impl Start {
         })
     }
 
-    /// Returns the initial chain `number` for relays limited to the lateral offsets and altitudes `room`. `None`
-    /// after the last chain; `Some(None)` if that chain does not fit into `room`.
+    /// Returns the initial chain `number` for relays limited to the lateral offsets and altitudes `room`. `None` if
+    /// there is no chain with this number; `Some(None)` if the chain does not fit into `room`.
     #[expect(
         clippy::option_option,
         reason = "past the end, of no use, and a start are three things"
@@ -257,8 +259,8 @@ impl Start {
 /// Bisection for the highest feasible target SIR of a chain, in ln(SIR).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Seek {
-    /// Highest target found feasible, in ln(SIR); `None` before any. The `bool` is true if some relays have to stay
-    /// short of their farthest x to meet it.
+    /// Highest target found feasible, in ln(SIR); `None` until a target is found. The `bool` is true if some relays
+    /// have to stay short of their farthest x to meet this target.
     low: Option<(f32, bool)>,
     high: Option<f32>,
     pub(super) sigma: f32,
@@ -268,8 +270,8 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from the target `sigma`, to a precision of `width`, in ln(SIR). The first step is
-    /// `step`, each next one `growth` times as long.
+    /// Creates a search downward from the target `sigma`, in ln(SIR), to the precision `width`. The first step has
+    /// the length `step`. Each further step is `growth` times as long as the previous step.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -281,9 +283,9 @@ impl Seek {
         }
     }
 
-    /// Creates a search upward from the feasible target `sigma`, to a precision of `width`, in ln(SIR). The first
-    /// step is `step`, each next one three times as long. `holds_back` is true if some relays have to stay short of
-    /// their farthest position to meet `sigma`.
+    /// Creates a search upward from the feasible target `sigma`, in ln(SIR), to the precision `width`. The first step
+    /// has the length `step`. Each further step is three times as long as the previous step. `holds_back` is true if
+    /// some relays have to stay short of their farthest position to meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),
@@ -295,10 +297,10 @@ impl Seek {
         }
     }
 
-    /// Records if the chain meets the target that was tried; returns true if there is another one to try.
+    /// Records if the chain meets the target that was tried. Returns true if the search goes on with another target.
     ///
-    /// `met` is `None` if the target is infeasible, else true if some relays have to stay short of their farthest
-    /// positions to meet it.
+    /// `met` is `None` if the target is infeasible. Otherwise `met` is true if some relays have to stay short of
+    /// their farthest positions to meet the target.
     pub(super) fn tried(&mut self, met: Option<bool>) -> bool {
         match met {
             Some(holds_back) => self.low = Some((self.sigma, holds_back)),
@@ -324,12 +326,12 @@ impl Seek {
         true
     }
 
-    /// Returns the highest feasible target found, in ln(SIR); `None` if there is none. The `bool` is true if some
-    /// relays have to stay short of their farthest position to meet it.
+    /// Returns the highest feasible target found, in ln(SIR); `None` if no target is feasible. The `bool` is true if
+    /// some relays have to stay short of their farthest position to meet this target.
     pub(super) const fn found(&self) -> Option<(f32, bool)> {
         self.low
     }
 }
 
-/// Maximum step between two targets, in ln(SIR). The search ends instead of a longer step.
+/// Maximum step between two targets, in ln(SIR). The search ends when the next step would be longer.
 const MOST_STEP: f32 = 40.0;

@@ -139,8 +139,8 @@ pub struct Claim {
     pub other_number: u32,
     /// True if the claiming node is passive because another node uses its node number.
     pub passive: bool,
-    /// True for an echo: the sender returns a claim of a node that has the destination's node number. If two nodes have
-    /// that node number, both receive the echo, and so the claim of the other one.
+    /// True for an echo: the sender returns a claim of a node that has the destination's node number. If two nodes
+    /// have this node number, both receive the echo, and so the claim of the other node.
     pub echo: bool,
 }
 

@@ -201,7 +201,7 @@ pub struct OwnSeat {
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
 /// Message that collects relay profiles, altitude and power. In a pass it has the profiles of the relays up to the
-/// sender, in the reply those of the whole chain.
+/// sender, in the reply the profiles of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -443,8 +443,8 @@ fn sir_in_range(sir: f32) -> Option<f32> {
 /// estimate, the sums, the interference level at Rx, and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: interference estimate, and sums of measurements. In a pass they are the sums of the relays up to
-/// the sender, in the reply those of the sender and all later relays.
+/// Sensing message: interference estimate, and sums of measurements. In a pass the sums are over the relays up to the
+/// sender, in the reply over the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.

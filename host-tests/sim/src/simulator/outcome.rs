@@ -159,7 +159,8 @@ pub struct RelayEnd {
     pub believed: NumberedEstimate,
     /// Geographic positions of Tx and Rx in the relay's mission; `None` unless an upload has moved them.
     pub sites: Option<Sites>,
-    /// State of the relay from which the run's statistics are computed, such as the availability.
+    /// Phase, view and lease of the relay. The run's statistics, such as the availability, are computed from these
+    /// states.
     pub observed: ObservedState,
 }
 

@@ -83,7 +83,8 @@ pub(super) struct Battery {
     pub(super) tube: Option<usize>,
     /// Time since which a spare hovers at its place.
     pub(super) hovers_since: Instant,
-    /// True once the drone has been in place after it joined: the data depends on it.
+    /// True once the drone, after it joined, has been within 3 m of its agreed position. From then on the data must
+    /// be routed over this drone.
     pub(super) is_settled: bool,
 }
 

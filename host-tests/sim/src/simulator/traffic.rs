@@ -24,8 +24,8 @@ use std::fmt;
 use super::outcome::{Ending, Outcome};
 use super::route::{self, DataLink, Hop, Period, Ps, Route, SECOND, Stage, TrueHops};
 
-/// Number of packets that are sent after the end of a run. They make the reported data rates averages over many
-/// packets.
+/// Number of packets that are sent after the end of a run without a set end. The data rates that the report states
+/// are then averages over many packets.
 const AFTER: usize = 1_000;
 /// Number of packets for each hop that are sent after the end of a run, in addition to [`AFTER`].
 const AFTER_A_HOP: usize = 30;

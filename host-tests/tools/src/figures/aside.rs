@@ -1,9 +1,9 @@
 //! Relay beside the line: its best position by lateral room, and the gain of freedom. The freedom is lateral and vertical.
 
+use crate::single::{Found, aside, theorems};
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::Mission;
-use uav_relay::planning::single::{Found, aside, theorems};
 
 use super::chart::{Axis, Chart, Line, Look, Panel};
 use super::paper;

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::planning::fleet::Fewest;
+
+use crate::fewest::Fewest;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::paper;

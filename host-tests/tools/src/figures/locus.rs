@@ -1,8 +1,8 @@
 //! Lemma 1: the locus where both hops of a single relay have the same SIR.
 
+use crate::single::theorems::equal_altitudes;
 use serde::Serialize;
 use uav_relay::Mission;
-use uav_relay::planning::single::theorems::equal_altitudes;
 
 use super::chart::{Axis, Chart, Line, Look};
 use super::paper;

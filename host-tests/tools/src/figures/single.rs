@@ -1,8 +1,8 @@
 //! Relay at its best position (Theorem 1), against random, interference-blind and middle positions.
 
+use crate::single::theorems;
 use rayon::prelude::*;
 use serde::Serialize;
-use uav_relay::planning::single::theorems;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Scenario, Source, mission};
 use uav_relay_sim::report::db;
@@ -323,10 +323,11 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the cells of the caption's table, which compares the paper's averages with computed ones.
+/// Returns the cells of the caption's table, which compares the paper's averages with computed averages.
 ///
-/// Its rows are the printed averages, then for each kind of average the pair of powers that comes nearest to them,
-/// then the pairs of powers that the figure draws.
+/// The first row has the printed averages. Then there is a row for each kind of average, with the pair of powers
+/// whose averages are nearest to the printed averages. The last rows are for the pairs of powers that the figure
+/// shows.
 fn shown(gains: &[GainRow]) -> Vec<Vec<String>> {
     let head = [
         "reading",

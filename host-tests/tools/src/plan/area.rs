@@ -62,7 +62,9 @@ const NARROWEST: f64 = 1e-7;
 /// Criterion by which positions are chosen.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Criterion {
-    /// Fraction of the interferers' positions and powers, 0.5 to 0.99; `None` for the worst case.
+    /// Fraction of cases, 0.5 to 0.99, in which the chain has at least the SIR that is maximised. A case is one
+    /// choice of the interferers' positions and powers within their areas. `None` to maximise the SIR of the worst
+    /// case.
     pub quantile: Option<f64>,
     /// True if the ways between neighbours may cross no-fly areas.
     pub allow_crossing: bool,

@@ -12,12 +12,14 @@
 use std::cell::OnceCell;
 
 use uav_relay::optimiser::plan as silent;
-use uav_relay::{Mission, MissionConfig, Placement, Profile, Schedule};
+use uav_relay::{Mission, MissionConfig, Placement, Schedule};
 use uav_relay_scenario::link::{Access, Radio};
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Scenario};
 use uav_relay_sim::report::WorstBack;
+
+use crate::fewest;
 
 use super::bound::{Targets, excludes};
 use super::path::{Table, Times};
@@ -177,7 +179,7 @@ impl<'a> Carried<'a> {
             let profile_of = |index| briefed.profile(index);
             let agreed = silent::solve(&mission, Schedule::Bracketed, profile_of).ok()?;
             (f64::from(agreed.target) >= there).then_some(())?;
-            chain(&mission, agreed.target, profile_of)
+            fewest::places(&mission, agreed.target, profile_of)
         };
         let mut best = None;
         let (mut low, mut high) = (least, if least > 0.0 { 1.25 * least } else { 1.0 });
@@ -197,17 +199,6 @@ impl<'a> Carried<'a> {
         }
         best
     }
-}
-
-fn chain(
-    mission: &Mission,
-    target: f32,
-    profile_of: impl Fn(u16) -> Profile,
-) -> Option<Vec<Placement>> {
-    let mut places = vec![Placement::default(); usize::from(mission.relays())];
-    mission
-        .places_for(target, profile_of, &mut places)
-        .then_some(places)
 }
 
 /// Returns true if it is proven that no positions carry `bits_per_hz`, bit/s/Hz, over each hop to Rx. With `reverse`

@@ -55,10 +55,11 @@ pub struct OverTerrain {
     /// SIR of the worst hop with terrain, dB, at positions that ignore it; absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
-    /// Gain of the plan over these positions, dB.
+    /// Gain of the plan compared with the positions that ignore the terrain, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_gain_db: Option<f64>,
-    /// Reason why those positions cannot be flown, or why there are none; absent if they can.
+    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist; absent if they can be
+    /// flown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_problem: Option<String>,
 }
@@ -196,7 +197,8 @@ impl<'a> Search<'a> {
         Ok(f64::from(self.ground.point(x_m, 0.0)?.amsl_mm) / 1e3)
     }
 
-    /// Returns the candidates for relay `relay` (from 0) at `x_m`. `levels` chooses altitudes from the allowed ones.
+    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`. `levels` returns the altitudes to try,
+    /// from the lowest and highest permitted altitude.
     fn column(
         &self,
         relay: usize,
@@ -226,10 +228,10 @@ impl<'a> Search<'a> {
             .collect())
     }
 
-    /// Returns the candidates of every relay on a grid of `columns` by `levels` altitudes.
+    /// Returns the candidate positions of every relay on a grid of `columns` x by `levels` altitudes.
     ///
     /// # Errors
-    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    /// A line that names the position: the elevation files do not cover it, or have no height there.
     pub fn grid(&self, columns: u32, levels: u32) -> Result<Vec<Vec<Candidate>>, String> {
         let relays = 0..self.scene.relays.len();
         let each = relays.map(|relay| {
@@ -241,7 +243,9 @@ impl<'a> Search<'a> {
         each.collect()
     }
 
-    /// Returns the candidates for relay `relay` (from 0) at `x_m` and `levels` allowed altitudes.
+    /// Returns the candidate positions of relay `relay` (from 0) at `x_m`. There are `levels` altitudes in equal
+    /// steps over the permitted range. Candidates in a no-fly area are left out. A relay with a fixed altitude has at
+    /// most one candidate.
     pub(super) fn above(
         &self,
         relay: usize,
@@ -261,7 +265,7 @@ impl<'a> Search<'a> {
         Ok(Candidate { x_m, h_m, amsl_m })
     }
 
-    /// Returns the SIR of the worst hop of a chain, linear, and much less for altitudes not allowed.
+    /// Returns the SIR of a chain's worst hop, linear; much less if an altitude is not permitted.
     ///
     /// Every chain with such an altitude ranks behind all chains without one.
     pub(super) fn rank(&mut self, chain: &[Candidate]) -> Result<f64, String> {
@@ -313,7 +317,8 @@ impl<'a> Search<'a> {
         Ok(crests.collect::<Result<Vec<_>, String>>()?.concat())
     }
 
-    /// Returns the candidates around `chain`, at steps of `step_m` along x and `climb_m` in altitude.
+    /// Returns the candidate positions around each relay of `chain`, in steps of `step_m` along x and `climb_m` in
+    /// altitude.
     fn around(
         &self,
         chain: &[Candidate],
@@ -342,7 +347,7 @@ impl<'a> Search<'a> {
 
     /// Returns the SIR of the hop to node `node` in free space, linear.
     ///
-    /// It is the smaller one of both directions if the mission has both.
+    /// If the mission has both directions, this is the smaller SIR of the two.
     fn free_sir(&self, node: usize, from: Option<Candidate>, to: Option<Candidate>) -> f64 {
         let place = |at: Candidate| (at.x_m, at.h_m);
         let relays = &self.scene.relays;

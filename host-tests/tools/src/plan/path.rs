@@ -197,7 +197,8 @@ impl<'a> Times<'a> {
         if guide { time + Self::guide(sir) } else { time }
     }
 
-    /// Returns the small extra time that falls as the SIR rises, to decide between equal times.
+    /// Returns a very small time that falls as the SIR rises, s Hz. It is added to the time for one bit, so that of
+    /// two chains with equal times the chain with the higher SIR is better.
     fn guide(sir: f64) -> f64 {
         GUIDE / libm::log1p(sir)
     }

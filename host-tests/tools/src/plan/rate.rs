@@ -16,19 +16,19 @@ use uav_relay_sim::report::HopSlots;
 use super::carried::{Carried, carries_no};
 use super::{NoPlan, Number, Plan, PlanRequest, source};
 
-/// Largest number of relays for which the rate is computed, if planning a chain takes milliseconds.
+/// Largest number of relays for which rates are computed, if the plan of one chain takes milliseconds.
 const MOST_FAST: u16 = 200;
 
-/// Largest number of relays for which the rate is computed, if planning a chain takes seconds.
+/// Largest number of relays for which rates are computed, if the plan of one chain takes seconds.
 const MOST_SLOW: u16 = 20;
 
-/// Largest number of relays for which the rate is computed, if positions are optimised for the rate.
+/// Largest number of relays for which rates are computed, if the positions are optimised for the rate.
 const MOST_SEARCHED: u16 = 60;
 
-/// Number of relays up to which data rates are always computed if time slots fit the hops' needs.
+/// Number of relays up to which rates are always computed if each time slot is as long as its hop needs.
 ///
-/// The list ends earlier only if so many relays do not fit on the line, or if it is proven that more relays do not
-/// carry more.
+/// The list is shorter only if so many relays do not fit on the line, or if it is proven that more relays do not
+/// increase the rate.
 const LEAST_LISTED: u16 = 10;
 
 /// Data rate of a chain, bit/s.

@@ -1,13 +1,13 @@
 //! Plans against one interferer: one relay by a theorem, several at their own altitudes.
 
 use uav_relay::optimiser::plan as silent;
-use uav_relay::planning::fleet;
-use uav_relay::planning::fleet::{Fewest, Most};
-use uav_relay::planning::single::{Found, aside, theorems, without_interferer};
 use uav_relay::{Band, Mission, MissionConfig, Placement, Profile, Schedule};
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::Scene;
+
+use crate::fewest::{self, Fewest, Most, best_of_equals};
+use crate::single::{Found, aside, theorems, without_interferer};
 
 use super::bound::{Targets, excludes};
 use super::{
@@ -205,12 +205,7 @@ pub(super) fn solved(briefed: &ProfiledMission) -> Result<f32, NoPlan> {
 
 /// Returns the relays' positions for the target SIR `target`; `None` if the chain cannot meet it.
 pub(super) fn placed(briefed: &ProfiledMission, target: f32) -> Option<Vec<Placement>> {
-    let mut places = vec![Placement::default(); usize::from(briefed.mission.relays())];
-    let profile_of = |index| briefed.profile(index);
-    briefed
-        .mission
-        .places_for(target, profile_of, &mut places)
-        .then_some(places)
+    fewest::places(&briefed.mission, target, |index| briefed.profile(index))
 }
 
 /// Returns the plan with the fewest relays that give every hop the SIR `target`. `how` names the method. The relays
@@ -342,11 +337,11 @@ fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pla
         let places = placed(&briefed, target).ok_or_else(nothing)?;
         return Ok(briefed.plan(&places, "Algorithm 4", false));
     }
-    let target = fleet::best_of_equals(&briefed.mission, profile).ok_or_else(nothing)?;
+    let target = best_of_equals(&briefed.mission, profile).ok_or_else(nothing)?;
     let places = placed(&briefed, target).ok_or_else(nothing)?;
     let proven = is_free(scenario, |free| {
         let free = ProfiledMission::new(free, relays, tolerance).ok()?;
-        let most = fleet::best_of_equals(&free.mission, profile)?;
+        let most = best_of_equals(&free.mission, profile)?;
         Some(f64::from(most) <= f64::from(target) * (1.0 + tolerance))
     });
     Ok(briefed.plan(&places, "ranges that can be continued to Rx", proven))

@@ -35,8 +35,9 @@ const SAME: f64 = 1e-4;
 /// Loss of reach in the return direction (to Tx) that the search neglects. It is a fraction of the line Tx-Rx.
 const SLIGHT: f64 = 1e-6;
 
-/// Number of halvings of a cell in the search for the farthest x at which a hop meets a rate step. A rate step is a
-/// data rate of the radio, and the least SINR that it requires.
+/// Number of bisection steps in the search for the farthest x at which a hop meets a rate step. The search starts
+/// from one cell, which is one of [`CELLS`] equal parts of the line. A rate step is a data rate of the radio, and the
+/// least SINR that it requires.
 const HALVINGS: u8 = 40;
 
 /// First hops of a chain, which end at a relay at `point`. They need `time` for one bit, in s Hz: the time in s for a
@@ -232,8 +233,11 @@ impl Search<'_> {
         cell
     }
 
-    /// Extends the chains `labels` by relay `node`; returns the new chains that are worth keeping. `limit` is the
-    /// relay's largest x, m. `bound` has lower bounds on the time of the hops after it, s Hz, for each cell.
+    /// Extends each chain of `labels` by a hop to relay `node`. Returns the new chains that are worth keeping.
+    ///
+    /// `limit` is the largest permitted x of relay `node`, m. `bound` has one number for each cell, that is for each
+    /// of [`CELLS`] equal parts of the line. The number is a lower bound on the time for one bit of all hops after
+    /// the relay, if the relay is in this cell. Its unit is s Hz: the time in s for a bandwidth of 1 Hz.
     fn extended(
         &self,
         labels: &[Label],
@@ -398,7 +402,8 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the start, m, of the interval of x that ends at `point` without a better position.
+    /// Returns the smallest x, m, from which up to `point` no position is better than `point`. A position is better
+    /// if it receives the next relay's signal from farther away, at some rate step of the way back.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

@@ -17,9 +17,9 @@ pub fn name(index: u16) -> String {
 
 /// Writes `files`, each with its name and content, to the folder `dir`. Creates `dir` if necessary.
 ///
-/// With `force`, existing files are overwritten and other blocks in the folder removed, because a drone of another
-/// flight would accept them. Files are first written under temporary names and renamed at the end: an earlier failure
-/// leaves the folder as it was.
+/// With `force`, the function overwrites existing files. It also removes all other configuration blocks from the
+/// folder, because these blocks belong to another flight and a drone would accept them. The function first writes
+/// temporary files and renames them at the end. If it fails before that, the folder is unchanged.
 ///
 /// # Errors
 /// A line that names the file or folder and the reason.

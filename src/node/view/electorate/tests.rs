@@ -80,8 +80,8 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks for every subset of chains of up to seven relays that it decides only if it is a quorum. A quorum is more
-/// than half of the relays, or half with the initial leader.
+/// Checks that a subset of a chain's relays decides only if it is a quorum: all subsets of up to seven relays. A
+/// quorum is more than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {
@@ -260,8 +260,8 @@ fn the_next_proposal_spreads_the_agreed_view() {
     assert_eq!(chain.knows(4).0, poll.agreed);
 }
 
-/// Checks that the vote of a relay that does not know the newest view does not count. Relay 2, which does not know
-/// it, votes before relay 3, which does.
+/// Checks that the vote of a relay that does not know the newest view does not count. Relay 2 does not know the
+/// newest view and votes first. Relay 3 knows this view and votes later.
 #[test]
 fn a_relay_that_does_not_know_the_view_has_no_vote() {
     let mut chain = Chain::of(3);
@@ -302,7 +302,7 @@ fn only_members_may_be_relied_on() {
     assert_eq!((poll.lease_left, poll.votes), (40, 2));
 }
 
-/// Checks that a refused view proposal is removed from the list of votes. That list is for proposals with an unknown
+/// Checks that a refused view proposal is removed from the list of votes. The list is for proposals with an unknown
 /// decision.
 #[test]
 fn votes_are_kept_until_their_result_is_known() {

@@ -26,11 +26,11 @@ const SHORTEST: f32 = 1e-8;
 
 /// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
 ///
-/// The factor r is the required ratio of backward to forward SIR. Other values for the two directions of a hop have the
-/// same order. The *slack* of a level is its excess over the target.
+/// The factor r is the required ratio of backward to forward SIR. Other pairs of values for a hop have the same
+/// order: forward, backward. The *slack* of a level is the level minus the target.
 pub(super) type Levels = [f32; 2];
 
-/// Symmetric 3 x 3 matrix over x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
+/// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
 
 #[inline(never)]
@@ -103,15 +103,16 @@ impl LogGains {
         [there, back - self.reverse]
     }
 
-    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. Interference is relative to
-    /// the interferer's power at the distance from Tx to Rx.
+    /// Returns ln q at the position `at`; q is the inverse of interference plus noise. The interference is divided by
+    /// the interferer's power received at the distance D from Tx to Rx.
     pub(super) fn quiet(&self, at: Triple) -> f32 {
         let w = minus(at, self.gains.source);
         let s = dot(&w, &w) + SHORTEST * SHORTEST;
         libm::logf(s / (1.0 + self.gains.noise * s))
     }
 
-    /// Returns the levels of hop `k` from `from` to `to`. `quiet_from` and `quiet_to` are ln q there.
+    /// Returns the levels of hop `k` from `from` to `to`. `quiet_from` and `quiet_to` are ln q at `from` and at `to`;
+    /// q is the inverse of interference plus noise. A level is ln(SIR).
     pub(super) fn levels(
         &self,
         k: u16,
@@ -127,9 +128,9 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s levels by the positions of its ends `from` and `to`. The second ones are
-    /// summed with the `weights` of both levels. If `convex` is true, terms that would make that sum indefinite are
-    /// left out.
+    /// Returns the derivatives of hop `k`'s levels (ln SIR) with respect to the positions of its ends `from` and
+    /// `to`. The second derivatives are added up, with the `weights` of both levels. If `convex` is true, terms that
+    /// would make this sum indefinite are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -168,9 +169,9 @@ impl LogGains {
         hop
     }
 
-    /// Adds the derivatives of ln q by the position `at`; q is the inverse of interference plus noise. The first
-    /// derivatives are added to `slope`, and the second ones, multiplied by -`weight`, to `bend`. If `convex` is
-    /// true, terms that would make `bend` indefinite are left out.
+    /// Adds the derivatives of ln q with respect to the position `at`; q is the inverse of interference plus noise.
+    /// The first derivatives are added to `slope`, and the second derivatives, multiplied by -`weight`, to `bend`. If
+    /// `convex` is true, terms that would make `bend` indefinite are left out.
     fn add_quiet(
         &self,
         at: Triple,
@@ -197,15 +198,15 @@ impl LogGains {
     }
 }
 
-/// Derivatives of a hop's levels by the positions of its ends. The second derivatives (`bend...`) are weighted sums
-/// over both levels, negated.
+/// Derivatives of a hop's levels (ln SIR) with respect to the positions of its ends. The second derivatives
+/// (`bend...`) are weighted sums over both levels, negated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {
     pub(super) by_from: [Triple; 2],
     pub(super) by_to: [Triple; 2],
     pub(super) bend_from: Symmetric,
     pub(super) bend_to: Symmetric,
-    /// Part of `bend_from` and `bend_to` that comes from the hop's length. The mixed second derivatives, by one end
-    /// and the other, are its negative.
+    /// Part of `bend_from` and `bend_to` that comes from the hop's length. The mixed second derivatives, with respect
+    /// to one end and the other, are the negative of this matrix.
     pub(super) bend: Symmetric,
 }

@@ -41,26 +41,30 @@ use newton::{Factor, Front, Sums, Weights};
 const FIRST_MU: f32 = 0.03;
 /// First barrier weight for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
-/// Last barrier weight. The result is within this of a local optimum, in ln(SIR), if the problem is concave around it.
+/// Last barrier weight. The result differs from a local optimum by at most this value, in ln(SIR), if the problem is
+/// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight falls once the positions have settled.
+/// Factor by which the barrier weight falls once the positions have settled, so that a step gains little.
 const LESS: f32 = 0.3;
 
-/// Gain of the merit, over the barrier weight, below which positions have settled. For more than half a Newton step.
+/// Gain below which the positions count as settled after more than half of a Newton step. The gain is the increase of
+/// the merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
 const SETTLED: f32 = 0.1;
-/// Gain of the merit, over the barrier weight, below which positions have settled. For any fraction of a Newton step.
+/// Gain below which the positions count as settled after a Newton step of any length. The gain is the increase of the
+/// merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
 /// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened after a try that lowers the merit.
+/// Factor by which a Newton step is shortened if it lowers the merit, the function that is maximised.
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers outside are moved to the limit.
+/// Maximum factor between a Lagrange multiplier and its value at the optimum. A multiplier outside this range is set
+/// to the limit.
 const APART: f32 = 5.0;
 
 /// Number of Newton steps for the target that one call makes.
@@ -77,7 +81,8 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop, and their Lagrange multipliers `lambda`, each of which is the upper half of an f32.
+/// Levels of a hop (ln SIR, forward and backward), and their Lagrange multipliers `lambda`. Each multiplier is stored
+/// as the upper half of an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -149,7 +154,7 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of all hops' levels at the tried positions. The field is the next hop.
+    /// Computation of all hops' levels (ln SIR) at the tried positions. The field is the next hop.
     Levels(u16),
     /// Computation of the target from all levels; the field is the number of Newton steps done.
     Target(u8),
@@ -159,8 +164,8 @@ enum Work {
     Accept(u16),
     /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and which half of it:
-    /// `true` for the second half, which is computed before the first one.
+    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and a flag: `true` for
+    /// the second half of the segment. The second half is computed before the first half.
     Substitute(u16, bool),
 }
 
@@ -171,8 +176,8 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Lengths of the line Tx-Rx that are closed to two relays. They are next to Rx for relay 1, and next to Tx for
-    /// the last relay. In units of the distance from Tx to Rx.
+    /// Two parts of the line Tx-Rx where one relay must not be: a part next to Rx for relay 1, and a part next to Tx
+    /// for the last relay. The values are the lengths of the parts, divided by the distance from Tx to Rx.
     pub(super) closed: [f32; 2],
     nodes: [Node; RELAYS],
     last: Hop,
@@ -185,9 +190,10 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit at the stored positions. The current step is accepted if it does not lower the merit.
+    /// Merit, the function that is maximised, at the stored positions. The current step is accepted if it does not
+    /// lower the merit.
     merit: f32,
-    /// Sum of the barrier's logarithms over the hops handled so far, at the positions that are tried.
+    /// Sum of the barrier's logarithms for the hops handled so far, at the positions that are tried.
     sum: f32,
     /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions only.
     share: f32,
@@ -228,8 +234,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         iterations: 0,
     };
 
-    /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if they
-    /// are close to the result; the barrier weight is then smaller at first.
+    /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if
+    /// these positions are close to the result. The first barrier weight is then smaller.
     pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
         self.gains = LogGains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
@@ -333,7 +339,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and multipliers of hop `k`, which leads to relay `k`, or to Rx for N + 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. This hop leads to relay `k`, or to Rx if `k` is
+    /// N + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -342,8 +349,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Prepares the evaluation of the stored positions, without a step. If `resets` is true, the Lagrange multipliers
-    /// are then replaced by new ones.
+    /// Prepares the evaluation of the stored positions, without a step. If `resets` is true, the evaluation replaces
+    /// the Lagrange multipliers.
     const fn look(&mut self, resets: bool) {
         self.share = 0.0;
         self.resets = resets;
@@ -356,8 +363,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by one bounded portion. Ready at the end, with a target in ln(SIR) slightly
-    /// below all levels of the stored positions.
+    /// Continues the interior-point method by one bounded portion. Ready at the end, with a target in ln(SIR)
+    /// slightly below ln(SIR) of all hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -405,7 +412,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels of ten hops from hop `k` on, and adds ln(distance to a limit) of their ends.
+    /// Computes the levels (ln SIR) of ten hops, from hop `k` on. For the coordinates of the hops' ends it adds
+    /// ln(distance to a limit) to the barrier.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -436,9 +444,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over them is 1.
+    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over all levels is 1.
     ///
-    /// The inverse of the sum is concave in T, and Newton's method for it starts above the solution. So T falls to it.
+    /// The inverse of this sum is concave in T, and Newton's method starts above the solution. So T falls to the
+    /// solution.
     fn approach(&mut self, relays: u16, steps: u8) {
         let end = steps + STEPS;
         self.work = Work::Target(end);
@@ -471,8 +480,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Accepts the tried step if it does not lower the merit; else shortens the step. After the last try the step is
-    /// computed again without negative curvature, and after that the barrier weight falls.
+    /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. After the last attempt the
+    /// step is computed again without negative curvature, and after that the barrier weight falls.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -551,7 +560,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives of hop `k`'s levels by the positions `ends`, and its multipliers and slacks.
+    /// Returns the derivatives of hop `k`'s levels (ln SIR) with respect to the positions `ends`. Also returns the
+    /// hop's Lagrange multipliers and slacks.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
         let weights = self.weights(relays, k);

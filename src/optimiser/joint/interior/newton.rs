@@ -26,14 +26,15 @@ use super::Spot;
 use super::hop::{Derivatives, Symmetric, add_scaled, add_square, dot};
 use crate::root::sqrt;
 
-/// Smallest pivot that counts as positive, relative to the diagonal element before any elimination.
+/// Smallest pivot that counts as positive, divided by the diagonal element before the elimination.
 const LEAST_PIVOT: f32 = 1e-6;
 
-/// Curvature of a coordinate whose two limits are equal. It is so large that the Newton step does not move it.
+/// Curvature of a coordinate whose two limits are equal. The curvature is so large that the Newton step does not move
+/// this coordinate.
 const STIFF: f32 = 1e18;
 
-/// Equations of the Newton system for one relay, after the elimination of all previous relays. The hop to the next relay is still missing
-/// in them.
+/// Equations of the Newton system for one relay, after the elimination of all previous relays. The terms of the hop
+/// to the next relay are not added yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     bend: Symmetric,
@@ -44,14 +45,15 @@ pub(super) struct Front {
 }
 
 /// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the
-/// next relay's steps in x, y and h. The last two are right sides: constant, and per unit of the target's change.
+/// next relay's steps in x, y and h. The last two values are the right side: its constant part, and its part per unit
+/// of the target's change.
 type Row = [f32; 5];
 
 /// Equations of one relay after its elimination, from which its Newton step follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. Those of the
-    /// diagonal are stored inverted, because they are divisors.
+    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal
+    /// elements are stored as inverses, because they are divisors.
     lower: [f32; 6],
     /// Linear equations for the relay's steps in x, y and h, one row each.
     rows: [Row; 3],
@@ -74,13 +76,14 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    /// Returns the Lagrange multiplier over the slack for each direction of the hop.
+    /// Returns the Lagrange multiplier divided by the slack for each direction of the hop.
     fn ratios(&self) -> [f32; 2] {
         let ([a, b], [s, t]) = (self.lambda, self.slack);
         [a / s, b / t]
     }
 
-    /// Returns mu over the slack for each direction of the hop: the Lagrange multipliers at the optimum.
+    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is mu, the barrier
+    /// weight, divided by the slack.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
@@ -100,8 +103,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of that relay, and on
-    /// return those of the node at `spot`, where `hop` ends.
+    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of this relay; on return
+    /// `self` has the rows of the node at `spot`, where `hop` ends.
     ///
     /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
     /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
@@ -188,7 +191,8 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`. It is added to `sums`.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds this
+    /// contribution to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -220,9 +224,9 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of one coordinate's barrier to `slope` and `bend`. The barrier is mu (ln a + ln b); the
-/// second derivative is negated. a and b are the distances to the lower and the upper limit, mu is the barrier
-/// weight.
+/// Adds the derivatives of one coordinate's barrier to `slope` and `bend`. The barrier is mu (ln a + ln b); its
+/// second derivative is negated before it is added. a and b are the distances to the lower and the upper limit, mu is
+/// the barrier weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
@@ -267,7 +271,7 @@ impl Factor {
         rows: [[0.0; 5]; 3],
     };
 
-    /// Returns this relay's Newton step, from the target's step `by_target` and the next relay's, `next`.
+    /// Returns this relay's Newton step, from the target's step `by_target` and the next relay's step `next`.
     pub(super) fn step(&self, by_target: f32, next: Triple) -> Triple {
         let known = (self.rows)
             .map(|[x, y, h, slope, column]| slope + by_target * column - dot(&[x, y, h], &next));

@@ -31,13 +31,13 @@ const LINE: u16 = 2;
 const PUT: u16 = 20;
 
 /// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays
-/// at the same x. The first value is for its first run, the second for repetitions.
+/// at the same x. The first value is for the first run of this method, the second value for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Description of an initial chain, from the end with more power (Tx or Rx) to the other end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets away from the interferer, as fractions of the largest permitted one. The values are for the
+    /// Lateral offsets away from the interferer, as fractions of the largest permitted offset. The values are for the
     /// first, the middle and the last relay.
     aside: [f32; 3],
     /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
@@ -53,8 +53,8 @@ enum Along {
     /// First and last x of evenly spaced relays, as fractions of the distance from Tx to Rx. They are counted from
     /// the end with more power.
     Even([f32; 2]),
-    /// x from Algorithm 1 without those that `close_beyond` closes. Lateral offsets and altitudes follow part of an
-    /// ellipse down to the end with less power.
+    /// x from Algorithm 1, without the x that the function `close_beyond` excludes. Lateral offsets and altitudes
+    /// follow part of an ellipse down to the end with less power.
     Arc,
 }
 
@@ -156,8 +156,8 @@ struct Pass {
     index: u16,
     /// True while the solver passes along the chain from Rx back to Tx.
     is_back: bool,
-    /// x of relay `index`, m. In the pass to Rx it is the farthest that meets the target, in the pass back the final
-    /// one.
+    /// x of relay `index`, m. In the pass to Rx it is the farthest x that meets the target; in the pass back it is
+    /// the final x.
     x_m: f32,
     /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
     end_m: f32,
@@ -176,7 +176,7 @@ impl Pass {
 #[derive(Clone, Debug)]
 pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pub(super) interior: Interior<RELAYS, SEGMENTS>,
-    /// Best target found, in ln(SIR); `None` before any is found.
+    /// Best target found, in ln(SIR); `None` until a target is found.
     best: Option<f32>,
     /// Lateral offsets and altitudes of the chain that meets the best target.
     best_cells: Cells<RELAYS>,
@@ -184,7 +184,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     pass: Pass,
     /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
-    /// Number of repeated runs of the interior-point method for the current initial chain.
+    /// Number of repeated runs, so far, of the interior-point method for the current initial chain.
     again: u8,
     /// Number of the current initial chain. In chain 0 all relays are at the common altitude.
     number: u8,
@@ -268,8 +268,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
-    /// relays have theirs already. After the last initial chain, the next work is the final search for the best
-    /// chain's target.
+    /// relays already have their offsets and altitudes. After the last initial chain, the next work is the final
+    /// search for the best chain's target.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -304,12 +304,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x its
-    /// SIR rises with the distance from that end.
+    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x the
+    /// SIR of this relay rises with its distance from that end.
     ///
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
-    /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The interferer is taken
-    /// for as far from the line as the relay's cross-section from the interferer.
+    /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
+    /// interferer from the line is replaced by its distance from the relay's cross-section.
     fn close_beyond(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let (distance_m, is_turned) = (chain.distance_m(), is_turned(chain));
         let index = if is_turned { chain.relays() } else { 1 };
@@ -330,15 +330,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, has the description of chain 1, of which it only uses `along`: the x are those of Algorithm 1.
+    /// altitude, has the description of chain 1. Chain 0 uses only `along` of this description: the x come from
+    /// Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
-    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best one; returns the next work. If
+    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best one so far; returns the next work. If
     /// Algorithm 1 has found positions worth an improvement, the next work leads to another run of the interior-point
-    /// method. Otherwise it is the next initial chain.
+    /// method. Otherwise the next work begins the next initial chain.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);
@@ -358,7 +359,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Chooses the positions at which the interior-point method starts, and starts it. The lateral offsets and
-    /// altitudes are the stored ones. Each x is that of Algorithm 1, or evenly spaced. The first `done` relays have
+    /// altitudes are the stored ones. The x come from Algorithm 1, or are evenly spaced. The first `done` relays have
     /// their positions already.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
@@ -420,8 +421,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay its final x.
-    /// `None` if the target cannot be met.
+    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay the result is its
+    /// final x. `None` if the target cannot be met.
     fn line_there(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -497,15 +498,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if the initial chains are described from Rx. That is so if Rx has more power than Tx; with equal powers
-/// if less SIR is required on the way back, because on the ground Rx receives less interference than relay 1.
+/// Returns true if the initial chains are described from Rx. This is so if Rx has more power than Tx. With equal
+/// powers it is so if less SIR is required on the way back, because Rx on the ground receives less interference than
+/// relay 1.
 fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
     rx_w > tx_w || (rx_w >= tx_w && config.reverse < 1.0)
 }
 
-/// Returns the number of relays between relay `index` and the end with more power (Tx or Rx).
+/// Returns the number of other relays between relay `index` and the end with more power (Tx or Rx).
 fn before(chain: &Chain<'_, impl SeatOf>, index: u16) -> u16 {
     if is_turned(chain) {
         chain.relays() - index
@@ -521,12 +523,11 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
     [a / radius, b / radius]
 }
 
-/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1
-/// meets at the last run's lateral offsets and altitudes, less the target of that run.
+/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is a difference: the target that
+/// Algorithm 1 meets at the last run's lateral offsets and altitudes, minus the target of the last run.
 const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Excess of the first target to try over the interior-point method's result, in ln(SIR). It is the method's possible
-/// error.
+/// First target to try minus the interior-point method's result, in ln(SIR). It is the possible error of this method.
 const ABOVE: f32 = 1e-4;

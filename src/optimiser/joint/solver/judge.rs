@@ -13,7 +13,7 @@ use crate::optimiser::search::Infeasible;
 use crate::place::CrossSection;
 use core::task::Poll;
 
-/// Precision of the search for the highest target that an improved chain meets, in ln(SIR).
+/// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
 pub(super) const JUDGED: f32 = 4e-6;
 
 /// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). A chain within
@@ -22,7 +22,7 @@ pub(super) const CEILING: f32 = 5e-5;
 
 /// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
 ///
-/// There the search checks if the chain already reaches the bound, and then ends.
+/// At this target the search checks if the chain already reaches the bound; if so, the search ends.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -69,9 +69,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Records if the chain meets the target that was tried, and selects the next piece of work.
+    /// Records if the chain meets the tried target, and selects the next piece of work.
     ///
-    /// `met` is as in [`Seek::tried`].
+    /// `met` is `None` if the target is infeasible; otherwise it is true if some relays have to stay short of their
+    /// farthest positions.
     pub(super) fn tried(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -181,8 +182,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the work that searches for the highest target that the current chain meets. The hops are computed
     /// exactly as the relays compute them from their messages.
     ///
-    /// The chain results from an ascent that ended at the target `sigma`; `ceiling` is the upper bound, both in
-    /// ln(SIR). Relays may stay short of their farthest position.
+    /// The chain is the result of an ascent (improvement in steps) that ended at the target `sigma`. `ceiling` is the
+    /// upper bound of all chains. Both are in ln(SIR). Relays may stay short of their farthest position.
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -193,14 +194,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current chain may still become the best one, so that it is improved again.
+    /// Returns true if the current chain may still become the best chain. Such a chain is improved again.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain can no longer become the best one, so that its improvement stops. `turn` is
-    /// the next action of the improvement.
+    /// Returns true if the current chain can no longer become the best chain. The improvement of such a chain stops.
+    /// `turn` is the next action of the improvement.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -235,8 +236,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for which the last phase tries moves of single relays. It always does if some relays have
-/// a fixed altitude, since the path then has kinks.
+/// Maximum number of relays for which the last phase tries moves of single relays. If some relays have a fixed
+/// altitude, the phase always tries them, because the path then has kinks.
 const POLISHED: u16 = 5;
 
 /// Number of times that the trial moves of single relays are halved, in the last phase of the solution.
@@ -251,8 +252,8 @@ const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Returns the current trial move: the relay's index, the kind of move, and how often it was halved. Kinds 0 to 3
-    /// move it down, up, left or right. Kinds 4 and 5 copy the offset and altitude of the relay two places on or
-    /// back.
+    /// move the relay down, up, left or right. Kinds 4 and 5 copy the lateral offset and altitude of the relay two
+    /// places toward Rx or toward Tx.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
         // A mission has at least one relay, which the compiler does not know.
         let relays = mission.relays().max(1);
@@ -360,7 +361,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns true if `start` cannot lead to a better chain.
+    /// Returns true if the initial chain `start` cannot lead to a better chain than the best one found.
     fn is_skipped(&self, chain: &Chain<'_, impl SeatOf>, start: Start) -> bool {
         match start {
             Start::Near if self.again => false,
@@ -376,8 +377,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Begin
     }
 
-    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they are those of a new
-    /// initial chain, else the stored ones.
+    /// Returns the lateral offset and altitude of relay `index`. With [`Purpose::Start`] they come from a new initial
+    /// chain, otherwise from the stored chain.
     pub(super) fn shaped(
         &self,
         chain: &Chain<'_, impl SeatOf>,

@@ -34,7 +34,7 @@ use both::Both;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {
-    /// Number of relays that the forward pass (the one that moves the relays) has completed.
+    /// Number of relays that the forward pass has completed. The forward pass moves the relays.
     done: u16,
     /// Position to which the forward pass has moved the last relay that it has completed.
     from: Placement,
@@ -65,8 +65,8 @@ enum Work {
     Seek(Seek, Purpose),
     /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Check that every relay has a position if some must stay short of their farthest one. The fields are the
-    /// segment, the required x of its last relay, m, and the search with its purpose.
+    /// Check that every relay has a position if some relays must stay short of their farthest position. The fields
+    /// are the segment, the required x of its last relay, m, and the search with its purpose.
     HoldBack(u8, f32, Seek, Purpose),
     /// Try the next move of one relay. The field is the target that the chain meets, as ln(SIR).
     Polish(f32),
@@ -83,7 +83,7 @@ enum Purpose {
     Start,
     /// The search raises the target as far as the current chain meets it without moves of its relays.
     Raise,
-    /// The chain's slack is computed again, after the cap on the slack was lowered.
+    /// The chain's slack is computed again, after the upper limit on the slack was lowered.
     Tighten,
     /// The search finds the highest target of an improved chain, with the improvement's margins.
     Judge,
@@ -115,16 +115,18 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the improvement of the best chain reached, in ln(SIR). Others are stopped if predicted to end below.
+    /// Target that the improvement of the best chain reached, in ln(SIR). The improvement of another chain stops if
+    /// it is predicted to end below this target.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target at which the improvement of the best chain ended: its `judged_at`. The last search starts there, and
-    /// need not improve the chain again.
+    /// Target at which the improvement of the best chain ended, in ln(SIR). The last search starts there, and need
+    /// not improve the chain again.
     best_judged: Option<f32>,
-    /// Target at which the current chain's improvement ended, in ln(SIR). `None` before the end, and if it was stopped early.
+    /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, and if
+    /// it was stopped early.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was stopped early, as it would not become the best.
+    /// True unless the current chain's improvement was stopped early, because it would not become the best chain.
     is_whole: bool,
     /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
     again: bool,
@@ -202,8 +204,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::NONE;
     }
 
-    /// Stores the lateral offset and altitude `cell` of relay `index`. If it is the first of a segment, it also
-    /// stores `x_m`, the x of the relay before it, m.
+    /// Stores the lateral offset and altitude `cell` of relay `index`. If relay `index` is the first relay of a
+    /// segment, the function also stores `x_m`, the x of the previous relay, m.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -212,7 +214,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins there.
+    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins at this
+    /// relay.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -228,7 +231,7 @@ const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 /// its hop needs.
 const FITTED: usize = ALTITUDE as usize;
 
-/// Joint solver of a chain: that for one direction, for both directions, or for fitted slots.
+/// Joint solver of a chain: the solver for one direction, for both directions, or for fitted slots.
 ///
 /// A mission needs only one of the three, so they share their memory.
 #[cfg_attr(
@@ -263,8 +266,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         solver.begin(mission).then_some(solver)
     }
 
-    /// Prepares the solver for the directions of `mission`; returns false if it cannot solve the chain. It cannot in
-    /// an interference field, or with too many relays.
+    /// Prepares the solver for the directions of `mission`; returns false if it cannot solve the chain. It cannot
+    /// solve a chain in an interference field, or a chain with too many relays.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
         if mission.fitted_gap() > 0.0 {
@@ -293,7 +296,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
 
     /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
     ///
-    /// To be called once the chain is solved. The limit is equal, to the bit, to the one that the solver used.
+    /// Call it once the chain is solved. The limit is equal, to the bit, to the limit that the solver used.
     pub fn end_m(&self, mission: &Mission, seat_of: &impl Fn(u16) -> Seat, index: u16) -> f32 {
         let chain = Chain::new(mission, seat_of);
         let solved = chain.zip(self.cells());

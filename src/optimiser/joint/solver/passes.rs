@@ -108,8 +108,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Runs the forward pass through one more segment, or first computes the relays' moves there. The pass tries the
-    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
+    /// Runs the forward pass through one more segment, or first computes the moves of this segment's relays. The pass
+    /// tries the fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -189,13 +189,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 /// Number of relays that one call handles in a pass that computes only their x.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty at which an improved chain counts as feasible. It is for relays near the interferer, as a fraction
-/// of the distance from Tx to Rx.
+/// Maximum penalty at which an improved chain counts as feasible. The penalty is for relays too near the interferer;
+/// the unit is the distance from Tx to Rx.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and altitudes stay. Stores the
-    /// chain if `kept`. At the end of the pass returns the chain's slack, m, or `None` if a hop cannot meet the target.
+    /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and
+    /// altitudes stay unchanged. Stores the chain if `kept`. At the end of the pass returns the chain's slack, m, or
+    /// `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -276,8 +277,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the hop to relay `index` of the current chain, computed as the relay does from its messages. The hop
-    /// ends at x = `end_m`, m, at most.
+    /// Returns the hop to relay `index` of the current chain, computed as the relay computes it from its messages.
+    /// The x of the hop's end is at most `end_m`, m.
     pub(super) fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16, end_m: f32) -> Hop {
         let at = |index| (self.cells.get(index)).place(chain.room(index));
         let before = if index > 1 {

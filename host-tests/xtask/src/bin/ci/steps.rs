@@ -62,7 +62,8 @@ pub(crate) enum Lane {
     ///
     /// The main lane does not wait for the end of this step, because the step mostly waits for the wall clock.
     Waiting,
-    /// The step runs at low priority after the previous step of this lane. It has a target folder of its own.
+    /// The step runs at low priority, beside the steps of the other lanes. It starts when the previous `Background`
+    /// step has ended, and builds into a target folder of its own.
     Background,
 }
 

@@ -248,9 +248,11 @@ impl Shell {
     }
 }
 
-/// Returns a shell function `cargo` that runs the built programs in `bin` for the aliases of `config`.
+/// Returns the definition of a shell function `cargo` for the commands of a documentation page.
 ///
-/// It runs all other cargo commands in `root`, so that nothing is built again for other paths.
+/// For an alias of `config` the shell function runs the program that is already built in `bin`. For any other command
+/// it runs the real cargo in the folder `root`. In another folder cargo would build everything again, because the
+/// paths differ.
 fn functions(config: &str, bin: &Path, root: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {

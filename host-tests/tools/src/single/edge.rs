@@ -65,15 +65,15 @@
 //! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
 //! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
+use uav_relay::root::bisected;
+use uav_relay::sir::Slope;
+use uav_relay::{Band, Interferer, Mission, Placement};
+use uav_relay_scenario::number::narrow;
+
 use super::{Found, HALVINGS, TwoHops};
-use crate::mission::{Band, Interferer, Mission};
-use crate::place::Placement;
-use crate::root::bisected;
-use crate::sir::Slope;
 
 /// Coordinate that varies along an edge of the box in which a relay may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum EdgeCoordinate {
     /// Position varies from Tx toward Rx: edge along x.
@@ -84,8 +84,8 @@ pub enum EdgeCoordinate {
     Upward = 6,
 }
 
-/// Edge of the box in which a relay may be. On it the coordinate `free` varies within `room`, m, and the other two
-/// are those of `through`.
+/// Edge of the box in which a relay may be. On this edge the coordinate `free` varies within `room`, m. The other two
+/// coordinates are constant, as in the point `through`.
 #[derive(Clone, Copy)]
 pub(super) struct Edge {
     pub(super) free: EdgeCoordinate,
@@ -104,8 +104,8 @@ impl Edge {
         place
     }
 
-    /// Returns the extrema of both hops' SIRs along the edge, as values of the varying coordinate, m. Missing ones
-    /// are NaN, or far away.
+    /// Returns the extrema of both hops' SIRs along the edge, as values of the varying coordinate, m. An extremum
+    /// that does not exist is NaN, or far away.
     fn turns(&self, mission: &Mission, interferer: &Interferer) -> [f32; 4] {
         let wide = |x: f32| f64::from(x);
         let at = self.through;
@@ -162,8 +162,8 @@ impl Edge {
         best
     }
 
-    /// Returns the best position between `low` and `high` on the edge, without `low` itself, m. Each hop's SIR must
-    /// only rise or only fall between the two.
+    /// Returns the best position on the edge above `low` and up to `high`, m. Each hop's SIR must only rise or only
+    /// fall between the two.
     fn best_of(&self, hops: &TwoHops<'_>, low: f32, high: f32) -> Found {
         let both = |t: f32| hops.both(self.place(t));
         let (at_low, at_high) = (both(low), both(high));
@@ -178,7 +178,7 @@ impl Edge {
     }
 }
 
-/// Returns the four values in ascending order; a NaN is replaced by one of the others.
+/// Returns the four values in ascending order; a NaN is replaced by another of the four values.
 fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
     let (c, d) = (c.min(d), c.max(d));
@@ -187,17 +187,10 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     [a, b.min(c), b.max(c), d]
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a place is given as an f32"
-)]
-pub(super) fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
 const NOISY_HALVINGS: u8 = 60;
 
-/// Returns the two t, m, at which the first hop's SIR has an extremum on an edge, without noise.
+/// Returns the two values of the coordinate t, m, at which the first hop's SIR has an extremum on an edge, without
+/// noise. t is the coordinate that varies along the edge.
 fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
     let half = 0.5 * (squared(p) + a - b);
     // The larger root first, the other one from their product: neither cancels.
@@ -206,7 +199,8 @@ fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
     [sum / p, -p * b / sum]
 }
 
-/// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. Missing ones are NaN.
+/// Returns the three values of the coordinate t, m, at which the first hop's SIR has an extremum on an edge, with
+/// noise. An extremum that does not exist is NaN.
 ///
 /// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where the coordinate t varies
 /// along the edge. `noise` is nu.
@@ -241,7 +235,7 @@ fn noisy_turns(p: f64, a: f64, b: f64, noise: f64) -> [f64; 3] {
 /// Number of lines of constant y on either side of y = 0 that the search at one altitude evaluates.
 const LINES: u8 = 24;
 
-/// Number of lines of constant y near which the search at one altitude is refined: the best ones.
+/// Number of the best lines of constant y. Near these lines the search at one altitude is refined.
 const FOLLOWED: usize = 3;
 
 /// Number of golden-section steps in y near each of the best lines of constant y.
@@ -315,20 +309,20 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts the line of constant y `new` into the list of the best lines if it is better than one. Each entry has the
-/// best SIR on the line, and the y of the lines on either side.
+/// Inserts the line of constant y `new` into the list of the best lines, if it is better than a line in the list.
+/// Each entry has the best SIR on the line, and the y of the two adjacent lines.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {
         if new.0 > slot.0 {
-            core::mem::swap(slot, &mut new);
+            std::mem::swap(slot, &mut new);
         }
     }
 }
 
-/// Returns the position in the plane y = `y_m` at which the two hops' curves of constant SIR touch. `None` if it is
-/// not between Tx and Rx or not within the altitudes `band`, and without noise, where it does not exist. Work: 40
-/// bisection steps.
+/// Returns the position in the plane y = `y_m` at which the two hops' curves of constant SIR touch. `None` if the
+/// position is not between Tx and Rx, or not within the altitudes `band`. Also `None` without noise, because the
+/// curves then do not touch. Work: 40 bisection steps.
 pub(super) fn touching_inside(
     hops: &TwoHops<'_>,
     interferer: &Interferer,
@@ -362,8 +356,9 @@ pub(super) fn touching_inside(
     within.then(|| hops.found(place))
 }
 
-/// Vertical plane y = y0, with the numbers that determine both hops' SIRs in it. They are D (distance Tx-Rx),
-/// interferer's X, (y0 - Y)^2, y0^2, noise nu, and ratio G = K / A of the hops' gains, in m and m^2.
+/// Vertical plane y = y0, with the numbers that determine both hops' SIRs at a point of the plane. The numbers are D
+/// (distance Tx-Rx), the interferer's X, (y0 - Y)^2, y0^2, the noise nu, and the ratio G = K / A of the hops' gains,
+/// in m and m^2.
 struct Face {
     d: f64,
     x: f64,
@@ -374,8 +369,8 @@ struct Face {
 }
 
 impl Face {
-    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane. The result is its x
-    /// less that of Rx, m. `r` is the radius of the circle, m.
+    /// Returns the point with the first hop's largest SIR on a circle about Rx in this plane. The result is the x of
+    /// this point minus the x of Rx, m. `r` is the radius of the circle, m.
     fn best(&self, r: f64) -> f64 {
         let (d, gap) = (self.d, self.d - self.x);
         let t = gap * self.y - self.x * squared(r) + d * (gap * self.x - self.aside);
@@ -384,8 +379,8 @@ impl Face {
         z.max(-r).min(r)
     }
 
-    /// Returns the first hop's largest SIR on a circle about Rx in this plane, over the hop's gain. `r` is the radius
-    /// of the circle, m.
+    /// Returns the first hop's largest SIR on a circle about Rx in this plane, divided by the hop's gain. `r` is the
+    /// radius of the circle, m.
     fn first(&self, r: f64) -> f64 {
         let (z, gap) = (self.best(r), self.d - self.x);
         let s = squared(r) + squared(gap) + self.aside + 2.0 * gap * z;

@@ -1,35 +1,12 @@
-//! Cost of placing one relay, and of finding the number of relays, on board.
+//! Cost of the joint method on board.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
 use uav_relay::optimiser::joint::{Seat, Solver};
-use uav_relay::planning::fleet::Fewest;
-use uav_relay::planning::single::theorems;
 
 use super::counter::instructions;
-use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, MISSION, WIDE};
-
-/// Measures the instructions for the paper's Theorems 1 to 3, and for the search for the fewest relays. The search
-/// finds the smallest number of relays with which every hop reaches a given SIR.
-#[inline(never)]
-pub(crate) fn planning() {
-    let common = HIGH.config().common;
-    let (mission, x_m) = (black_box(&HIGH), black_box(700.0));
-    let first = instructions(|| theorems::best_at_altitude(mission, common));
-    let second = instructions(|| theorems::best_at_x(mission, x_m, common.power_w));
-    let third = instructions(|| theorems::best_free(mission, common.power_w));
-    hprintln!("theorem_1 {}", first);
-    hprintln!("theorem_2 {}", second);
-    hprintln!("theorem_3 {}", third);
-    let mut relays = 0;
-    let count = instructions(|| {
-        relays = Fewest::of(black_box(&MISSION), black_box(5.0), |_| common)
-            .map_or(0, |found| found.relays);
-    });
-    hprintln!("fewest {}", count);
-    hprintln!("fewest_relays {}", relays);
-}
+use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, WIDE};
 
 /// Solves a chain of `relays` relays by the joint method, in several calls of the solver.
 ///

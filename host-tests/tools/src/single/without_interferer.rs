@@ -24,16 +24,15 @@
 //!
 //! Accuracy: `host-tests/tests/single.rs`, against a dense search in f64.
 
+use uav_relay::root::sqrt;
+use uav_relay::sir::square;
+use uav_relay::{Mission, Placement, Profile};
+use uav_relay_scenario::number::narrow;
+
 use super::{Found, Two};
-use crate::field::InNoise;
-use crate::mission::{Mission, Profile};
-use crate::place::Placement;
-use crate::root::sqrt;
-use crate::sir::square;
 
 /// Noise power at the receivers' inputs, W, above 0 (1e-15 W is -120 dBm).
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Noise {
     /// Receiver noise power of the relay, W.
     pub relay_w: f32,
@@ -48,7 +47,7 @@ pub struct Noise {
 pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found {
     let config = mission.config();
     let (d, h) = (config.distance_m, profile.altitude_m);
-    let first_w = mission.first_hop_power_w(1.0) / noise.relay_w;
+    let first_w = narrow(f64::from(config.tx_power_w) / config.channel.eta()) / noise.relay_w;
     let second_w =
         first_w * (profile.power_w / config.tx_power_w) * (noise.relay_w / noise.receiver_w);
     let snr = |x_m: f32| {
@@ -90,15 +89,19 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     let end_m = mission.config().distance_m;
     let mut best = two.found(0.0);
     let mut from = 0.0_f32;
-    let points = field.points();
-    let corners = points.iter().map(|point| point.x_m).chain([end_m]);
+    let corners = mission
+        .field()?
+        .points()
+        .iter()
+        .map(|point| point.x_m)
+        .chain([end_m]);
     for corner in corners {
         let to = corner.min(end_m);
         if to <= from {
             continue;
         }
         let mut piece = from;
-        for turn in turns(&field, from, to, profile.altitude_m)
+        for turn in turns(|x_m| field.upsilon(x_m), from, to, profile.altitude_m)
             .into_iter()
             .chain([to])
         {
@@ -112,11 +115,11 @@ pub fn best_in_field(mission: &Mission, profile: Profile) -> Option<Found> {
     Some(best)
 }
 
-/// Returns both extrema of the first hop's mean SIR along x, ascending, m. Upsilon = E[1/I] is linear in [`low`,
+/// Returns both extrema of the first hop's mean SIR along x, ascending, m. `upsilon` = E[1/I] is linear in [`low`,
 /// `high`]: for Upsilon = a + b x they are the roots of b x^2 + 2 a x - b h^2 = 0, with the altitude h. `high` twice
 /// if Upsilon is constant.
-fn turns(field: &InNoise<'_>, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
-    let (at_low, at_high) = (field.upsilon(low), field.upsilon(high));
+fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> [f32; 2] {
+    let (at_low, at_high) = (upsilon(low), upsilon(high));
     let b = (at_high - at_low) / (high - low);
     let a = at_low - b * low;
     if !(b.abs() * high > 1e-7 * at_low) {
@@ -142,8 +145,7 @@ pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> 
     let start = two.second(end_m);
     let mut best: Option<Found> = None;
     for step in 0..most {
-        #[expect(clippy::cast_possible_truncation, reason = "the start is an f32")]
-        let target = (f64::from(start) - f64::from(step) * f64::from(epsilon)) as f32;
+        let target = narrow(f64::from(start) - f64::from(step) * f64::from(epsilon));
         if !(target > best.map_or(0.0, |best| best.sir)) {
             break;
         }

@@ -6,8 +6,7 @@
 //! | a field | equal | ranges of equal relays | exact, also in an uneven field, which the paper leaves to an exhaustive search |
 //! | a field | different | reaches of a pass | result of Algorithm 4; not proven |
 //!
-//! A minimum separation can only raise the number. A number that is the same without it is proven, any other is not. These
-//! functions do not allocate, but are not intended for a relay's main loop.
+//! A minimum separation can only raise the number. A number that is the same without it is proven, any other is not.
 //!
 //! **Reaches of a pass:** the paper's eq. (Opt) and Problem 1. No chain gets farther than its reaches (see `optimiser::pass`), so n
 //! relays whose reaches do not end within the last hop cannot meet the target. The printed search starts with two relays; one may
@@ -17,18 +16,15 @@
 //! relays never have a lower SIR. N of them meet a target if and only if the ranges of `optimiser::retreat` end at a position
 //! within the reach of the first hop.
 
-use crate::mission::{MAX_RELAYS, Mission, Profile};
-use crate::optimiser::pass::{Walk, origin};
-use crate::place::Placement;
-use crate::root::bisected;
-use crate::root::sqrt;
-use crate::side::Heading;
-use crate::sir;
-use crate::sir::square;
+use uav_relay::optimiser::pass::{Walk, origin};
+use uav_relay::root::{bisected, sqrt};
+use uav_relay::sir::{self, square};
+use uav_relay::{Heading, Mission, MissionConfig, Placement, Profile};
+
+const MAX_RELAYS: u16 = Mission::MAX_RELAYS;
 
 /// Minimum number of relays for a target SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fewest {
     /// Number of relays with which a chain meets the target SIR.
     pub relays: u16,
@@ -38,7 +34,6 @@ pub struct Fewest {
 
 /// Highest target SIR that any number of relays meets, and the fewest relays that meet it.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Most {
     /// Highest target SIR that can be met, linear, with a relative error of 1e-6.
     pub target: f32,
@@ -68,7 +63,7 @@ impl Fewest {
         if !(mission.config().min_separation_m > 0.0) || !found.proven {
             return Some(found);
         }
-        let freely = counted(&mission.unseparated(), target, &profile_of);
+        let freely = counted(&unseparated(mission)?, target, &profile_of);
         Some(Self {
             proven: freely.is_some_and(|freely| freely.relays == found.relays),
             ..found
@@ -107,23 +102,25 @@ impl Most {
     }
 }
 
-impl Mission {
-    /// Writes positions with which the mission's N relays meet `target` to `places`, relay 1 first.
-    ///
-    /// Returns false if they do not meet it, or `places` is shorter than N. Every hop but one has its maximum length, and meets
-    /// the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
-    pub fn places_for(
-        &self,
-        target: f32,
-        profile_of: impl Fn(u16) -> Profile,
-        places: &mut [Placement],
-    ) -> bool {
-        let Some(places) = places.get_mut(..usize::from(self.relays())) else {
-            return false;
-        };
-        let chain = Walk::new(self, target, false, &profile_of);
-        settled(&chain, places).is_some() || settled(&chain.plainly(), places).is_some()
-    }
+/// Returns positions with which the mission's N relays meet the SIR `target`, relay 1 first.
+///
+/// `None` if they do not meet it. Every hop but one has its maximum length, and meets the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
+pub fn places(
+    mission: &Mission,
+    target: f32,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Option<Vec<Placement>> {
+    let chain = Walk::new(mission, target, false, &profile_of);
+    settled(&chain).or_else(|| settled(&chain.plainly()))
+}
+
+/// Returns the mission without a minimum separation.
+fn unseparated(mission: &Mission) -> Option<Mission> {
+    let config = MissionConfig {
+        min_separation_m: 0.0,
+        ..*mission.config()
+    };
+    Mission::try_new(config).ok()
 }
 
 /// Returns the minimum number of relays that meet `target`; `None` if no number does. The result's `proven` is valid
@@ -152,7 +149,7 @@ fn fewest_by_reaches(
         // Profiles are indexed from Tx, so every number of relays is another chain.
         Heading::TowardTx => (1..=MAX_RELAYS)
             .map_while(|relays| mission.with_relays(relays).ok())
-            .find(|mission| Walk::new(mission, target, false, profile_of).is_met())
+            .find(|mission| is_met(&Walk::new(mission, target, false, profile_of)))
             .map(|mission| Fewest {
                 relays: mission.relays(),
                 proven: false,
@@ -182,7 +179,7 @@ fn toward_rx(
             continue;
         }
         // If it leaves room for the relays behind it, a chain of known length may end earlier than one that grows.
-        if last.is_met() {
+        if is_met(&last) {
             return Some(Fewest {
                 relays: index,
                 proven,
@@ -193,12 +190,39 @@ fn toward_rx(
     None
 }
 
-/// Writes positions that meet the target to `places`; `None` if there are none. It first computes each relay's reach,
-/// the farthest x at which its hop meets the target; then, from the last relay back, the x that the next hop
-/// requires.
-fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement]) -> Option<()> {
+/// Computes the reach of every relay, and calls `visit` with its index and reach, m.
+///
+/// Returns the chain's slack and the x of the last relay, m; `None` if a hop cannot meet the target.
+fn ends<F: Fn(u16) -> Profile>(
+    chain: &Walk<'_, F>,
+    mut visit: impl FnMut(u16, f32),
+) -> Option<(f32, f32)> {
+    let mut relays = 0;
+    let reaches = chain.reaches().inspect(|(at, _, reach)| {
+        relays += 1;
+        visit(*at, *reach);
+    });
+    let (at, before_m, reach) = reaches.last()?;
+    let is_complete = relays == chain.mission.relays();
+    is_complete.then(|| chain.link(at).ending(chain.target, before_m, reach))?
+}
+
+/// Returns true if the reaches of a pass end within the last hop.
+fn closes<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
+    ends(chain, |_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
+}
+
+/// Returns true if the chain meets its target with relays at their reaches or required positions.
+fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
+    closes(chain) && (closes(&chain.plainly()) || chain.place(0).is_some())
+}
+
+/// Returns positions that meet the target; `None` if there are none. It first computes each relay's reach, the farthest
+/// x at which its hop meets the target; then, from the last relay back, the x that the next hop requires.
+fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
-    let (slack, place) = chain.ends(|index, reach| {
+    let mut places = vec![Placement::default(); usize::from(chain.mission.relays())];
+    let (slack, place) = ends(chain, |index, reach| {
         if let Some(own) = places.get_mut(slot(index)) {
             *own = chain.link(index).own.cross_section.at(reach);
         }
@@ -213,7 +237,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>, places: &mut [Placement])
             None => Some(origin(chain.mission)),
         }
     })?;
-    Some(())
+    Some(places)
 }
 
 /// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
@@ -221,8 +245,8 @@ const MORE: u16 = 32;
 
 const TARGETS: u8 = 48;
 
-fn is_met(mission: &Mission, target: f32, profile: Profile) -> bool {
-    Walk::new(mission, target, false, &|_| profile).closes()
+fn is_met_by_equals(mission: &Mission, target: f32, profile: Profile) -> bool {
+    closes(&Walk::new(mission, target, false, &|_| profile))
 }
 
 /// Returns the minimum number of relays for `target` in an interference field; `None` if there is none. All relays
@@ -231,9 +255,9 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
     let met_by = |mission: &Mission, relays: u16| {
         mission
             .with_relays(relays)
-            .is_ok_and(|mission| is_met(&mission, target, profile))
+            .is_ok_and(|mission| is_met_by_equals(&mission, target, profile))
     };
-    let freely = mission.unseparated();
+    let freely = unseparated(mission)?;
     let (mut too_few, mut enough) = (0, 1);
     while !met_by(&freely, enough) {
         if enough >= MAX_RELAYS {
@@ -264,11 +288,9 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
 /// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven
 /// field. Work: 48 chains, each three square roots for every point of the field and relay.
-#[cfg(feature = "internals")]
-#[doc(hidden)]
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
-    let met = |target: f32| is_met(mission, target, profile);
+    let met = |target: f32| is_met_by_equals(mission, target, profile);
     // SIR of the last hop from right above Rx.
     let mut high = mission.receiver_gain(profile.power_w) / square(profile.altitude_m);
     if met(high) {

@@ -10,7 +10,7 @@
 //! | altitude, noise only | [`without_interferer`] | the paper's special case without interference |
 //!
 //! They use the locus of equal SIRs ([`theorems::equal_altitudes`], Lemma 1) and the extrema of the first hop's SIR
-//! ([`crate::sir::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
+//! ([`uav_relay::sir::first_hop_turn`], Lemma 2). [`theorems::power_ratios`] has C_1, C_2 and C_3, the power ratios at which the cases
 //! change. SIR_2 always rises with x and falls with the altitude. With receiver noise SIR_1 may have one more extremum, and the
 //! optimum of Theorem 3 may be inside the box (`edge`). All functions use the mission's noise but
 //! [`without_interferer::best_in_noise`], which has its own.
@@ -20,26 +20,24 @@ mod edge;
 pub mod theorems;
 pub mod without_interferer;
 
-use crate::mission::{Mission, Profile};
-use crate::place::Placement;
-use crate::sir::{self, Sender};
+use uav_relay::sir::{self, Sender};
+use uav_relay::{Mission, Placement, Profile};
 
-/// Number of bisection steps for the x at which both hops have the same SIR; exact to a step of an f32.
+/// Number of bisection steps for the x at which both hops have the same SIR; the result is exact to a step of an f32.
 const HALVINGS: u8 = 40;
 
-/// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field it is the
-/// mean SIR.
+/// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field the SIR is
+/// a mean.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Found {
     /// Position of the single relay.
     pub place: Placement,
-    /// SIR of the worse hop, linear: the smaller one of SIR_1 (from Tx) and SIR_2 (to Rx).
+    /// SIR of the worse hop, linear: the smaller of SIR_1 (hop from Tx) and SIR_2 (hop to Rx).
     pub sir: f32,
 }
 
 impl Found {
-    /// Returns the better one of `self` and `other`, by its SIR; `self` if both are equal.
+    /// Returns `self` or `other`, whichever has the higher SIR; `self` if both are equal.
     fn or(self, other: Self) -> Self {
         if other.sir > self.sir { other } else { self }
     }
@@ -67,10 +65,10 @@ impl TwoHops<'_> {
     }
 
     /// Returns the position on a line where both hops have the same SIR. Of the two adjacent f32 values of the
-    /// varying coordinate it is the better one.
+    /// varying coordinate, the value with the better SIR is returned.
     ///
-    /// `is_low` returns true for a value of that coordinate, from `low` to `high`, m, before the position; `place`
-    /// returns the position for it.
+    /// `is_low` returns true for a value of this coordinate that is below the searched value. The search is from
+    /// `low` to `high`, m. `place` returns the position for a value.
     fn crossing(
         &self,
         low: f32,
@@ -127,12 +125,13 @@ impl<'a> Two<'a> {
         self.hops.found(self.at(x_m))
     }
 
-    /// Returns true if the first hop's SIR is at most the second's at `x_m`.
+    /// Returns true if the first hop's SIR is at most the second hop's SIR at `x_m`.
     fn is_first_worse(&self, x_m: f32) -> bool {
         self.first(x_m) <= self.second(x_m)
     }
 
-    /// Returns the position, x from `low` to `high`, m, where the first hop's SIR falls below the second's.
+    /// Returns the position at which the first hop's SIR falls below the second hop's SIR. Its x is from `low` to
+    /// `high`, m.
     fn crossing(&self, low: f32, high: f32) -> Found {
         let is_low = |x_m| self.first(x_m) > self.second(x_m);
         self.hops.crossing(low, high, is_low, |x_m| self.at(x_m))

@@ -70,11 +70,12 @@
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use super::edge::{Edge, best_in_corridor, narrow, squared, touching_inside};
+use uav_relay::root::bisected;
+use uav_relay::{Band, Interferer, Mission, Placement, Profile};
+use uav_relay_scenario::number::narrow;
+
+use super::edge::{Edge, best_in_corridor, squared, touching_inside};
 use super::{Found, TwoHops};
-use crate::mission::{Band, Interferer, Mission, Profile};
-use crate::place::Placement;
-use crate::root::bisected;
 
 pub use super::edge::EdgeCoordinate;
 
@@ -83,33 +84,32 @@ const HALVINGS: u8 = 48;
 
 /// Geometric case of the optimal position of a single relay that may move sideways.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AsideCase {
     /// Optimum at the lowest altitude, where the circles of constant SIR of both hops touch.
     Touching,
     /// Optimum at the lowest altitude, where the first hop's SIR is at its maximum. The second hop's SIR is higher
     /// there.
     Hilltop,
-    /// Optimum above Rx, at the lowest altitude: the first hop's SIR is the higher one there.
+    /// Optimum above Rx, at the lowest altitude: the first hop's SIR is higher than the second hop's SIR there.
     AboveRx,
-    /// Optimum on an edge of the box of allowed positions, along this coordinate. Without the box it would be
-    /// elsewhere.
+    /// Optimum on an edge of the box of allowed positions, along this coordinate. Without the limits of the box the
+    /// optimum would be elsewhere.
     Edge(EdgeCoordinate),
     /// Optimum above Rx: the interferer is at Tx (X = Y = 0), so the SIR of the first hop is constant.
     Level,
     /// Optimum on a vertical face of the box of allowed positions, with noise. The curves of constant SIR of the two
     /// hops touch there.
     Wall,
-    /// Optimum at the lowest or highest altitude, inside the allowed lateral range; only with noise. Found by a
-    /// search, without a proof.
+    /// Optimum at the lowest or highest altitude, inside the allowed lateral range; only with noise. A search has
+    /// found this optimum; it is not proven.
     Inside,
     /// Optimum above Rx: the interferer is at Rx (X = D, Y = 0), so the second hop's SIR is always 0.
     Drowned,
 }
 
 impl AsideCase {
-    /// Number of the case, 1 to 10. Cases 1 to 3 are optima without limits, 4 to 6 those on edges along x, y and h, 7
-    /// and 8 those with the interferer at Tx or Rx, 9 and 10 those with noise.
+    /// Number of the case, 1 to 10. Cases 1 to 3 are optima without limits; 4 to 6 are optima on edges along x, y and
+    /// h. In cases 7 and 8 the interferer is at Tx or Rx. Cases 9 and 10 occur only with noise.
     pub const fn number(self) -> u8 {
         match self {
             Self::Touching => 1,
@@ -212,7 +212,7 @@ fn best_within(mission: &Mission, band: Band, power_w: f32) -> Option<(Found, As
 
 fn both_ends(band: Band) -> impl Iterator<Item = f32> {
     let other = (!band.is_single()).then_some(band.most_m);
-    core::iter::once(band.least_m).chain(other)
+    std::iter::once(band.least_m).chain(other)
 }
 
 fn holds(band: Band, value: f32) -> bool {
@@ -243,8 +243,9 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs in it. They are D (distance
-/// Tx-Rx), interferer (X, Y), h^2, ratio G = K / A of the hops' gains, and noise nu, in m and m^2.
+/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs at a point of the plane. The
+/// numbers are D (distance Tx-Rx), the interferer's position (X, Y), h^2, the ratio G = K / A of the hops' gains, and
+/// the noise nu, in m and m^2.
 struct Plane {
     d: f64,
     x: f64,
@@ -278,14 +279,14 @@ impl Plane {
         (self.loudest(s), AsideCase::Touching)
     }
 
-    /// Returns the first hop's SIR over its gain A, with the relay at (x, y) in this plane.
+    /// Returns the first hop's SIR divided by the hop's gain A, with the relay at (x, y) in this plane.
     fn first(&self, (x, y): (f64, f64)) -> f64 {
         let heard = squared(self.x - x) + squared(self.y - y) + self.h2;
         heard / (squared(x) + squared(y) + self.h2) / (1.0 + self.noise * heard)
     }
 
-    /// Returns t of the position -t (X, Y) at which the first hop has its largest SIR. The interferer is at (X, Y),
-    /// and Tx at (0, 0), so the position is opposite the interferer as seen from Tx. `q` is X^2 + Y^2.
+    /// Returns the factor t for the position -t (X, Y) at which the first hop has its largest SIR. The interferer is
+    /// at (X, Y), and Tx at (0, 0), so the position is opposite the interferer as seen from Tx. `q` is X^2 + Y^2.
     fn hill(&self, q: f64) -> f64 {
         let away = libm::sqrt(q);
         if !(away > 0.0) {
@@ -323,7 +324,7 @@ impl Plane {
         at(bisected(0.0, 1.0, HALVINGS, rises).0 * far)
     }
 
-    /// Returns the second hop's SIR over the first hop's gain A. `s` is the relay's distance from Rx along the
+    /// Returns the second hop's SIR divided by the first hop's gain A. `s` is the relay's distance from Rx along the
     /// ground, m.
     fn second(&self, s: f64) -> f64 {
         self.g / (squared(s) + self.h2)

@@ -73,38 +73,40 @@
 //! Computed in f64, and so exact to the last place of the f32 result. Accuracy: `the_locus_is_where_the_hops_are_equal` in
 //! `host-tests/tests/theorems/`.
 
-use super::edge::{narrow, squared, touching_inside};
-use super::{Found, Two, TwoHops};
-use crate::mission::{Band, Interferer, Mission, Profile};
-use crate::root::sqrt;
-use crate::sir::{Extremum, first_hop_turn, square};
+use uav_relay::root::sqrt;
+use uav_relay::sir::{Extremum, first_hop_turn, square};
+use uav_relay::{Band, Interferer, Mission, Profile};
+use uav_relay_scenario::number::narrow;
 
-/// Case of the optimal x at a given altitude. The first five cases are those of the paper's Corollary 1, for an
+use super::edge::{squared, touching_inside};
+use super::{Found, Two, TwoHops};
+
+/// Case of the optimal x at a given altitude. The first five cases are the cases of the paper's Corollary 1, for an
 /// interferer at X >= 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum PlaceCase {
     /// Optimum at x = 0: even right above Tx the first hop's SIR is lower than the second hop's. The ratio of the
     /// powers of Tx and relay is below C_1 ([`Guide::c1`]).
     AboveTx = 1,
     /// Optimum at the only x where both hops have the same SIR. The first hop's SIR falls all the way to Rx, and
-    /// crosses the second's once.
+    /// equals the second hop's SIR once.
     Crossing = 2,
     /// Optimum above Rx: the first hop's SIR falls all the way to Rx. Above Rx it is still higher than the second
     /// hop's.
     AboveRx = 3,
-    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. It is above Rx
-    /// instead if the worse hop's SIR is higher there, because the first hop's SIR has risen again beyond its
+    /// Optimum where both hops have the same SIR, at an x before the minimum of the first hop's SIR. If the worse
+    /// hop's SIR is higher above Rx, the optimum is above Rx instead: the first hop's SIR rises again beyond its
     /// minimum.
     BeforeValley = 4,
     /// Optimum above Rx: the first hop's SIR has a minimum before Rx. At that minimum it is still higher than the
     /// second hop's.
     OverValley = 5,
-    /// Optimum at the maximum of the first hop's SIR, where it is still the lower of the two hops' SIRs. The
-    /// interferer is behind Tx.
+    /// Optimum at the maximum of the first hop's SIR, where the first hop's SIR is still lower than the second hop's
+    /// SIR. The interferer is behind Tx.
     Hilltop = 6,
-    /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's. The interferer is behind Tx.
+    /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's SIR. The interferer is behind
+    /// Tx.
     BeyondHill = 7,
     /// Optimum above Rx, with the interferer behind Tx. The first hop's SIR rises all the way to Rx, or above Rx it
     /// is still higher than the second hop's.
@@ -113,8 +115,8 @@ pub enum PlaceCase {
     Level = 9,
     /// Optimum above Rx: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 10,
-    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. If it is beyond, both hops
-    /// have the same SIR there. Only with noise.
+    /// Optimum at or beyond the maximum that the first hop's SIR has after its minimum. If the optimum is beyond this
+    /// maximum, both hops have the same SIR there. This case occurs only with noise.
     SecondHill = 11,
 }
 
@@ -196,18 +198,17 @@ fn second_hill(two: Two<'_>, turn: Extremum, end_m: f32) -> Option<Found> {
     })
 }
 
-/// Case of the optimal altitude at a given x. The first three cases are those of Theorem 2.
+/// Case of the optimal altitude at a given x. The first three cases are the cases of the paper's Theorem 2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum AltitudeCase {
     /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
     /// (X^2 + Y^2) / 2X (the paper's Psi^h), with the interferer at (X, Y).
     BothFall = 1,
-    /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second's.
+    /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second hop's SIR.
     Crossing = 2,
-    /// Optimum at the lowest altitude, or at the highest one up to which the first hop's SIR rises. The two hops'
-    /// SIRs are equal at no altitude in between.
+    /// Optimum at the lowest altitude, or at the highest altitude up to which the first hop's SIR rises. The two
+    /// hops' SIRs are equal at no altitude in between.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
@@ -265,8 +266,8 @@ pub fn best_at_x(mission: &Mission, x_m: f32, power_w: f32) -> Option<(Found, Al
     Some((at(altitude_m).found(x_m), AltitudeCase::Crossing))
 }
 
-/// Returns true if the first hop's SIR rises with the altitude at `x_m`, and the end of the rise. The end is an
-/// altitude, m, limited to the allowed range `band`.
+/// Returns true if the first hop's SIR rises with the altitude at `x_m`. The second result is the altitude at which
+/// the rise ends, m, limited to the permitted range `band`.
 fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (bool, f32) {
     let ahead = 2.0 * interferer.x_m * x_m - square(interferer.x_m) - square(interferer.y_m);
     let noise = mission.noise_at_a_metre();
@@ -279,10 +280,9 @@ fn rising(mission: &Mission, interferer: &Interferer, x_m: f32, band: Band) -> (
     (top_m > band.least_m, top_m.max(band.least_m))
 }
 
-/// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or its inside. An optimum on a
-/// corner is on the first of its edges.
+/// Location of the optimum in the rectangle of allowed x and altitudes: an edge, or its inside. An optimum at a
+/// corner counts for the edge that is first in this list.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FreeCase {
     /// Optimum at the lowest altitude, with this case of the optimal x (Theorem 1).
     Lowest(PlaceCase),
@@ -329,17 +329,17 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
 /// Limits of the power ratio p_t / p_u, linear, at which the case of the optimal x changes. p_t and p_u are the
 /// powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Guide {
-    /// Ratio C_1: if p_t / p_u is below it, the first hop is the worse one even right above Tx. 0 with the interferer
-    /// at Rx.
+    /// Ratio C_1: if p_t / p_u is below C_1, the first hop is worse than the second hop even right above Tx. C_1 is 0
+    /// if the interferer is at Rx.
     pub c1: f32,
-    /// Ratio C_2: if p_t / p_u is above it, the first hop is the better one even right above Rx.
+    /// Ratio C_2: if p_t / p_u is above C_2, the first hop is better than the second hop even right above Rx.
     pub c2: f32,
-    /// Ratio C_3: if p_t / p_u is above it, the first hop is the better one even at the minimum of its SIR.
+    /// Ratio C_3: if p_t / p_u is above C_3, the first hop is better than the second hop even at the minimum of its
+    /// SIR.
     ///
-    /// The minimum is between Tx and Rx or beyond. `None` without a minimum, as for an interferer at X <= 0. With
-    /// noise it is the minimum before the maximum.
+    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, as for an interferer at X <= 0.
+    /// With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
     pub c3: Option<f32>,
 }
 
