@@ -122,6 +122,13 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap: the
     /// drone of this relay may fly away.
     MayLeave,
+    /// The drone's endurance is unknown; raised only with a reserve (`Relay::set_reserve`).
+    ///
+    /// A value was invalid, none came for 10 s, or there was none while the relay controls the drone. The last valid value counts
+    /// down. Without any the relay does not leave by itself. Raised at most once a minute, and again while that lasts.
+    EnduranceUnknown,
+    /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
+    AtReserve,
     /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
@@ -165,6 +172,8 @@ const POLLED_LAST: &[Event] = &[
     Event::InterfererUnclear,
     #[cfg(feature = "departures")]
     Event::MayLeave,
+    Event::EnduranceUnknown,
+    Event::AtReserve,
 ];
 
 /// Kind of event that concerns one node on one side of this relay.

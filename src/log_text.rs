@@ -115,6 +115,8 @@ fn text(event: Event) -> defmt::Str {
         Event::MayLeave => {
             defmt::intern!("the chain works without this relay now: this drone may fly away")
         }
+        Event::EnduranceUnknown => defmt::intern!("unknown endurance: watch the battery"),
+        Event::AtReserve => defmt::intern!("battery at the reserve: fly this drone home"),
         Event::UploadRefused { .. } => defmt::intern!("a newer mission was rejected"),
     }
 }

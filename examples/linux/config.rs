@@ -213,10 +213,13 @@ fn is_same(one: &str, other: &str) -> bool {
 }
 
 /// Command-line options that have an effect only with an autopilot, and their keys in the file.
-const NEEDS_AUTOPILOT: [(&str, &str); 3] = [
+const NEEDS_AUTOPILOT: [(&str, &str); 6] = [
     ("--autopilot-baud", "autopilot_baud"),
     ("--autopilot-key-file", "autopilot_key_file"),
     ("--speed", "speed_m_s"),
+    ("--flight-time", "flight_time_s"),
+    ("--return-speed", "return_speed_m_s"),
+    ("--descent", "descent_m_s"),
 ];
 
 /// Command-line options, each with the options of the file that it makes void.
@@ -233,6 +236,9 @@ const EXCLUDES: [(&str, &[&str]); 6] = [
             "--autopilot-baud",
             "--autopilot-key-file",
             "--speed",
+            "--flight-time",
+            "--return-speed",
+            "--descent",
         ],
     ),
 ];

@@ -66,6 +66,10 @@ pub(crate) struct AutopilotPlan {
     /// Side of the neighbour that the drone's directional antenna points to; `None` without one.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
+    /// Time of flight with a full battery, s, NaN if unknown; speeds of the return and of the descent, m/s.
+    ///
+    /// `None` if the autopilot's battery does not matter.
+    pub(crate) endurance: Option<[f32; 3]>,
 }
 
 /// Open port of an autopilot.
@@ -116,6 +120,9 @@ impl Companion {
         let mut link = Autopilot::new(axis, plan.pace, now);
         link.set_seed(seed());
         link.point_antenna(plan.antenna);
+        if let Some([full_s, return_m_s, descent_m_s]) = plan.endurance {
+            link.set_endurance(full_s, return_m_s, descent_m_s);
+        }
         if let Some(SigningKey(key)) = plan.key {
             link.sign(Signing::new(key, LINK, stamp(), now));
         }
@@ -299,6 +306,21 @@ impl Companion {
         }
     }
 
+    /// Sends a text to the operator's ground station.
+    pub(crate) fn send_text(&mut self, text: &str) {
+        self.link.send_text(text);
+    }
+
+    /// Returns the control state of the drone.
+    pub(crate) const fn control(&self) -> State {
+        self.link.state()
+    }
+
+    /// Returns true while the autopilot reports that the drone is on the ground.
+    pub(crate) fn is_landed(&self, now: Instant) -> bool {
+        self.link.is_landed(now)
+    }
+
     /// Shows an event of the relay on the operator's ground station.
     pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);
@@ -409,6 +431,7 @@ fn log_command(
     let command = format!("MAV_CMD_USER_1 {}", named.join(" "));
     let Address { system, component } = from;
     let by = format!("MAVLink system {system}, component {component}");
+    let done = done.map(|text| ("cleared", text));
     lost::log_command(now, log, done, command.trim(), &by);
 }
 

@@ -57,6 +57,7 @@ impl Lost {
         user: &str,
     ) -> Value {
         let done = self.clear(now, relay, command);
+        let done = done.map(|text| ("cleared", text));
         log_command(now, log, done, command, user)
     }
 
@@ -64,7 +65,7 @@ impl Lost {
         let mut words = command.split_whitespace();
         if words.next() != Some(CLEAR) {
             return Err(format!(
-                "unknown command `{command}`: the only command is `{CLEAR} N ..`; N .. are the numbers of all lost relays on one side of this relay, and all of them must have landed"
+                "unknown command `{command}`: allowed are `leave`, `stay` and `{CLEAR} N ..`, with the numbers of every lost relay on one side of this relay, once all of them have landed"
             ));
         }
         let named: BTreeSet<u16> = words
@@ -130,18 +131,17 @@ impl Lost {
 }
 
 /// Logs an operator's command and its result; returns the answer for the status socket.
+///
+/// `done` has the event's name and a text.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,
-    done: Result<String, String>,
+    done: Result<(&str, String), String>,
     command: &str,
     by: &str,
 ) -> Value {
-    let (event, is_done) = match done {
-        Ok(_) => ("cleared", true),
-        Err(_) => ("command refused", false),
-    };
-    let (Ok(text) | Err(text)) = done;
+    let is_done = done.is_ok();
+    let (event, text) = done.unwrap_or_else(|text| ("command refused", text));
     let fields = json!({ "command": command, "by": by });
     let line = format_args!("{text} (command `{command}` from {by})");
     log.event(now, event, fields, line);

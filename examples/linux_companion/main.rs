@@ -29,6 +29,7 @@
 //! | `check/` | check before flight, `--check` |
 //! | `ports.rs` | ttys of either wiring |
 //! | `autopilot.rs` | link to the autopilot |
+//! | `battery.rs` | departure of a drone whose battery is low |
 //! | `datagrams.rs` | UDP port of the autopilot |
 //! | `unanswered.rs` | report of an autopilot that does not answer |
 //! | `off_line.rs` | report of a drone far from its line |
@@ -47,6 +48,8 @@
 
 #[cfg(unix)]
 mod autopilot;
+#[cfg(unix)]
+mod battery;
 #[cfg(unix)]
 mod check;
 #[cfg(unix)]

@@ -88,7 +88,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     dead_after_ms: u64,
     /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep drones apart.
-    /// With --listen a line may end with the interference measured there, in W, or in dBm with that unit
+    /// A line `endurance SECONDS HOME` gives the remaining time of flight, and that of the way home. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
     pub(crate) positions: Option<PathBuf>,
     /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
@@ -132,8 +132,11 @@ pub(crate) struct Options {
     field: Option<Field>,
     #[command(flatten)]
     listen: ListenOptions,
-    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The command `clear-lost N`
-    /// reports that the lost relay N has landed, so that this relay need not keep clear of it
+    #[command(flatten)]
+    pub(crate) battery: BatteryOptions,
+    /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The commands
+    /// `leave` and `stay` order the relay to leave the chain, or to stay. `clear-lost N` reports that the lost relay N has landed, so
+    /// that this relay need not keep clear of it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     pub(crate) status_socket: Option<PathBuf>,
     /// Write every frame of the neighbour ports to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2,
@@ -175,17 +178,63 @@ impl ListenOptions {
         } else {
             Listen::default()
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "1e4 to 1e18"
-        )]
-        let micros = |seconds: f32| Duration::from_micros((f64::from(seconds) * 1e6) as u64);
         self.listen.then(|| Listen {
             every: self.listen_every.map_or(default.every, micros),
             half_life: self.listen_half_life.map_or(default.half_life, micros),
             relative_error: self.listen_error.unwrap_or(default.relative_error),
         })
+    }
+}
+
+/// Options of the battery: when the relay leaves the chain by itself.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Battery")]
+pub(crate) struct BatteryOptions {
+    /// Reserve of the remaining time of flight, s, 0 to 3600. With it the relay asks to leave the chain by itself when the time left
+    /// is the way home, this reserve, and twelve times --dead-after-ms, at most 240 s, for the replacement. Without it the time left
+    /// is only shown
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
+    reserve: Option<f32>,
+    /// Shortest time of flight with a full battery, s, 1 to 21600. It is for an autopilot that reports a percentage but no time left,
+    /// as ArduCopter does. Without it such an endurance is unknown
+    #[arg(long, value_name = "S", requires = "autopilot", allow_negative_numbers = true, value_parser = number([1.0, 21_600.0]))]
+    flight_time: Option<f32>,
+    /// Speed at which the autopilot returns home, m/s, 0.1 to 20
+    #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
+    return_speed: f32,
+    /// Mean speed at which the autopilot descends to land, m/s, 0.1 to 20
+    #[arg(long, value_name = "M/S", default_value_t = 1.5, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
+    descent: f32,
+    /// Wait outside of the chain as a spare until the leader calls this relay. Not for relay 1, and only with --shared
+    #[arg(long, requires = "shared")]
+    pub(crate) spare: bool,
+}
+
+impl BatteryOptions {
+    /// Returns the arguments of `Autopilot::set_endurance`; `None` if no battery message is needed.
+    fn endurance(&self) -> Option<[f32; 3]> {
+        let full_s = self.flight_time.unwrap_or(f32::NAN);
+        let is_needed = self.reserve.is_some() || self.flight_time.is_some();
+        is_needed.then_some([full_s, self.return_speed, self.descent])
+    }
+
+    pub(crate) fn reserve(&self) -> Option<Duration> {
+        self.reserve.map(micros)
+    }
+
+    /// Checks that a full battery lasts until the relay asks to leave.
+    fn check(&self, dead_after_ms: u64) -> Result<(), String> {
+        let (Some(reserve), Some(full)) = (self.reserve, self.flight_time) else {
+            return Ok(());
+        };
+        let replacement = u32::try_from(dead_after_ms * 12 / 1_000).map_or(240, |s| s.min(240));
+        let least = f64::from(reserve) + f64::from(replacement);
+        if f64::from(full) > least {
+            return Ok(());
+        }
+        Err(format!(
+            "--flight-time {full}: must be above {least}, which is --reserve {reserve} and {replacement} s of a replacement"
+        ))
     }
 }
 
@@ -217,6 +266,15 @@ pub(crate) fn read() -> Result<Plan, ExitCode> {
     plan(options, beyond).map_err(|line| command::refuse(&line))
 }
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 1e18"
+)]
+fn micros(seconds: f32) -> Duration {
+    Duration::from_micros((f64::from(seconds) * 1e6) as u64)
+}
+
 /// Adds the options that the file's sections `[network]` and `[companion]` give.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
@@ -232,6 +290,11 @@ fn section(deployment: &Deployment, given: &mut FileOptions) {
     given.value("--autopilot-baud", own.autopilot_baud);
     given.path("--autopilot-key-file", own.autopilot_key_file.as_ref());
     given.value("--speed", own.speed_m_s);
+    given.value("--reserve", own.reserve_s);
+    given.value("--flight-time", own.flight_time_s);
+    given.value("--return-speed", own.return_speed_m_s);
+    given.value("--descent", own.descent_m_s);
+    given.flag("--spare", own.spare);
     given.path("--positions", own.positions.as_ref());
     given.value("--position-error", own.position_error_m);
     given.flag("--json", own.json);
@@ -254,6 +317,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
             options.probe_after_ms + 1
         ));
     }
+    options.battery.check(options.dead_after_ms)?;
     let wiring = wiring(&options)?;
     let load = match wiring {
         Wiring::Pair => ChannelLoad::of_radios(1),
@@ -284,6 +348,11 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         dead_after: Duration::from_millis(options.dead_after_ms),
         ..Settings::default()
     };
+    if options.battery.spare && index == mission.leader() {
+        return Err(format!(
+            "--spare: relay {index} is the first leader, which cannot wait as a spare"
+        ));
+    }
     let key = options.key_file.as_deref();
     let key = key.map(|file| key::load("--key-file", file));
     Ok(Plan {
@@ -322,6 +391,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
             Antenna::Downstream => Side::Downstream,
         }),
         key: key.transpose()?.map(SigningKey),
+        endurance: options.battery.endurance(),
     }))
 }
 

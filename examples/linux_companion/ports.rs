@@ -76,6 +76,15 @@ impl Ports {
             .min()
     }
 
+    /// Discards received bytes, up to 16 KiB of each tty.
+    pub(crate) fn discard(&mut self) {
+        let mut bytes = [0; 1_024];
+        for tty in self.ttys() {
+            let reads = (0..16).take_while(|_| matches!(tty.read(&mut bytes), Ok(1..)));
+            reads.for_each(drop);
+        }
+    }
+
     pub(crate) fn names(&mut self) -> Vec<String> {
         self.ttys().map(|tty| tty.to_string()).collect()
     }

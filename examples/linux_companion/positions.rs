@@ -1,5 +1,6 @@
 //! Positions of the drone, read from a FIFO. Each line is `x_m y_m altitude_m`, optionally followed by the interference measured
-//! there, `1.2e-12` in W or `-95 dBm`; or `receiver POWER`, measured at the ground receiver.
+//! there, `1.2e-12` in W or `-95 dBm`; or `receiver POWER`, measured at the ground receiver; or `endurance SECONDS HOME`, the remaining time of flight and the time of the
+//! way home.
 
 use std::os::fd::BorrowedFd;
 use std::path::Path;
@@ -33,28 +34,30 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the drone's newest position received since the last call. Passes measurements to `on_sample` and logs the
-    /// first invalid line. Work: that of [`Fifo::read`].
+    /// Returns the newest position and times received since the last call.
+    ///
+    /// The times are the remaining one of flight and that of the way home, s. Invalid times are NaN. Passes measurements to `on_sample` and logs the first invalid line. Work: that of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
         log: &Log,
         on_sample: &mut impl FnMut(Sample),
-    ) -> Option<Placement> {
-        let mut newest = None;
+    ) -> (Option<Placement>, Option<[f32; 2]>) {
+        let (mut newest, mut endurance_s) = (None, None);
         let Self {
             fifo, listens, bad, ..
         } = self;
         fifo.read(|line| match parse_line(line, *listens) {
-            Ok((place, sample)) => {
+            Ok(Line::Position(place, sample)) => {
                 newest = place.or(newest);
                 sample.into_iter().for_each(&mut *on_sample);
             }
+            Ok(Line::Endurance(times)) => endurance_s = Some(times),
             Err(why) => {
                 let expected = if *listens {
-                    "x_m y_m altitude_m [POWER] or receiver POWER"
+                    "x_m y_m altitude_m [POWER], receiver POWER or endurance SECONDS HOME"
                 } else {
-                    "x_m y_m altitude_m"
+                    "x_m y_m altitude_m or endurance SECONDS HOME"
                 };
                 bad.refuse(
                     now,
@@ -66,7 +69,7 @@ impl Positions {
             }
         });
         self.newest = newest.map(|place| (now, place)).or(self.newest);
-        newest
+        (newest, endurance_s)
     }
 
     /// Returns the drone's newest position, unless it is older than 3 s.
@@ -105,10 +108,18 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parses a line: a position with or without a measured power, or the word `receiver` and a power. Returns the
-/// position and the measurement, if any. Returns the reason as an error if the line is invalid, or if it has a power
-/// without `listens`.
-fn parse_line(text: &[u8], listens: bool) -> Result<(Option<Placement>, Option<Sample>), String> {
+/// Parsed line: position and measurement, or remaining time of flight and way home, s.
+///
+/// A time that is no number is NaN.
+enum Line {
+    Position(Option<Placement>, Option<Sample>),
+    Endurance([f32; 2]),
+}
+
+/// Parses a line: position with or without power, `receiver` and a power, or `endurance` and two times.
+///
+/// Returns the reason as an error if the line is invalid, or if it has a power without `listens`.
+fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
     let words = lines::words(text)?;
     let number = |word: &str| {
         let number = word.parse::<f32>().ok().filter(|it| it.is_finite());
@@ -124,7 +135,15 @@ fn parse_line(text: &[u8], listens: bool) -> Result<(Option<Placement>, Option<S
     };
     if let ["receiver", power @ ..] = words.as_slice() {
         let power_w = measured_w(power)?;
-        return Ok((None, Some(Sample::Receiver { power_w })));
+        return Ok(Line::Position(None, Some(Sample::Receiver { power_w })));
+    }
+    // An invalid time counts as unknown, which is an event of the relay.
+    if let ["endurance", times @ ..] = words.as_slice() {
+        let time = |word: &str| word.parse().unwrap_or(f32::NAN);
+        return Ok(Line::Endurance(match times {
+            [left, home] => [time(left), time(home)],
+            _ => [f32::NAN; 2],
+        }));
     }
     let [x, y, altitude, rest @ ..] = &words[..] else {
         return Err("the line must have at least three numbers".to_owned());
@@ -141,5 +160,5 @@ fn parse_line(text: &[u8], listens: bool) -> Result<(Option<Placement>, Option<S
             power_w: measured_w(power)?,
         }),
     };
-    Ok((Some(at), sample))
+    Ok(Line::Position(Some(at), sample))
 }

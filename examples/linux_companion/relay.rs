@@ -4,9 +4,10 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 
 use rustix::event::PollFlags;
 use serde_json::json;
-use uav_relay::{Auth, Event, Instant, Key, Relay, Settings, ViewRecord};
+use uav_relay::{Auth, Duration, Event, Instant, Key, Relay, Settings, ViewRecord};
 
 use crate::autopilot::{Companion, SigningKey};
+use crate::battery::Battery;
 use crate::hold_reasons::HoldReasonLog;
 use crate::lost::Lost;
 use crate::options::Plan;
@@ -19,6 +20,9 @@ use uav_relay_linux::log::Source;
 use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::{StoredFile, next_epoch};
 use uav_relay_linux::{config, tap};
+
+/// Time between two checks of a relay that waits for the endurance of its drone.
+const WAIT: Duration = Duration::from_millis(100);
 
 struct Flight {
     service: Service,
@@ -34,6 +38,7 @@ struct Flight {
     rejections: RejectionReasons,
     hold_reasons: HoldReasonLog,
     lost: Lost,
+    battery: Battery,
     signs: bool,
 }
 
@@ -93,6 +98,13 @@ impl Flight {
         let now = service.now();
         let mut relay = Relay::new(plan.mission, plan.identity, settings, seed(), now)
             .map_err(|error| error.to_string())?;
+        let reserve = options.battery.reserve();
+        relay.set_reserve(reserve);
+        let has_source = plan.autopilot.is_some() || options.positions.is_some();
+        let waits = reserve.is_some() && has_source;
+        if options.battery.spare {
+            relay.wait_as_spare(now);
+        }
         let file = options.upload_file.as_deref();
         let resumed =
             file.is_some_and(|file| records::resume_upload(file, &plan.mission, &mut relay, &log));
@@ -139,6 +151,7 @@ impl Flight {
             rejections: RejectionReasons::default(),
             hold_reasons: HoldReasonLog::default(),
             lost: Lost::new(plan.identity.index, plan.mission.relays()),
+            battery: Battery::new(waits),
             signs: auth.is_some(),
         })
     }
@@ -151,8 +164,12 @@ impl Flight {
         let mut drone = None;
         if let Some(positions) = &mut self.positions {
             let mut on_sample = |sample| relay.handle_sample(time, sample);
-            if let Some(place) = positions.newest(time, log, &mut on_sample) {
+            let (place, endurance_s) = positions.newest(time, log, &mut on_sample);
+            if let Some(place) = place {
                 relay.handle_position(time, place, time);
+            }
+            if let Some([left_s, home_s]) = endurance_s {
+                relay.handle_endurance(time, left_s, home_s);
             }
             drone = positions.place(time);
         }
@@ -168,7 +185,13 @@ impl Flight {
             let file = views.as_mut();
             file.is_none_or(|file| file.store(&record.to_bytes()))
         };
-        let wake = self.ports.poll(time, relay, &mut store);
+        let waits = self.battery.waits(time, relay, self.autopilot.as_ref());
+        let wake = if waits {
+            self.ports.discard();
+            Some(time + WAIT)
+        } else {
+            self.ports.poll(time, relay, &mut store)
+        };
         while let Some(event) = relay.poll_event() {
             if let (Event::Uploaded, Some(uploads), Some(upload)) =
                 (event, &mut self.uploads, relay.upload())
@@ -181,6 +204,8 @@ impl Flight {
             self.lost.handle_event(event);
             self.report.event(time, event, relay);
         }
+        let autopilot = self.autopilot.as_mut();
+        self.battery.tend(time, log, relay, autopilot);
         let moves = self.report.log_movement(time, relay, drone);
         let uploads = self.uploads.as_mut();
         let uploads = uploads.and_then(|file| file.tend(time, log));
@@ -203,12 +228,16 @@ impl Flight {
             report,
             ports,
             lost,
+            battery,
             ..
         } = self;
         let (uploads, views) = (self.uploads.as_ref(), self.views.as_ref());
         let index = report.index();
         service.tend(time, "relay", |log, command| {
             if let Some((command, user)) = command {
+                if let Some(done) = Battery::command(time, log, relay, command, user) {
+                    return done;
+                }
                 return lost.command(time, log, relay, command, user);
             }
             json!({
@@ -216,6 +245,7 @@ impl Flight {
                 "program_version": env!("CARGO_PKG_VERSION"),
                 "uptime_s": time.as_micros() / 1_000_000,
                 "relay": status::of_relay(relay, index, lost, |node| report.name(node)),
+                "battery": battery.status(relay, time),
                 "links": ports.status(),
                 "autopilot": self.autopilot.as_ref().map(Companion::status),
                 "positions_refused": self.positions.as_ref().map(Positions::invalid_lines),
@@ -239,7 +269,9 @@ impl Flight {
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
         let has_autopilot = autopilot.is_some();
-        let (found, is_over) = self.service.sleep(wake, self.ports.ttys(), &others);
+        let is_waiting = self.battery.is_waiting();
+        let ttys = self.ports.ttys().filter(|_| !is_waiting);
+        let (found, is_over) = self.service.sleep(wake, ttys, &others);
         if has_autopilot
             && let (Some(autopilot), Some(events)) = (&mut self.autopilot, found.last())
         {

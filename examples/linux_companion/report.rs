@@ -160,6 +160,18 @@ impl Report {
                 "may leave",
                 "the chain works without this relay now, so this drone may fly away",
             ),
+            Event::EnduranceUnknown => self.log.event(
+                now,
+                "endurance unknown",
+                json!({ "leaves_below_s": relay.endurance_limit_s() }),
+                "the drone's remaining time of flight is invalid, or has not been received for 10 s; the last one counts down; watch the battery",
+            ),
+            Event::AtReserve => self.log.event(
+                now,
+                "at the reserve",
+                json!({ "endurance_s": relay.endurance_s(now), "must_leave": relay.must_leave() }),
+                "the drone has only its way home and the reserve left: fly it home now",
+            ),
             other => self.node_event(now, other, relay),
         }
     }

@@ -2,6 +2,7 @@
 
 use super::{Port, Transmit};
 use crate::event::Event;
+use crate::features::DEPARTURES;
 use crate::field::estimate::Estimate;
 use crate::geodetic::Sites;
 use crate::guard::HoldReason;
@@ -13,6 +14,7 @@ use crate::node::view::record::{RecordError, ViewRecord};
 use crate::optimiser::joint::fitted::SlotShares;
 use crate::place::Placement;
 use crate::pointing::Bearing;
+use crate::relay::endurance::Endurance;
 use crate::relay::frames;
 use crate::sensing::estimate::NumberedEstimate;
 use crate::sensing::fit::Unfit;
@@ -85,6 +87,8 @@ pub struct Relay {
     /// downstream port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
+    /// Endurance of the drone. Empty without the feature `departures`.
+    pub(super) endurance: [Endurance; DEPARTURES as usize],
 }
 
 impl Relay {
@@ -143,6 +147,7 @@ impl Relay {
             endpoint: Endpoint::new(identity.network, identity.index),
             deframers: [Deframer::new(), Deframer::new()],
             clock: MonotonicClock::new(now),
+            endurance: [Endurance::default(); DEPARTURES as usize],
         }
     }
 
@@ -220,7 +225,9 @@ impl Relay {
     /// ```
     #[inline(never)] // as `poll_transmit`
     pub fn handle_timeout(&mut self, now: Instant) {
-        self.node.handle_timeout(self.clock.advance(now));
+        let now = self.clock.advance(now);
+        self.node.handle_timeout(now);
+        self.review_endurance(now, false);
     }
 
     /// Restarts the placement method from its beginning. Better positions can result once the relays have measured
@@ -316,7 +323,8 @@ impl Relay {
     /// assert!(relay.poll_timeout().is_some_and(|due| due >= Instant::ZERO), "sleep until then, or the next byte");
     /// ```
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let due = self.node.poll_timeout()?;
+        let due = [self.node.poll_timeout(), self.endurance_timeout()];
+        let due = due.into_iter().flatten().min()?;
         Some(self.clock.external(due))
     }
 }
@@ -705,7 +713,9 @@ impl Relay {
     ///
     /// Returns true if that is a change for the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
-        self.node.handle_control(self.clock.advance(now), flown)
+        let now = self.clock.advance(now);
+        self.review_endurance(now, flown);
+        self.node.handle_control(now, flown)
     }
 
     /// Records the control state of the drone, for the reports to a ground station that watches.
@@ -756,6 +766,7 @@ impl Relay {
     /// ```
     pub fn leave(&mut self, now: Instant, endurance_s: Option<u16>) {
         let now = self.clock.advance(now);
+        self.override_endurance(now, false);
         self.node.leave(now, endurance_s);
     }
 
@@ -770,8 +781,12 @@ impl Relay {
     }
 
     /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
+    ///
+    /// The relay then requests to leave only by [`leave`](Self::leave), or once half of the remaining time of flight beyond the way home
+    /// has passed (`handle_endurance`).
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
+        self.override_endurance(now, true);
         self.node.stay(now);
     }
 

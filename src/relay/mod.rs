@@ -2,9 +2,11 @@
 //!
 //! | file | content |
 //! | --- | --- |
+//! | `endurance` | endurance of the drone, and the departure that it causes |
 //! | `facade` | relay: bytes and time in, frames and events out; records and uploads across a reboot; getters, and inputs besides bytes |
 //! | `frames` | frames to and from the protocol |
 
+mod endurance;
 mod facade;
 mod frames;
 #[cfg(feature = "auth")]

@@ -77,6 +77,16 @@ pub struct Companion {
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
+    /// Reserve of the drone's remaining time of flight, s, 0 to 3600. Without it the relay does not leave by itself.
+    pub reserve_s: Option<f32>,
+    /// Time of flight with a full battery, s, 1 to 21600.
+    pub flight_time_s: Option<f32>,
+    /// Speed of the return home, m/s, 0.1 to 20.
+    pub return_speed_m_s: Option<f32>,
+    /// Mean speed of the descent to land, m/s, 0.1 to 20.
+    pub descent_m_s: Option<f32>,
+    /// True to wait outside of the chain as a spare.
+    pub spare: Option<bool>,
     /// FIFO from which the companion reads the drone's own position. Another program writes it.
     pub positions: Option<PathBuf>,
     /// Largest reported position error of a hovering drone, m, 0 to 1000.

@@ -23,7 +23,7 @@ fn relay(settings: Settings) -> Relay {
 
 /// Creates relay `index` of `relays` relays with a motion guard. The mission has the distance between the Tx and Rx
 /// of `vehicle::sites`.
-fn of(relays: u16, index: u16, settings: Settings) -> Relay {
+pub(crate) fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;
     let mission = Mission::try_new(config).unwrap();

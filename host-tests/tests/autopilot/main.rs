@@ -2,6 +2,7 @@
 
 mod any;
 mod arducopter;
+mod battery;
 mod clearance;
 mod exchange;
 mod flights;

@@ -14,6 +14,8 @@ JSON object a line, with the drone's own place and mode; standard input has an o
     lose, find                   its position, as without satellites
     reboot, mute, speak          begins anew on the ground; says nothing; says something
     stranger, vehicle            heartbeats of no known autopilot; of its own kind again
+    battery 40 600               40 percent and 600 s are left from now on, as BATTERY_STATUS once a second (ArduCopter: if requested)
+    drop 245 147                 it sends none of these messages from now on
     noise 150                    a SiK radio hears so much between frames
     clear 2                      a ground station clears relay 2: MAV_CMD_USER_1 to the companion, by way of this autopilot
     track                        from now on its place is an output line, too, 50 times a second, with this computer's time
@@ -140,6 +142,7 @@ class Drone:
         self.at, self.sticks, self.silent, self.refuses = list(at), (0.0, 0.0), False, False
         self.is_stranger = self.is_tracked = self.is_lost = False
         self.system, self.parameters = SYSTEM, {}
+        self.battery, self.dropped = None, set()
         self.port = port_of(link)
         self.start()
         self.plug()
@@ -194,6 +197,12 @@ class Drone:
                 self.is_stranger = word == "stranger"
             case ["track"]:
                 self.is_tracked = True
+            case ["battery", percent, left]:
+                self.battery = int(percent), int(left)
+                if self.kind == "px4":
+                    self.streams |= {147: [1.0, 0.0], 242: [2.0, 0.0]}
+            case ["drop", *numbers]:
+                self.dropped = set(map(int, numbers))
             case ["noise", noise]:
                 self.noise(int(noise))
             case ["clear", *relays]:
@@ -320,7 +329,7 @@ class Drone:
             self.goal = message.lat_int / 1e7, message.lon_int / 1e7, message.alt
 
     def has(self, number):
-        return number in (33, 245) or self.kind == "arducopter" and number in (87, 162)
+        return number in (33, 245) or self.kind == "arducopter" and number in (87, 147, 162, 242)
 
     def say(self, message):
         if not self.silent:
@@ -333,7 +342,7 @@ class Drone:
     def say_what_is_due(self):
         now = time.monotonic()
         for number, stream in self.streams.items():
-            if stream[0] > 0 and stream[1] <= now:
+            if stream[0] > 0 and stream[1] <= now and number not in self.dropped:
                 stream[1] = now + stream[0]
                 if message := self.message(number, int((now - self.began) * 1e3)):
                     self.say(message)
@@ -352,6 +361,12 @@ class Drone:
             )
         if number == 245:
             return common.MAVLink_extended_sys_state_message(0, self.landed)
+        if number == 147 and self.battery:
+            percent, left = self.battery
+            return common.MAVLink_battery_status_message(0, 0, 1, 32767, [65535] * 10, -1, -1, -1, percent, left)
+        if number == 242:
+            lat, lon = (round(degrees * 1e7) for degrees in self.home[:2])
+            return common.MAVLink_home_position_message(lat, lon, round(self.home[2] * 1e3), 0, 0, 0, [1, 0, 0, 0], 0, 0, 0)
         # A PX4 does not say it in its mode.
         if number == 162:
             return common.MAVLink_fence_status_message(0, 0, 0, 0)

@@ -12,7 +12,7 @@ use crate::peer::Peer;
 use crate::process::{LIMIT, Relay, bits};
 
 /// Sends a command to the status socket of a process. Returns true if it was executed, and the text of the answer.
-fn commanded(socket: impl AsRef<Path>, command: &str) -> (bool, String) {
+pub(crate) fn commanded(socket: impl AsRef<Path>, command: &str) -> (bool, String) {
     let said: Value = serde_json::from_str(&answer(socket, command, false)).unwrap();
     let text = said["text"].as_str().unwrap();
     (said["done"].as_bool().unwrap(), text.to_owned())
@@ -81,7 +81,7 @@ fn an_operator_clears_a_silent_relay_and_the_others_fly_on() {
     for (command, why) in [
         (
             "land",
-            "unknown command `land`: the only command is `clear-lost N",
+            "unknown command `land`: allowed are `leave`, `stay` and `clear-lost N",
         ),
         ("clear-lost", "clear-lost names no relay"),
         ("clear-lost 2", "relay 2 is this relay"),
@@ -126,7 +126,7 @@ fn an_incomplete_command_is_answered() {
     relay.line("converged: ");
     let (is_done, text) = commanded(&socket, "clear-lo");
     assert!(!is_done, "{text}");
-    relay.line("command refused: unknown command `clear-lo`: the only command is `clear-lost N");
+    relay.line("command refused: unknown command `clear-lo`: allowed are `leave`, `stay` and `clear-lost N");
     assert_eq!(status_of(&socket)["relay"]["index"], 1);
     let text = answer(&socket, "", false);
     assert!(text.contains("\"has_lease\""), "the state: {text}");

@@ -3,6 +3,7 @@
 
 mod acting;
 mod astray;
+mod battery;
 mod bench;
 mod binary;
 mod bundle;

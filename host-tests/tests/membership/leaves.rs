@@ -15,10 +15,14 @@ use uav_relay_sim::simulator::faults::OneWayFailure;
 use super::*;
 
 /// Time at which relays request to leave the chain in these tests, s.
-const AT_S: u64 = 60;
+pub(crate) const AT_S: u64 = 60;
 
 /// Returns the times, s, at which relay `relay` had an event `what`.
-fn times(outcome: &Outcome, relay: u16, what: impl Fn(TimelineEvent) -> bool) -> Vec<f64> {
+pub(crate) fn times(
+    outcome: &Outcome,
+    relay: u16,
+    what: impl Fn(TimelineEvent) -> bool,
+) -> Vec<f64> {
     let moments = outcome.moments.iter();
     let own = moments.filter(|moment| moment.relay == relay && what(moment.what));
     own.map(|moment| ms(moment.at.since(Instant::ZERO)) as f64 / 1e3)
@@ -26,14 +30,14 @@ fn times(outcome: &Outcome, relay: u16, what: impl Fn(TimelineEvent) -> bool) ->
 }
 
 /// Returns the time from the request of relay `relay` to its permission to leave, s. `None` if it got none.
-fn freed(outcome: &Outcome, relay: u16) -> Option<f64> {
+pub(crate) fn freed(outcome: &Outcome, relay: u16) -> Option<f64> {
     let times = times(outcome, relay, |what| what == TimelineEvent::MayLeave);
     times.first().map(|at| at - AT_S as f64)
 }
 
 /// Returns the setup of the paper's chain of `relays`, some of which request to leave. `leaves` has their numbers and
 /// endurances, s.
-fn departing(relays: u16, leaves: &[(u16, Option<u16>)]) -> Setup {
+pub(crate) fn departing(relays: u16, leaves: &[(u16, Option<u16>)]) -> Setup {
     let mut setup = paper(relays);
     let leaves = leaves
         .iter()
@@ -214,17 +218,19 @@ fn a_spare_by_the_joint_method_proposes_nothing() {
     }
 }
 
+/// Returns the places of the paper's chain of eight relays.
+pub(crate) fn on_line() -> Vec<Point> {
+    let (mission, _) = of_link(&Link::paper(8), 1e-4).unwrap();
+    let target = solve(&mission, &[]).unwrap().target;
+    let all = places(&mission, &[], target).into_iter();
+    all.map(point).collect()
+}
+
 /// Checks that a relay may leave although no drone stays within the tolerance of its place.
 #[test]
 fn a_relay_leaves_drones_that_never_arrive() {
     let mut setup = departing(8, &[(4, None)]);
-    let (mission, _) = of_link(&Link::paper(8), 1e-4).unwrap();
-    let target = solve(&mission, &[]).unwrap().target;
-    let start: Vec<Point> = places(&mission, &[], target)
-        .into_iter()
-        .map(point)
-        .collect();
-    setup.flight = Some(FlightSpec::multicopters(start, 0.0, 8.0));
+    setup.flight = Some(FlightSpec::multicopters(on_line(), 0.0, 8.0));
     let outcome = run(setup.clone()).unwrap();
     println!("free after {:?} s", freed(&outcome, 4));
     assert!(freed(&outcome, 4).is_some());

@@ -1,6 +1,7 @@
 //! Loss and return of relays: the rest ends in an undisturbed chain's positions (`COUNT`, `SEED`).
 
 mod duplicates;
+mod endurance;
 mod flights;
 mod leaves;
 mod losses;

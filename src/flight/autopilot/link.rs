@@ -322,6 +322,15 @@ impl Autopilot {
         self.antenna = side;
     }
 
+    /// Sets the time of flight with a full battery, s, and the speeds of return and descent, m/s.
+    ///
+    /// At first they are NaN (unknown: a percentage without a remaining time says nothing), 5 and 1.5. The speeds are clamped to 0.1 to 20.
+    /// From the first call on an ArduCopter is requested to send the messages of its battery.
+    pub const fn set_endurance(&mut self, full_s: f32, return_m_s: f32, descent_m_s: f32) {
+        let [level, down] = [return_m_s.clamp(0.1, 20.0), descent_m_s.clamp(0.1, 20.0)];
+        self.vehicle.battery.setup = Some([full_s, level, down]);
+    }
+
     /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
@@ -604,7 +613,8 @@ impl Autopilot {
         if self.state != State::Silent
             && let Some(kind) = self.vehicle.kind()
         {
-            if let Some((id, interval_us)) = self.streams.take(now, kind) {
+            let counts = self.vehicle.battery.setup.is_some();
+            if let Some((id, interval_us)) = self.streams.take(now, kind, counts) {
                 return Some(self.frame(Outgoing::SetMessageInterval { id, interval_us }));
             }
             if let Some(asked) = self.vehicle.echo.take(now) {
@@ -780,6 +790,11 @@ impl Autopilot {
         self.state.is_flown()
     }
 
+    /// Returns true while the drone is disarmed, or has reported for 2 s that it is on the ground.
+    pub fn is_landed(&self, now: Instant) -> bool {
+        self.state == State::Grounded && self.vehicle.is_landed(self.clock.internal(now))
+    }
+
     /// Returns the counts of intact and broken messages from the autopilot.
     pub const fn counters(&self) -> Counters {
         self.parser.counters()
@@ -808,8 +823,8 @@ impl Autopilot {
     /// | 1 | relay | link | line between the Tx and Rx positions of an adopted mission | the positions and the setpoint of later steps are along it |
     /// | 2 | | link | timeouts that are due by `now` | an overdue link releases the drone |
     /// | 3 | link | relay | control state | an engaged relay starts from the first position that it receives afterwards |
-    /// | 4 | link | relay | position, sample of the radio's noise, side with cleared lost relays | the relay computes its setpoint from them |
-    /// | 5 | relay | link | readiness, hold reasons, setpoint, values for the operator | the link sends the newest ones |
+    /// | 4 | link | relay | position, sample of the radio's noise, endurance, side with cleared lost relays | the relay computes its setpoint from them |
+    /// | 5 | relay | link | readiness, hold reasons, end of the endurance, setpoint, values for the operator | the link sends the newest ones |
     ///
     /// Call it in each turn of the main loop, after [`handle_bytes`](Self::handle_bytes) and before
     /// [`poll_transmit`](Self::poll_transmit). If the relay's ports are served after this call, the relay sends the new position in the
@@ -876,6 +891,14 @@ impl Autopilot {
             relay.handle_sample(now, sample);
             is_news = true;
         }
+        if self.is_landed(now) {
+            relay.reset_endurance();
+        }
+        let internal = self.clock.internal(now);
+        if let Some([remaining_s, home_s]) = self.vehicle.take_endurance(internal, &self.axis) {
+            relay.handle_endurance(now, remaining_s, home_s);
+            is_news |= relay.endurance_limit_s().is_some();
+        }
         if let Some(side) = self.poll_cleared() {
             relay.clear_lost(now, side);
             is_news = true;
@@ -884,6 +907,10 @@ impl Autopilot {
         self.handle_ready(now, relay.is_ready());
         let holds = [Side::Upstream, Side::Downstream].map(|side| relay.hold_reason(side));
         self.handle_hold(now, holds);
+        if matches!(self.state, State::Engaged | State::Blind) && relay.must_leave() {
+            let line = Line::leave(relay.leaves_by_endurance());
+            self.report.queue_line(line);
+        }
         self.handle_setpoint(now, setpoint);
         if let Some(side) = self.antenna {
             self.handle_bearing(relay.bearing(side));

@@ -1,6 +1,6 @@
 //! Texts and numbers for the operator, shown by a ground station, and events for the firmware.
 //!
-//! Equal lines are sent at most once per [`SPACING`], and within it at most [`RECENT`] different lines. A waiting line is replaced
+//! Equal lines are sent at most once per [`SPACING`], critical ones per [`URGENT`], and within it at most [`RECENT`] different lines. A waiting line is replaced
 //! by a newer line of the same [`Topic`], so the last line on a topic is always current.
 
 use heapless::{Deque, String, Vec};
@@ -8,7 +8,7 @@ use heapless::{Deque, String, Vec};
 use crate::event::Event;
 use crate::flight::autopilot::state::{Kind, Release, State, WaitReason};
 use crate::flight::autopilot::trust::Mistrust;
-use crate::flight::autopilot::vehicle::OffLine;
+use crate::flight::autopilot::vehicle::{OffLine, millis};
 use crate::flight::mavlink::frame::Address;
 use crate::flight::mavlink::outgoing::{Outgoing, severity};
 use crate::guard::HoldReason;
@@ -16,8 +16,11 @@ use crate::place::Placement;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Minimum time between two equal lines of text to the operator.
-const SPACING: Duration = Duration::from_millis(10_000);
+/// Minimum time between two equal lines of text to the operator, ms.
+const SPACING: u32 = 10_000;
+
+/// Minimum time between two equal lines that require action now, ms.
+const URGENT: u32 = 5_000;
 
 /// Maximum number of different lines of text to the operator that are sent within [`SPACING`].
 const RECENT: usize = 16;
@@ -49,10 +52,12 @@ pub(super) enum Topic {
     Fence,
     /// Command of the operator that reports lost relays as landed.
     Clearance,
+    /// Order to the pilot to fly home.
+    Leave,
 }
 
 impl Topic {
-    const COUNT: usize = 7;
+    const COUNT: usize = 8;
 }
 
 /// Line of text for the operator. The text is stored in two parts, which are joined when it is sent.
@@ -64,6 +69,16 @@ pub(super) struct Line {
 }
 
 impl Line {
+    /// Returns the order to leave. `is_battery` is false if the operator or the firmware has requested the departure.
+    pub(super) const fn leave(is_battery: bool) -> Self {
+        let why = if is_battery { "battery" } else { "relay" };
+        Self {
+            topic: Topic::Leave,
+            severity: severity::CRITICAL,
+            text: [why, ": leave now"],
+        }
+    }
+
     pub(super) const fn info(topic: Topic, text: &'static str) -> Self {
         Self {
             topic,
@@ -104,6 +119,8 @@ impl Line {
     /// Returns the text for the operator about an event of the relay; `None` for events without a text.
     pub(super) const fn of(event: Event) -> Option<Self> {
         let text = match event {
+            Event::EnduranceUnknown => "battery: endurance unknown",
+            Event::AtReserve => "battery: at the reserve",
             Event::Infeasible => "relay: no target SIR met, keeps position",
             Event::NeighbourLost { .. } => "relay: neighbour lost",
             Event::NoQuorum => "relay: no quorum, holds position",
@@ -113,6 +130,9 @@ impl Line {
             Event::DuplicateIndex { .. } => "relay: duplicate relay number, land one",
             _ => return None,
         };
+        if matches!(event, Event::EnduranceUnknown | Event::AtReserve) {
+            return Some(Self::warning(Topic::Relay, [text, ""]));
+        }
         Some(Self::info(Topic::Relay, text))
     }
 
@@ -130,16 +150,24 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
+/// Returns the time from `now` to `until`, ms; `None` if it has passed.
+fn left(now: Instant, until: u32) -> Option<Duration> {
+    let left = until.wrapping_sub(millis(now.as_micros()));
+    (1..=SPACING)
+        .contains(&left)
+        .then(|| Duration::from_millis(left.into()))
+}
+
 /// Queue of the texts and named values that the link is to send to the operator.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
     /// Hashes of the lines sent in the last 10 s. Each has the earliest time at which an equal line may be sent
-    /// again.
-    recent: Vec<(u32, Instant), RECENT>,
-    /// Last line sent on each topic. An equal line that would have to wait is dropped.
-    newest_sent: [Option<Line>; Topic::COUNT],
+    /// again, in ms that wrap.
+    recent: Vec<(u32, u32), RECENT>,
+    /// Hash of the last line sent on each topic, 0 before. An equal line that would have to wait is dropped.
+    newest_sent: [u32; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
     /// Number of values (SIR and position) sent to the operator in the present second.
     sent: usize,
@@ -171,12 +199,12 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within 10
-    /// s after an equal line.
-    fn passes(&mut self, now: Instant, hash: u32) -> bool {
-        self.recent.retain(|(_, until)| *until > now);
-        self.recent.iter().all(|(of, _)| *of != hash)
-            && self.recent.push((hash, now + SPACING)).is_ok()
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within
+    /// `spacing` after an equal line.
+    fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
+        self.recent.retain(|(_, until)| left(now, *until).is_some());
+        let until = millis(now.as_micros()).wrapping_add(spacing);
+        self.recent.iter().all(|(of, _)| *of != hash) && self.recent.push((hash, until)).is_ok()
     }
 
     /// Removes the line at index `at`; unlike `Vec::remove`, without a panic if there is none.
@@ -192,14 +220,16 @@ impl Report {
     fn next_line(&mut self, now: Instant) -> Option<(u8, String<50>)> {
         let mut at = 0;
         while let Some(line) = self.lines.get(at).copied() {
-            let newest = self.newest_sent.get_mut(line.topic as usize);
-            let is_known = newest.as_deref() == Some(&Some(line));
+            let hash = line.hash();
+            let is_known = self.newest_sent.get(line.topic as usize) == Some(&hash);
             let rest = self.lines.get(at + 1..).unwrap_or_default();
             let is_overtaken = rest.iter().any(|other| other.topic == line.topic);
-            if self.passes(now, line.hash()) {
+            let is_urgent = line.severity == severity::CRITICAL;
+            let spacing = if is_urgent { URGENT } else { SPACING };
+            if self.passes(now, hash, spacing) {
                 self.remove_line(at);
                 if let Some(newest) = self.newest_sent.get_mut(line.topic as usize) {
-                    *newest = Some(line);
+                    *newest = hash;
                 }
                 let mut text = String::new();
                 for part in line.text {
@@ -216,7 +246,7 @@ impl Report {
         }
         for _ in 0..self.texts.len() {
             let text = self.texts.pop_front()?;
-            if self.passes(now, hash([&text, ""])) {
+            if self.passes(now, hash([&text, ""]), SPACING) {
                 return Some((severity::INFO, text));
             }
             // The queue has room for it.
@@ -272,8 +302,8 @@ impl Report {
     /// Returns the time at which the next line or number is due; `None` if none waits to be sent.
     pub(super) fn next_timeout(&self, now: Instant) -> Option<Instant> {
         let waits = !(self.lines.is_empty() && self.texts.is_empty());
-        let lines = self.recent.iter().map(|(_, until)| *until);
-        let lines = lines.filter(|until| waits && *until > now);
+        let lines = self.recent.iter().filter(|_| waits);
+        let lines = lines.filter_map(|(_, until)| Some(now + left(now, *until)?));
         lines.chain(self.next_values_at).min()
     }
 }

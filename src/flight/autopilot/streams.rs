@@ -35,27 +35,27 @@ struct RequestedMessage {
     is_vital: bool,
 }
 
-const REQUESTED: [RequestedMessage; 4] = [
-    RequestedMessage {
-        id: id::GLOBAL_POSITION_INT,
-        interval: Duration::from_millis(200),
-        is_vital: true,
-    },
-    RequestedMessage {
-        id: id::EXTENDED_SYS_STATE,
-        interval: Duration::from_millis(500),
-        is_vital: true,
-    },
-    RequestedMessage {
-        id: id::POSITION_TARGET_GLOBAL_INT,
-        interval: Duration::from_millis(500),
-        is_vital: false,
-    },
-    RequestedMessage {
-        id: id::FENCE_STATUS,
-        interval: Duration::from_millis(1_000),
-        is_vital: false,
-    },
+impl RequestedMessage {
+    const fn new(id: u32, interval_ms: u64, is_vital: bool) -> Self {
+        let interval = Duration::from_millis(interval_ms);
+        Self {
+            id,
+            interval,
+            is_vital,
+        }
+    }
+}
+
+/// Index of the first message of the battery in [`REQUESTED`].
+const BATTERY: usize = 4;
+
+const REQUESTED: [RequestedMessage; 6] = [
+    RequestedMessage::new(id::GLOBAL_POSITION_INT, 200, true),
+    RequestedMessage::new(id::EXTENDED_SYS_STATE, 500, true),
+    RequestedMessage::new(id::POSITION_TARGET_GLOBAL_INT, 500, false),
+    RequestedMessage::new(id::FENCE_STATUS, 1_000, false),
+    RequestedMessage::new(id::BATTERY_STATUS, 1_000, false),
+    RequestedMessage::new(id::HOME_POSITION, 2_000, false),
 ];
 
 /// State of the periodic request for one kind of message from the autopilot.
@@ -172,7 +172,9 @@ impl Streams {
     }
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
-    pub(super) fn take(&mut self, now: Instant, kind: Kind) -> Option<(u32, u32)> {
+    ///
+    /// Messages of the battery are requested only if it `counts`.
+    pub(super) fn take(&mut self, now: Instant, kind: Kind, counts: bool) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {
                 return None;
@@ -183,7 +185,8 @@ impl Streams {
         let streams = self.all.iter_mut().zip(REQUESTED).enumerate();
         for (which, (stream, asked)) in streams {
             let asks = core::mem::take(&mut stream.is_requested);
-            if asks && (asked.is_vital || kind == Kind::ArduCopter) {
+            let is_wanted = kind == Kind::ArduCopter && (counts || which < BATTERY);
+            if asks && (asked.is_vital || is_wanted) {
                 self.outstanding = Some((which, now));
                 let interval_us = u32::try_from(asked.interval.as_micros());
                 return Some((asked.id, interval_us.unwrap_or(u32::MAX)));

@@ -33,6 +33,8 @@ const CUSTOM_MODE: u8 = 1;
 /// Flag of `MAV_MODE_FLAG`: the vehicle is armed.
 const ARMED: u8 = 128;
 
+/// Value of `MAV_LANDED_STATE` for a vehicle on the ground.
+const ON_GROUND: u8 = 1;
 /// Value of `MAV_LANDED_STATE` for a vehicle in the air.
 const IN_AIR: u8 = 2;
 /// Value of `MAV_LANDED_STATE` for a landing vehicle.
@@ -96,6 +98,8 @@ pub(super) struct Vehicle {
     chosen: bool,
     armed: bool,
     in_air: bool,
+    /// Time since which the landed state has been "on the ground"; `None` in another or unknown state.
+    grounded_at: Option<Instant>,
     /// True while the drone is outside of the autopilot's fence.
     pub(super) is_breached: bool,
     clock: RemoteClock,
@@ -103,6 +107,9 @@ pub(super) struct Vehicle {
     /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
     measured_at: Option<Instant>,
     position: Option<Position>,
+    /// Place to return to (HOME_POSITION); `None` if unknown.
+    home: Option<Geodetic>,
+    pub(super) battery: Battery,
 }
 
 impl Vehicle {
@@ -128,6 +135,10 @@ impl Vehicle {
             self.known = Some((from, kind));
         }
         if self.address() != Some(from) {
+            return VehicleUpdate::Nothing;
+        }
+        // The battery's messages come at their own rate: they do not show that the link works.
+        if self.read_battery(now, message) {
             return VehicleUpdate::Nothing;
         }
         // A gap counts even if no timeout was handled meanwhile.
@@ -166,6 +177,8 @@ impl Vehicle {
                 VehicleUpdate::StateChanged
             }
             Incoming::ExtendedSysState { landed_state } => {
+                let is_grounded = landed_state == ON_GROUND;
+                self.grounded_at = is_grounded.then_some(self.grounded_at.unwrap_or(now));
                 self.in_air = match landed_state {
                     IN_AIR => self.armed,
                     LANDING => self.in_air,
@@ -301,6 +314,7 @@ impl Vehicle {
         self.measured_at = None;
         self.armed = false;
         self.in_air = false;
+        self.grounded_at = None;
         self.position = None;
     }
 
@@ -311,6 +325,50 @@ impl Vehicle {
             let place = moved(position.place)?;
             Some(Position { place, ..position })
         });
+    }
+
+    /// Records a message of the battery, or of the place to return to. Returns false for any other.
+    fn read_battery(&mut self, now: Instant, message: Incoming) -> bool {
+        match message {
+            // On the ground a PX4 computes the time from an assumed current.
+            Incoming::Battery {
+                battery,
+                percent,
+                remaining_s,
+            } => {
+                if self.battery.is_first(now, battery) {
+                    let is_flying = self.armed && self.in_air;
+                    self.battery.newest =
+                        is_flying.then(|| self.battery.left_s(percent, remaining_s));
+                }
+            }
+            Incoming::Home(at) => self.home = Some(at).filter(|at| at.is_valid()).or(self.home),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Returns true if the drone is disarmed, or has reported for [`LANDED`] that it is on the ground.
+    pub(super) fn is_landed(&self, now: Instant) -> bool {
+        let is_grounded = self.grounded_at.is_some_and(|at| now.since(at) >= LANDED);
+        self.heard_at.is_some() && (!self.armed || is_grounded)
+    }
+
+    /// Returns the newest remaining time of flight, once, and the time of the way home, s.
+    ///
+    /// `None` before the home is known. NaN is unknown, as the way home is without a recent position, and to a home far from the line.
+    pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
+        let remaining_s = self.battery.newest.take()?;
+        let home = axis.place(self.home?);
+        let [_, return_m_s, descent_m_s] = self.battery.setup.unwrap_or(Battery::UNSET);
+        let recent = |position: &Position| now.since(position.at) < OLD;
+        let way = home.zip(self.position.filter(recent));
+        let home_s = way.map_or(f32::NAN, |(to, Position { place: from, .. })| {
+            let level_m = libm::hypotf(from.x_m - to.x_m, from.y_m - to.y_m);
+            let height_m = (from.altitude_m - to.altitude_m).abs();
+            level_m / return_m_s + height_m / descent_m_s
+        });
+        Some([remaining_s, home_s])
     }
 
     pub(super) fn address(&self) -> Option<Address> {
@@ -354,6 +412,50 @@ impl Vehicle {
         all.chain(self.echo.next_timeout(now))
             .filter(|at| *at > now)
             .min()
+    }
+}
+
+/// Time on the ground after which an armed drone counts as landed: a single report in flight does not.
+const LANDED: Duration = Duration::from_millis(2_000);
+/// Age from which on SYS_STATUS counts instead of BATTERY_STATUS, and a position gives no way home.
+const OLD: Duration = Duration::from_millis(10_000);
+/// Part of a reported remaining time that counts.
+const CERTAIN: f32 = 0.9;
+
+/// Endurance by the battery's messages.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Battery {
+    /// Arguments of `Autopilot::set_endurance`; `None` for [`UNSET`](Self::UNSET) without requests.
+    pub(super) setup: Option<[f32; 3]>,
+    detailed_at: Option<Instant>,
+    /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
+    newest: Option<f32>,
+}
+
+impl Battery {
+    const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
+
+    /// Returns true for BATTERY_STATUS of the first `battery`, and without one for SYS_STATUS (`None`).
+    fn is_first(&mut self, now: Instant, battery: Option<u8>) -> bool {
+        if battery == Some(0) {
+            self.detailed_at = Some(now);
+        }
+        let is_only = self.detailed_at.is_none_or(|at| now.since(at) >= OLD);
+        battery.map_or(is_only, |id| id == 0)
+    }
+
+    /// Returns the remaining time of flight, s, as reported, or else by the percentage.
+    ///
+    /// NaN is unknown. Without a valid percentage a PX4 has no estimate of the time either.
+    #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
+    fn left_s(&self, percent: i8, remaining_s: i32) -> f32 {
+        if !(0..=100).contains(&percent) {
+            f32::NAN
+        } else if remaining_s > 0 {
+            CERTAIN * remaining_s as f32
+        } else {
+            f32::from(percent) / 100.0 * self.setup.unwrap_or(Self::UNSET)[0]
+        }
     }
 }
 

@@ -73,6 +73,8 @@ pub struct Known {
 pub mod id {
     /// Message HEARTBEAT: type, mode and state of a system.
     pub const HEARTBEAT: u32 = 0;
+    /// Message SYS_STATUS: state of the vehicle's parts, with the battery's percentage.
+    pub const SYS_STATUS: u32 = 1;
     /// Message PARAM_REQUEST_READ: a request for the value of a parameter.
     pub const PARAM_REQUEST_READ: u32 = 20;
     /// Message PARAM_VALUE: the value of a parameter.
@@ -93,8 +95,12 @@ pub mod id {
     pub const RADIO_STATUS: u32 = 109;
     /// Message TIMESYNC: clock value, which the receiver sends back.
     pub const TIMESYNC: u32 = 111;
+    /// Message BATTERY_STATUS: state of one battery.
+    pub const BATTERY_STATUS: u32 = 147;
     /// Message FENCE_STATUS: state of the vehicle's geofence.
     pub const FENCE_STATUS: u32 = 162;
+    /// Message HOME_POSITION: place where the vehicle returns to.
+    pub const HOME_POSITION: u32 = 242;
     /// Message EXTENDED_SYS_STATE: landed state of the vehicle.
     pub const EXTENDED_SYS_STATE: u32 = 245;
     /// Message NAMED_VALUE_FLOAT: named number, for an operator to plot.
@@ -125,8 +131,9 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
 /// Messages that the parser knows: messages of this crate, and messages whose payload may contain frames.
 ///
 /// The parser skips a message with such a payload as a whole, so that it does not find a frame inside.
-const TABLE: [Known; 28] = [
+const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),
+    known(id::SYS_STATUS, 124, 31),
     known(id::PARAM_REQUEST_READ, 214, 20),
     known(id::PARAM_VALUE, 220, 25),
     known(id::GLOBAL_POSITION_INT, 104, 28),
@@ -137,7 +144,9 @@ const TABLE: [Known; 28] = [
     known(id::POSITION_TARGET_GLOBAL_INT, 150, 51),
     known(id::RADIO_STATUS, 185, 9),
     known(id::TIMESYNC, 34, 16),
+    known(id::BATTERY_STATUS, 154, 36),
     known(id::FENCE_STATUS, 189, 8),
+    known(id::HOME_POSITION, 104, 52),
     known(id::EXTENDED_SYS_STATE, 130, 2),
     known(id::NAMED_VALUE_FLOAT, 170, 18),
     known(id::STATUSTEXT, 83, 54),

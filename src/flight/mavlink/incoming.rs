@@ -7,6 +7,7 @@ use super::frame::{
     Address, CHECKSUM, HEADER, Known, MAGIC, MAX_FRAME, MAX_PAYLOAD, SIGNATURE, SIGNED, checksum,
     find_known, id,
 };
+use crate::geodetic::Geodetic;
 use heapless::Vec;
 
 /// Payload of a received message; reads beyond its end return 0.
@@ -21,6 +22,10 @@ impl Payload<'_> {
 
     fn u8(self, at: usize) -> u8 {
         self.bytes::<1>(at)[0]
+    }
+
+    fn i8(self, at: usize) -> i8 {
+        i8::from_le_bytes(self.bytes(at))
     }
 
     fn i16(self, at: usize) -> i16 {
@@ -84,6 +89,17 @@ pub enum Incoming {
         /// Velocity toward north, east and down, cm/s.
         velocity_cm_s: [i16; 3],
     },
+    /// SYS_STATUS, or BATTERY_STATUS of one battery.
+    Battery {
+        /// Number of the battery; `None` in SYS_STATUS.
+        battery: Option<u8>,
+        /// Remaining charge, percent; -1 is unknown.
+        percent: i8,
+        /// Remaining time of flight, s; 0 is unknown.
+        remaining_s: i32,
+    },
+    /// HOME_POSITION: place where the vehicle returns to.
+    Home(Geodetic),
     /// EXTENDED_SYS_STATE: landed state of the vehicle.
     ExtendedSysState {
         /// Value of `MAV_LANDED_STATE`: 1 on the ground, 2 in the air, 3 taking off, 4 landing.
@@ -164,6 +180,21 @@ impl Incoming {
                 amsl_mm: payload.i32(12),
                 velocity_cm_s: [20, 22, 24].map(|at| payload.i16(at)),
             },
+            id::SYS_STATUS => Self::Battery {
+                battery: None,
+                percent: payload.i8(30),
+                remaining_s: 0,
+            },
+            id::BATTERY_STATUS => Self::Battery {
+                battery: Some(payload.u8(32)),
+                percent: payload.i8(35),
+                remaining_s: payload.i32(36),
+            },
+            id::HOME_POSITION => Self::Home(Geodetic {
+                lat_e7: payload.i32(0),
+                lon_e7: payload.i32(4),
+                amsl_mm: payload.i32(8),
+            }),
             id::EXTENDED_SYS_STATE => Self::ExtendedSysState {
                 landed_state: payload.u8(1),
             },

@@ -20,6 +20,8 @@ pub type FrameBytes = Vec<u8, FRAME>;
 
 /// Severities of [`Outgoing::StatusText`], `MAV_SEVERITY`.
 pub mod severity {
+    /// Severity of a problem that requires action now.
+    pub const CRITICAL: u8 = 2;
     /// Severity of a problem with which the flight continues.
     pub const WARNING: u8 = 4;
     /// Severity of a piece of information for the operator.

@@ -11,7 +11,7 @@
 //! | hello of the node beyond the neighbour that is ordered to leave | select it |
 //! | hello of a node outside of the chain | do not select it; if it is the neighbour, give it up |
 //! | outside, hello of a member: it has a neighbour beyond this relay in a later view, which is complete and in place | raise `MayLeave` |
-//! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost |
+//! | outside, called or `stay`; no later view for `dead_after`; not free for 16 times `dead_after` | join as a relay that was lost; without endurance only by `stay` |
 
 use super::{Layers, Node};
 use crate::event::{Event, NodeEvent};
@@ -61,6 +61,7 @@ pub enum Departure {
 }
 
 /// Departure of this relay from the chain, and its knowledge of spares (relays that wait outside).
+#[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Leaving {
     requested: bool,
@@ -72,8 +73,11 @@ pub(crate) struct Leaving {
     ended: [bool; 2],
     /// True for each side whose neighbour has selected the relay beyond this relay.
     passed: [bool; 2],
+    /// True for a spare, also for one that has requested to leave since.
     spare: bool,
     free: bool,
+    /// True while the drone has no endurance for a return to the chain.
+    spent: bool,
     /// Time of the first order to leave since the request; `None` without an order.
     ordered_at: Option<Instant>,
     /// Last reported position of the drone; `None` until a position is reported.
@@ -106,7 +110,7 @@ impl Leaving {
 
     /// Returns true if this relay waits outside of the chain until it is called.
     pub(crate) const fn is_spare(&self) -> bool {
-        self.spare
+        self.spare && !self.requested
     }
 
     pub(crate) const fn record_place(&mut self, place: Placement) {
@@ -199,16 +203,55 @@ impl Node {
         let leaving = &mut self.layers.leaving;
         leaving.lasts_until =
             endurance_s.map(|left_s| now + Duration::from_millis(1_000).times(left_s.into()));
-        if leaving.requested && !leaving.spare {
+        if leaving.requested {
             return;
         }
         leaving.requested = true;
-        leaving.spare = false;
         leaving.end_order();
         let refused = self.layers.departure_refusal(now, &self.member).is_some();
-        if !refused && self.layers.round.is_fresh() && !self.layers.leaving.is_outside() {
+        if !refused && self.is_untouched() && !self.layers.leaving.is_outside() {
             self.go_outside(now, false);
         }
+    }
+
+    /// Returns true until this relay has taken part in anything. The first leader has once it starts a pass.
+    fn is_untouched(&self) -> bool {
+        let Layers { round, view, .. } = &self.layers;
+        let is_loaded = self.member.view == ViewId::LOADED && view.outstanding().is_none();
+        round.is_fresh() || is_loaded && round.is_untouched()
+    }
+
+    /// Cancels the request to leave if nothing of it has been granted. Returns true if it has cancelled it.
+    pub(crate) fn withdraw(&mut self, now: Instant) -> bool {
+        let is_untouched = self.is_untouched();
+        let leaving = &mut self.layers.leaving;
+        let granted = leaving.ordered_at.is_some() || leaving.is_outside() && !is_untouched;
+        if granted || leaving.free {
+            return false;
+        }
+        leaving.requested = false;
+        if !leaving.spare {
+            self.come_back(now);
+        }
+        true
+    }
+
+    /// Returns true if every departure is refused for good.
+    pub(crate) fn is_refused(&self, now: Instant) -> bool {
+        let refusal = self.layers.departure_refusal(now, &self.member);
+        let lasting = [Departure::NeedsGuard, Departure::NeedsChannel];
+        refusal.is_some_and(|why| lasting.contains(&why))
+    }
+
+    /// Records if the drone has no endurance for a return to the chain.
+    pub(crate) const fn set_spent(&mut self, spent: bool) {
+        self.layers.leaving.spent = spent;
+    }
+
+    /// Returns true if the drone may fly away; `None` unless this relay has requested to leave.
+    pub(crate) fn leaves(&self) -> Option<bool> {
+        let leaving = &self.layers.leaving;
+        leaving.requested.then_some(leaving.free)
     }
 
     /// Makes this relay a spare outside of the chain. The call has no effect if the relay has taken part in the
@@ -231,7 +274,7 @@ impl Node {
         let leaving = &self.layers.leaving;
         match self.layers.departure_refusal(now, &self.member) {
             _ if leaving.free => Departure::Free,
-            _ if leaving.spare => Departure::Spare,
+            _ if leaving.is_spare() => Departure::Spare,
             _ if leaving.is_outside() => Departure::Outside,
             _ if !leaving.requested => Departure::Member,
             Some(refused) => refused,
@@ -243,7 +286,10 @@ impl Node {
     fn go_outside(&mut self, now: Instant, spare: bool) {
         // A relay that has just started knows no neighbours: it counts as an end only if there is no number beyond.
         let ends = [self.member.node == 1, self.member.node == self.member.all];
-        let fresh = self.layers.round.is_fresh();
+        let fresh = self.is_untouched();
+        if fresh && !self.layers.round.is_fresh() {
+            self.layers.round.cancel_work();
+        }
         self.layers.leaving.ended = [0, 1].map(|at: usize| {
             let known = self.layers.neighbours.nodes().get(at).copied().flatten();
             known.is_none() && (!fresh || ends.get(at).copied().unwrap_or(false))
@@ -284,6 +330,7 @@ impl Node {
             outside_since,
             spare,
             free,
+            spent,
             ..
         } = self.layers.leaving;
         let settings = &self.member.settings;
@@ -292,7 +339,8 @@ impl Node {
         } else {
             settings.dead_after
         };
-        if !spare && !free && outside_since.is_some_and(|at| now.since(at) >= most) {
+        let may_return = !spare && !free && !spent;
+        if may_return && outside_since.is_some_and(|at| now.since(at) >= most) {
             self.come_back(now);
         }
     }
@@ -416,10 +464,10 @@ impl Node {
                 (Side::Downstream, beyond) => beyond < own,
             };
             let told = hello.outside && !hello.fresh && later && goes_on;
-            if told && !leaving.spare && !leaving.free {
+            if told && !leaving.is_spare() && !leaving.free {
                 leaving.free = true;
                 self.raise(Event::MayLeave);
-            } else if hello.ready && !hello.fresh && leaving.spare {
+            } else if hello.ready && !hello.fresh && leaving.is_spare() {
                 self.come_back(now);
             }
             return true;

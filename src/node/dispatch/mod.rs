@@ -143,7 +143,7 @@ impl Node {
         }
     }
 
-    pub(super) fn raise(&mut self, event: Event) {
+    pub(crate) fn raise(&mut self, event: Event) {
         self.telemetry.events.raise(event);
     }
 

@@ -45,6 +45,22 @@ impl Layers {
 }
 
 impl Node {
+    pub(crate) const fn leave(&self, _: Instant, _: Option<u16>) {}
+
+    pub(crate) const fn leaves(&self) -> Option<bool> {
+        None
+    }
+
+    pub(crate) const fn withdraw(&self, _: Instant) -> bool {
+        true
+    }
+
+    pub(crate) const fn is_refused(&self, _: Instant) -> bool {
+        true
+    }
+
+    pub(crate) const fn set_spent(&self, _: bool) {}
+
     pub(super) const fn return_if_expired(&self, _: Instant) {}
 
     pub(super) const fn frees(&self, _: Side, _: u16) -> bool {

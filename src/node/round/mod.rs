@@ -217,6 +217,11 @@ impl Round {
         self.work_at = Some(now + PAUSE);
     }
 
+    /// Cancels the next step of a computation: the first leader starts no pass.
+    pub(crate) const fn cancel_work(&mut self) {
+        self.work_at = None;
+    }
+
     pub(crate) fn restart(&mut self, context: &Context<'_>) -> Effects {
         self.computation.restart();
         self.proceed(context, Action::Work)

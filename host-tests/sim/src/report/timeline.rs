@@ -80,6 +80,7 @@ impl MomentReport {
             TimelineEvent::InterfererUnclear => "interferer unclear",
             TimelineEvent::SensorOff => "sensor off",
             TimelineEvent::MayLeave => "may leave",
+            TimelineEvent::MustLeave => "has to leave",
             TimelineEvent::MayLeaveTold => "told to leave",
         };
         let (view, relays) = match moment.what {

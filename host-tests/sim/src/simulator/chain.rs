@@ -176,6 +176,7 @@ impl Chain {
             QueuedEvent::Kill
                 | QueuedEvent::Boot
                 | QueuedEvent::Leave(_)
+                | QueuedEvent::Endurance(_)
                 | QueuedEvent::Stay
                 | QueuedEvent::Partition
                 | QueuedEvent::Upload
@@ -247,6 +248,12 @@ impl Chain {
                 return;
             }
             QueuedEvent::Leave(endurance_s) => member.relay.leave(now, endurance_s),
+            QueuedEvent::Endurance(left_s) => {
+                member.relay.handle_endurance(now, left_s.into(), 0.0);
+                if member.relay.must_leave() {
+                    self.log(index, TimelineEvent::MustLeave, None);
+                }
+            }
             QueuedEvent::Stay => member.relay.stay(now),
             QueuedEvent::Bytes { port, bytes } => {
                 // The relay must accept any fragmentation of the byte stream: split at a random offset.
@@ -423,6 +430,7 @@ fn switched_on(
         index,
     };
     let mut relay = Relay::new(setup.mission, identity, settings, seed, now)?;
+    relay.set_reserve(setup.reserve);
     if setup.spares.contains(&index) {
         relay.wait_as_spare(now);
     }
@@ -463,6 +471,7 @@ impl Chain {
             let event = QueuedEvent::Leave(endurance_s);
             queue.put(at, usize::from(index.saturating_sub(1)), event);
         }
+        put_endurances(&setup, &mut queue);
         for &(index, at) in &setup.stays {
             queue.put(at, usize::from(index.saturating_sub(1)), QueuedEvent::Stay);
         }
@@ -476,6 +485,7 @@ impl Chain {
             + setup.kills.len()
             + setup.boots.len()
             + setup.leaves.len()
+            + setup.endurances.len()
             + setup.stays.len()
             + setup.uploads.len();
         let parts = setup.partitions.iter().map(|part| (part.from, part.until));
@@ -539,6 +549,14 @@ impl Chain {
         }
         chain.update_statistics(ChangedRelays::All);
         Ok(chain)
+    }
+}
+
+/// Queues the values of the drones' endurances.
+fn put_endurances(setup: &Setup, queue: &mut Queue) {
+    for &(index, at, left_s) in &setup.endurances {
+        let event = QueuedEvent::Endurance(left_s);
+        queue.put(at, usize::from(index.saturating_sub(1)), event);
     }
 }
 
@@ -630,6 +648,8 @@ pub enum QueuedEvent {
     Boot,
     /// The relay requests to leave the chain, with this remaining endurance, s.
     Leave(Option<u16>),
+    /// The relay gets its drone's endurance beyond the way home, s.
+    Endurance(u16),
     /// The relay cancels its departure.
     Stay,
     /// A partition or a one-way link failure begins or ends.

@@ -86,6 +86,8 @@ pub enum TimelineEvent {
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
+    /// The pilot is told to fly home, at each value of the endurance.
+    MustLeave,
     /// Event that this relay has informed a node outside of the chain that its drone may fly away.
     MayLeaveTold,
 }

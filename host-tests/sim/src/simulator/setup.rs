@@ -94,6 +94,10 @@ pub struct Setup {
     pub leaves: Vec<(u16, Instant, Option<u16>)>,
     /// Relays that cancel their departure: number from 1 and time.
     pub stays: Vec<(u16, Instant)>,
+    /// Reserve of endurance with which relays leave by themselves; `None` if they do not.
+    pub reserve: Option<Duration>,
+    /// Values of a drone's endurance beyond the way home: number from 1, time, and seconds.
+    pub endurances: Vec<(u16, Instant, u16)>,
     /// Relays that wait outside of the chain from the start until the leader calls them, by number from 1.
     pub spares: Vec<u16>,
     /// Partitions: periods in which two parts of the chain do not receive each other.
@@ -162,6 +166,8 @@ impl Setup {
             boots: Vec::new(),
             leaves: Vec::new(),
             stays: Vec::new(),
+            reserve: None,
+            endurances: Vec::new(),
             spares: Vec::new(),
             partitions: Vec::new(),
             auth: false,

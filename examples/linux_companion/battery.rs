@@ -1,0 +1,230 @@
+//! Battery of the drone: departure in the log, texts to the pilot, wait at a start in flight.
+//!
+//! | departure | text to the pilot |
+//! | --- | --- |
+//! | requested, or outside of the chain, or a member again | once |
+//! | refused | every minute in flight |
+//! | free, or at the reserve | "battery: leave now" every 5 s until he takes over, by the library |
+//!
+//! The drone keeps its setpoint: its pilot flies it home. The companion never changes the mode.
+
+use serde_json::{Value, json};
+use uav_relay::flight::autopilot::state::State;
+use uav_relay::{Departure, Duration, Instant, Relay};
+
+use crate::autopilot::Companion;
+use crate::lost::log_command;
+use uav_relay_linux::log::Log;
+
+/// Time between two texts about a refused departure.
+const AGAIN: Duration = Duration::from_millis(60_000);
+
+/// Minimum time between two log lines about a departure that is pending.
+const LOGGED: Duration = Duration::from_millis(10_000);
+
+/// Maximum time from the start for which the relay waits for the endurance of its drone.
+const FIRST: Duration = Duration::from_millis(10_000);
+/// Maximum time for which the relay waits for the confirmation of the first low endurance.
+const CONFIRMED: Duration = Duration::from_millis(20_000);
+
+/// State of the departure, as logged.
+#[derive(Debug)]
+pub(crate) struct Battery {
+    departure: Departure,
+    logged_at: Instant,
+    told_at: Instant,
+    /// True until the relay may take part in the chain.
+    waits: bool,
+    /// Time of the first low endurance during the wait.
+    low_at: Option<Instant>,
+}
+
+impl Battery {
+    /// Creates the state at the start; `waits` for a relay with a reserve and a source of endurances.
+    pub(crate) const fn new(waits: bool) -> Self {
+        Self {
+            departure: Departure::Member,
+            logged_at: Instant::ZERO,
+            told_at: Instant::ZERO,
+            waits,
+            low_at: None,
+        }
+    }
+
+    /// Returns true while a relay that has just started waits for its endurance.
+    ///
+    /// A relay that restarts with a low battery then leaves before it has taken part in anything, and does not join the chain.
+    pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
+        let left_s = relay.endurance_s(now);
+        if left_s.is_some() && left_s < relay.endurance_limit_s() {
+            self.low_at = self.low_at.or(Some(now));
+        }
+        let is_inside = matches!(relay.departure(now), Departure::Member | Departure::Spare);
+        let is_open = match self.low_at {
+            Some(at) => is_inside && now.since(at) < CONFIRMED,
+            None => left_s.is_none() && now.since(Instant::ZERO) < FIRST,
+        };
+        self.waits &= is_open && !link.is_some_and(|link| link.is_landed(now));
+        self.waits
+    }
+
+    pub(crate) const fn is_waiting(&self) -> bool {
+        self.waits
+    }
+
+    /// Logs changes of the relay's departure, and tells the pilot.
+    pub(crate) fn tend(
+        &mut self,
+        now: Instant,
+        log: &Log,
+        relay: &Relay,
+        autopilot: Option<&mut Companion>,
+    ) {
+        let departure = relay.departure(now);
+        let is_flapping = is_pending(departure) && is_pending(self.departure);
+        let is_news =
+            departure != self.departure && !(is_flapping && now.since(self.logged_at) < LOGGED);
+        if is_news {
+            self.departure = departure;
+            self.logged_at = now;
+            let fields = self.status(relay, now);
+            log.event(now, "departure", fields, describe(departure));
+        }
+        let refusal = refusal(departure);
+        let is_again = refusal.is_some() && now.since(self.told_at) >= AGAIN;
+        if let Some(autopilot) = autopilot
+            && !matches!(autopilot.control(), State::Silent | State::Grounded)
+            && (is_news || is_again)
+        {
+            self.told_at = now;
+            let text = match departure {
+                Departure::Requested => Some("asks the chain to close up"),
+                Departure::Outside => Some("waits for the others to close up"),
+                Departure::Member => Some("is in the chain, or joins it"),
+                _ => refusal,
+            };
+            let why = if relay.leaves_by_endurance() {
+                "battery: low, "
+            } else {
+                "relay: "
+            };
+            if let Some(text) = text {
+                autopilot.send_text(&format!("{why}{text}"));
+            }
+        }
+    }
+
+    /// Executes the operator's commands `leave` and `stay`; `None` for another command.
+    pub(crate) fn command(
+        now: Instant,
+        log: &Log,
+        relay: &mut Relay,
+        command: &str,
+        user: &str,
+    ) -> Option<Value> {
+        let text = match command.trim() {
+            "leave" => {
+                relay.leave(now, relay.endurance_s(now));
+                "this relay asks to leave the chain, as the operator commands"
+            }
+            "stay" => {
+                relay.stay(now);
+                if relay.is_at_reserve() {
+                    "this relay stays in the chain, as the operator commands; only the way home and the reserve are left: fly the drone home"
+                } else if relay.endurance_limit_s().is_some() {
+                    "this relay stays in the chain, as the operator commands, until half of its time of flight beyond the way home has passed"
+                } else {
+                    "this relay stays in the chain, as the operator commands"
+                }
+            }
+            _ => return None,
+        };
+        Some(log_command(
+            now,
+            log,
+            Ok(("commanded", text.to_owned())),
+            command,
+            user,
+        ))
+    }
+
+    /// Returns the endurance and the departure as JSON; `null` is unknown.
+    pub(crate) fn status(&self, relay: &Relay, now: Instant) -> Value {
+        json!({
+            "departure": word(self.departure),
+            "endurance_s": relay.endurance_s(now),
+            "leaves_below_s": relay.endurance_limit_s(),
+            "endurance_losses": relay.endurance_losses(),
+            "at_reserve": relay.is_at_reserve(),
+            "must_leave": relay.must_leave(),
+        })
+    }
+}
+
+/// Returns true for a departure that is requested and not granted.
+const fn is_pending(departure: Departure) -> bool {
+    !matches!(
+        departure,
+        Departure::Member | Departure::Spare | Departure::Outside | Departure::Free
+    )
+}
+
+/// Returns the reason of a refusal for the pilot, up to 37 bytes; `None` without one.
+const fn refusal(departure: Departure) -> Option<&'static str> {
+    Some(match departure {
+        Departure::NeedsGuard => "refused: no guard",
+        Departure::NeedsChannel => "refused: needs a shared radio",
+        Departure::NeedsQuorum => "refused: others lack a quorum",
+        Departure::WideGap => "refused: gap in the numbers",
+        Departure::Blocked => "refused: neighbours lack a link",
+        _ => return None,
+    })
+}
+
+const fn word(departure: Departure) -> &'static str {
+    match departure {
+        Departure::Member => "member",
+        Departure::Requested => "requested",
+        Departure::NeedsGuard => "needs guard",
+        Departure::NeedsChannel => "needs channel",
+        Departure::NeedsQuorum => "needs quorum",
+        Departure::WideGap => "wide gap",
+        Departure::Blocked => "blocked",
+        Departure::Spare => "spare",
+        Departure::Outside => "outside",
+        Departure::Free => "free",
+        _ => "other",
+    }
+}
+
+const fn describe(departure: Departure) -> &'static str {
+    match departure {
+        Departure::Member => "this relay is a member of the chain, or joins it",
+        Departure::Requested => {
+            "this relay asks to leave the chain, and holds its position until the leader's order"
+        }
+        Departure::NeedsGuard => {
+            "this relay asks to leave and is refused: without --positions or --autopilot its neighbours would fly close to it"
+        }
+        Departure::NeedsChannel => {
+            "this relay asks to leave and is refused: over --upstream and --downstream its neighbours do not receive each other, use --shared"
+        }
+        Departure::NeedsQuorum => {
+            "this relay asks to leave and is refused for now: the remaining relays would have no quorum"
+        }
+        Departure::WideGap => {
+            "this relay asks to leave and is refused for now: the numbers of its neighbours differ by more than four"
+        }
+        Departure::Blocked => {
+            "this relay asks to leave and is refused for a minute: its neighbours do not receive each other"
+        }
+        Departure::Spare => {
+            "this relay waits outside of the chain as a spare, until the leader calls it"
+        }
+        Departure::Outside => {
+            "this relay is outside of the chain and holds its position until the others have closed up"
+        }
+        Departure::Free => "this drone may fly away; its relay has no place in the chain",
+        _ => "the departure has another state",
+    }
+}

@@ -1,0 +1,223 @@
+//! Departures that relays request by themselves, by the endurance of their drones.
+
+use host_tests::flights::end_at;
+
+use uav_relay_sim::simulator::drones::FlightSpec;
+
+use super::leaves::{AT_S, departing, freed, on_line, times};
+use super::*;
+
+/// Reserve of all relays in these tests, s; the time of a replacement is 180 s.
+const RESERVE_S: u16 = 180;
+
+/// Returns a chain of `relays` with a reserve, for `seconds_s`. Drone `relay` has `left_s` of (relay, time in s) beyond its way home.
+fn drained(relays: u16, seconds_s: u16, left_s: impl Fn(u16, u16) -> Option<u16>) -> Setup {
+    let mut setup = departing(relays, &[]);
+    setup.reserve = Some(Duration::from_millis(1_000 * u64::from(RESERVE_S)));
+    for at_s in 1..seconds_s {
+        for relay in 1..=relays {
+            let at = seconds(u64::from(at_s));
+            setup
+                .endurances
+                .extend(left_s(relay, at_s).map(|left_s| (relay, at, left_s)));
+        }
+    }
+    end_at(&mut setup, seconds(u64::from(seconds_s)));
+    setup
+}
+
+/// Returns the first time at which each pilot is told to leave, s, by relay; `None` if he is not.
+fn told(outcome: &Outcome, relays: u16) -> Vec<Option<f64>> {
+    let told = |relay| times(outcome, relay, |what| what == TimelineEvent::MustLeave);
+    (1..=relays)
+        .map(|relay| told(relay).first().copied())
+        .collect()
+}
+
+/// Checks a fleet that took off together: all reach the limit at the same time, and leave one by one.
+///
+/// The last one is told at its reserve.
+#[test]
+fn a_fleet_of_equal_endurance_leaves_one_by_one() {
+    let end_s = 2 * RESERVE_S + AT_S as u16;
+    let setup = drained(8, 300, |_, at_s| Some(end_s - at_s));
+    let outcome = run(setup).unwrap();
+    let free: Vec<Option<f64>> = ALL.iter().map(|relay| freed(&outcome, *relay)).collect();
+    println!("free {free:?}, told {:?}", told(&outcome, 8));
+    assert_eq!(free.iter().flatten().count(), 7);
+    let mut order: Vec<f64> = free.iter().flatten().copied().collect();
+    order.sort_by(f64::total_cmp);
+    assert!(
+        order.windows(2).all(|pair| pair[0] + 10.0 < pair[1]),
+        "{order:?}"
+    );
+    let floor_s = f64::from(end_s - RESERVE_S);
+    for (relay, (free, told)) in (1..).zip(free.iter().zip(told(&outcome, 8))) {
+        let floor_s = floor_s - 10.0 * f64::from(8 - relay);
+        // A relay that may leave is switched off in this simulation.
+        let told = told.filter(|_| free.is_none());
+        assert!(
+            told.is_none_or(|told| (15.0..17.0).contains(&(told - floor_s))),
+            "{told:?}"
+        );
+    }
+}
+
+/// Checks a fleet whose departures take long: no two pilots are told at once. No drone arrives at its place.
+#[test]
+fn a_slow_fleet_of_equal_endurance_leaves_one_by_one() {
+    let end_s = 2 * RESERVE_S + AT_S as u16;
+    let mut setup = drained(8, 300, |_, at_s| Some(end_s - at_s));
+    setup.flight = Some(FlightSpec::multicopters(on_line(), 0.0, 8.0));
+    let outcome = run(setup).unwrap();
+    let may = |relay| times(&outcome, relay, |what| what == TimelineEvent::MayLeave);
+    let free: Vec<Option<f64>> = ALL
+        .iter()
+        .map(|relay| may(*relay).first().copied())
+        .collect();
+    let told = told(&outcome, 8);
+    println!("free {free:?}, told {told:?}");
+    let first = free
+        .iter()
+        .zip(&told)
+        .filter_map(|(free, told)| free.or(*told));
+    let mut order: Vec<f64> = first.collect();
+    order.sort_by(f64::total_cmp);
+    assert_eq!(order.len(), 8);
+    assert!(
+        order.windows(2).all(|pair| pair[0] + 3.0 < pair[1]),
+        "{order:?}"
+    );
+}
+
+/// Checks a fleet without a guard, whose departures are refused: its pilots are told one by one.
+#[test]
+fn a_refused_fleet_is_told_one_by_one() {
+    let end_s = 2 * RESERVE_S + AT_S as u16;
+    let mut setup = drained(8, 300, |_, at_s| Some(end_s - at_s));
+    setup.settings.leave_without_guard = false;
+    let outcome = run(setup).unwrap();
+    let mut order: Vec<f64> = told(&outcome, 8).into_iter().flatten().collect();
+    order.sort_by(f64::total_cmp);
+    println!("told at {order:?} s");
+    assert_eq!(order.len(), 8);
+    assert!(
+        order.windows(2).all(|pair| pair[0] + 20.0 < pair[1]),
+        "{order:?}"
+    );
+    let floor_s = f64::from(end_s - RESERVE_S);
+    assert!((15.0..17.0).contains(&(order[7] - floor_s)), "{order:?}");
+}
+
+/// Checks that a request that is granted is not withdrawn, and that one that waits is.
+#[test]
+fn a_request_is_withdrawn_until_it_is_granted() {
+    // Relays 3 and 6 are low; 3 has the lower number and leaves first. Both recover right after the request.
+    let recovers_s = AT_S as u16 + 16;
+    let left_s = |relay, at_s| match relay {
+        3 | 6 if (AT_S as u16..recovers_s).contains(&at_s) => Some(340 - at_s / 10),
+        _ => Some(900),
+    };
+    let outcome = run(drained(8, 300, left_s)).unwrap();
+    println!("told {:?}", told(&outcome, 8));
+    assert!(freed(&outcome, 3).is_some());
+    assert!(freed(&outcome, 6).is_none());
+    assert_eq!(outcome.relays[5].killed, None);
+}
+
+/// Checks that one low value, and an endurance that is low for less than 15 s, cause no departure.
+#[test]
+fn a_short_low_endurance_causes_nothing() {
+    for low_s in [1, 5, 10, 14] {
+        let from_s = AT_S as u16;
+        let left_s = |_, at_s| {
+            Some(if (from_s..from_s + low_s).contains(&at_s) {
+                0
+            } else {
+                900
+            })
+        };
+        let setup = drained(8, 120, left_s);
+        let outcome = run(setup.clone()).unwrap();
+        judge(&setup, &outcome, &ALL).unwrap();
+        assert!(told(&outcome, 8).iter().all(Option::is_none), "{low_s} s");
+        assert!(views(&outcome, 4) <= 1);
+    }
+}
+
+/// Checks without a reserve: no endurance makes a relay leave.
+#[test]
+fn without_a_reserve_no_relay_leaves_by_itself() {
+    let mut setup = drained(8, 200, |_, at_s| Some(100_u16.saturating_sub(at_s)));
+    setup.reserve = None;
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, &ALL).unwrap();
+    assert!(told(&outcome, 8).iter().all(Option::is_none));
+}
+
+/// Checks that a first leader that restarts and asks to leave at once stays outside.
+#[test]
+fn a_first_leader_that_restarts_and_leaves_stays_outside() {
+    let mut setup = departing(8, &[]);
+    let leader = setup.mission.leader();
+    setup.kills = vec![(leader, seconds(AT_S - 5))];
+    setup.boots = vec![(leader, seconds(AT_S - 3))];
+    // Before the restarted relay handles any timeout, as the companion does.
+    setup.leaves.push((leader, seconds(AT_S - 3), Some(60)));
+    let outcome = run(setup.clone()).unwrap();
+    judge(&setup, &outcome, &without(&[leader])).unwrap();
+    assert!(freed(&outcome, leader).is_some());
+    let since = AT_S as f64 - 3.0;
+    let takes_part = |what| {
+        matches!(
+            what,
+            TimelineEvent::ViewAccepted { .. } | TimelineEvent::Converged
+        )
+    };
+    let taken = times(&outcome, leader, takes_part);
+    assert!(taken.iter().all(|at| *at < since), "{taken:?}");
+}
+
+/// Checks that a first leader joins again by `stay`, at the chain's start and after its own restart.
+#[test]
+fn a_first_leader_that_left_joins_again() {
+    for at_s in [0, AT_S - 3] {
+        let mut setup = departing(8, &[]);
+        let leader = setup.mission.leader();
+        if at_s > 0 {
+            setup.kills = vec![(leader, seconds(at_s - 2))];
+            setup.boots = vec![(leader, seconds(at_s))];
+        }
+        setup.leaves = vec![(leader, seconds(at_s), None)];
+        for stays_ms in [500, 3_000, 8_000] {
+            let at = Instant::from_millis(1_000 * at_s + stays_ms);
+            setup.stays = vec![(leader, at)];
+            let outcome = run(setup.clone()).unwrap();
+            let is_free = freed(&outcome, leader).is_some();
+            let left = if is_free {
+                without(&[leader])
+            } else {
+                ALL.to_vec()
+            };
+            println!("{at_s} s, {stays_ms} ms: free {is_free}");
+            judge(&setup, &outcome, &left)
+                .unwrap_or_else(|what| panic!("{at_s} s, {stays_ms} ms: {what}"));
+        }
+    }
+}
+
+/// Checks that a restarted relay that asks to leave returns if the others have no quorum without it.
+#[test]
+fn a_restarted_relay_that_is_needed_returns() {
+    let mut setup = departing(4, &[]);
+    setup.kills = vec![(4, seconds(60)), (3, seconds(100)), (1, seconds(150))];
+    setup.boots = vec![(1, seconds(152))];
+    setup.leaves.push((1, seconds(152), Some(60)));
+    end_at(&mut setup, seconds(600));
+    let outcome = run(setup).unwrap();
+    let accepted = |what| matches!(what, TimelineEvent::ViewAccepted { .. });
+    let times = times(&outcome, 2, accepted);
+    println!("relay 2 accepts views at {times:?}");
+    assert!(times.last().is_some_and(|at| *at > 152.0), "{times:?}");
+    assert!(outcome.relays[1].observed.leased);
+}

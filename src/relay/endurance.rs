@@ -1,0 +1,311 @@
+//! Endurance of the drone, and the departure that it causes.
+//!
+//! The margin is the remaining time of flight less the time of the way home. The rules are in [`docs::batteries`](crate::docs::batteries),
+//! section "Endurance". The floor is the reserve, and a part of the time of a replacement by the relay's number.
+
+use super::Relay;
+use crate::event::Event;
+use crate::node::Node;
+use crate::node::departure::Leaving;
+use crate::settings::Settings;
+use crate::stats::bump;
+use crate::time::{Duration, Instant};
+
+/// Age at which the last value is too old.
+const STALE: Duration = Duration::from_millis(10_000);
+/// Maximum time between two comparisons of the margin with the limit.
+const REVIEW: Duration = Duration::from_millis(1_000);
+/// Time for which a condition must hold.
+const HOLD: Duration = Duration::from_millis(15_000);
+/// Hysteresis, difference of two values that agree, and change of a request that the leader is told.
+const STEP: Duration = Duration::from_millis(30_000);
+/// Time between two `EnduranceUnknown`, and between two `AtReserve`.
+const AGAIN: Duration = Duration::from_millis(60_000);
+/// Usual time of a replacement, in units of `dead_after`.
+///
+/// It is 8 until the order, and 4 until the view without the relay is in place.
+const REPLACEMENT: u32 = 12;
+/// Maximum time of a replacement.
+const LONGEST: Duration = Duration::from_millis(240_000);
+/// Maximum time between two pilots of relays of equal endurance who are told to leave.
+const APART: Duration = Duration::from_millis(10_000);
+/// Maximum remaining time and way home, s. A longer one is unknown: it is no multicopter's.
+const MAX_S: f32 = 21_600.0;
+
+#[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Endurance {
+    /// Reserve beyond the way home; `None` if the relay does not leave by itself.
+    reserve: Option<Duration>,
+    /// Last known end of the flight, and the time of the way home; `None` before a valid value.
+    end: Option<(Instant, Duration)>,
+    /// Time of the last valid value.
+    sampled_at: Instant,
+    /// True if the last two valid values agree: the countdown from the last one counts.
+    is_steady: bool,
+    /// True from the loss of the endurance to the next valid value.
+    is_lost: bool,
+    losses: u32,
+    /// Times of the last `EnduranceUnknown` and `AtReserve`; 0 before.
+    raised_at: [Instant; 2],
+    /// Limit of the margin since `Relay::stay`; `None` for the usual one.
+    limit: Option<Instant>,
+    /// Start times of four conditions, or 0: change due, floor reached, leader to be told, floor left.
+    since: [Instant; 4],
+    /// True if the request to leave is this module's.
+    is_own: bool,
+    /// True from a margin at or below the floor until it is [`STEP`] above the floor.
+    is_spent: bool,
+    /// Time of the floor, as the leader was told.
+    floor_at: Instant,
+    reviewed_at: Instant,
+}
+
+impl Endurance {
+    fn replacement(settings: &Settings) -> Duration {
+        let usual = settings.dead_after.times(REPLACEMENT);
+        let usual = Instant::ZERO + usual + Leaving::respacing(settings);
+        usual.since(Instant::ZERO).min(LONGEST)
+    }
+
+    /// Returns the margin below which the relay requests to leave; `None` without a reserve.
+    fn limit(&self, settings: &Settings) -> Option<Instant> {
+        let usual = Instant::ZERO + self.reserve? + Self::replacement(settings);
+        Some(self.limit.map_or(usual, |lower| lower.min(usual)))
+    }
+
+    /// Returns the remaining time of flight, s; `None` while it is unknown.
+    fn known(&self, now: Instant) -> Option<u16> {
+        let (end, _) = self.end?;
+        (!self.is_lost && now.since(self.sampled_at) < STALE).then(|| seconds(end.since(now)))
+    }
+
+    /// Returns the margin as a time from zero, to which durations are added.
+    fn margin(&self, now: Instant) -> Option<Instant> {
+        let (end, home) = self.end?;
+        Some(Instant::ZERO + end.since(now + home))
+    }
+
+    /// Makes the endurance unknown, and reports that.
+    fn lose(&mut self, now: Instant, node: &mut Node) {
+        if !core::mem::replace(&mut self.is_lost, true) {
+            bump(&mut self.losses);
+        }
+        if self.reserve.is_some() {
+            self.raise(now, node, 0, Event::EnduranceUnknown);
+        }
+    }
+
+    /// Raises an event whose last time is `which`, at most once per [`AGAIN`].
+    fn raise(&mut self, now: Instant, node: &mut Node, which: usize, event: Event) {
+        if let Some(last) = self.raised_at.get_mut(which)
+            && (*last == Instant::ZERO || now.since(*last) >= AGAIN)
+        {
+            *last = now;
+            node.raise(event);
+        }
+    }
+
+    /// Updates the time `which` since which a condition holds. Returns true once it decides.
+    fn holds(&mut self, now: Instant, which: usize, is_true: bool) -> bool {
+        let Some(since) = self.since.get_mut(which) else {
+            return false;
+        };
+        let at = Some(*since).filter(|at| *at > Instant::ZERO).unwrap_or(now);
+        *since = if is_true { at } else { Instant::ZERO };
+        is_true && now.since(at) >= HOLD && (self.is_steady || at < self.sampled_at)
+    }
+
+    /// Compares the margin with the limit and the floor, and requests to leave or withdraws that.
+    fn review(&mut self, now: Instant, node: &mut Node) {
+        if self.end.is_some() && now.since(self.sampled_at) >= STALE {
+            self.lose(now, node);
+        }
+        let settings = node.member().settings;
+        let all = (self.reserve, self.limit(&settings), self.margin(now));
+        let (Some(reserve), Some(limit), Some(margin)) = all else {
+            return;
+        };
+        self.reviewed_at = now;
+        let leaves = node.leaves().is_some();
+        let changes = if leaves {
+            self.is_own && margin >= limit + STEP
+        } else {
+            margin < limit
+        };
+        // Pilots of a fleet of equal endurance are told one by one, in the leader's order, also if it is slow or refuses all.
+        let (number, all) = (node.member().node, node.member().all);
+        let each = Self::replacement(&settings).as_micros() / u64::from(all.max(1));
+        let each = if node.is_refused(now) {
+            Duration::from_micros(each)
+        } else {
+            Duration::from_micros(each / 2).min(APART)
+        };
+        let floor = Instant::ZERO + reserve + each.times(all.saturating_sub(number).into());
+        let is_restored = self.holds(now, 3, margin >= floor + STEP);
+        self.is_spent = self.holds(now, 1, margin <= floor) || self.is_spent && !is_restored;
+        node.set_spent(self.is_spent);
+        if self.is_spent {
+            self.raise(now, node, 1, Event::AtReserve);
+        }
+        // The leader's order is due before the reserve is used.
+        let left = margin.since(Instant::ZERO + reserve);
+        let floor_at = now + left;
+        let moved = apart(floor_at, self.floor_at);
+        let is_due = self.holds(now, 0, changes);
+        let is_moved = self.holds(now, 2, leaves && self.is_own && moved >= STEP);
+        if is_due && leaves {
+            self.is_own = !node.withdraw(now);
+        } else if is_due || is_moved {
+            self.is_own |= !leaves;
+            self.floor_at = floor_at;
+            node.leave(now, Some(seconds(left)));
+        }
+    }
+}
+
+fn apart(one: Instant, other: Instant) -> Duration {
+    one.since(other).max(other.since(one))
+}
+
+/// Returns `seconds` as a duration; `None` if it is negative, not finite, or more than [`MAX_S`].
+fn duration(seconds: f32) -> Option<Duration> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked"
+    )]
+    (0.0..=MAX_S)
+        .contains(&seconds)
+        .then(|| Duration::from_millis((seconds * 1e3) as u64))
+}
+
+/// Returns a duration in whole seconds, at most 65 534: the maximum is the mark of an unknown one.
+fn seconds(span: Duration) -> u16 {
+    u16::try_from(span.as_micros() / 1_000_000).map_or(u16::MAX - 1, |s| s.min(u16::MAX - 1))
+}
+
+impl Relay {
+    /// Records the drone's remaining time of flight and the time of its way home, s, 0 to 21 600.
+    ///
+    /// Needs the feature `departures`. Any other value, such as NaN for an unknown one, and a pause of 10 s make the endurance unknown.
+    ///
+    /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay calls [`leave`](Self::leave) by itself below [`endurance_limit_s`](Self::endurance_limit_s).
+    /// The rules are in [`docs::batteries`](crate::docs::batteries). Takes constant time.
+    ///
+    /// ```
+    /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
+    /// # use paper::*;
+    /// use uav_relay::{Duration, Instant, Settings};
+    ///
+    /// let mut relay = relay(Settings::default());
+    /// relay.set_reserve(Some(Duration::from_millis(180_000)));
+    /// relay.handle_endurance(Instant::from_millis(1_000), 900.0, 60.0);
+    /// // The way home, 3 min of reserve, and 3 min for the replacement.
+    /// # #[cfg(feature = "departures")]
+    /// assert_eq!(relay.endurance_limit_s(), Some(420));
+    /// ```
+    pub fn handle_endurance(&mut self, now: Instant, remaining_s: f32, home_s: f32) {
+        let now = self.clock.advance(now);
+        let Some(endurance) = self.endurance.first_mut() else {
+            return;
+        };
+        if let Some((left, home)) = duration(remaining_s).zip(duration(home_s)) {
+            let end = now + left;
+            let last = endurance.end.replace((end, home));
+            endurance.is_steady = last.is_some_and(|(last, _)| apart(last, end) < STEP);
+            endurance.sampled_at = now;
+            endurance.is_lost = false;
+        } else {
+            endurance.lose(now, &mut self.node);
+        }
+        endurance.review(now, &mut self.node);
+    }
+
+    /// Sets the reserve beyond the way home and the time of a replacement. With `None`, as at first, the relay does not leave by itself.
+    pub fn set_reserve(&mut self, reserve: Option<Duration>) {
+        if let Some(endurance) = self.endurance.first_mut() {
+            endurance.reserve = reserve;
+        }
+    }
+
+    /// Returns the remaining time of flight, s; `None` while it is unknown. Takes constant time.
+    pub fn endurance_s(&self, now: Instant) -> Option<u16> {
+        self.endurance.first()?.known(self.clock.internal(now))
+    }
+
+    /// Returns the endurance below which the relay requests to leave, s.
+    ///
+    /// `None` without a reserve, and before a valid value. It is the way home and the limit of [`docs::batteries`](crate::docs::batteries).
+    pub fn endurance_limit_s(&self) -> Option<u16> {
+        let endurance = self.endurance.first()?;
+        let limit = endurance.limit(&self.node.member().settings)?;
+        let (_, home) = endurance.end?;
+        Some(seconds((limit + home).since(Instant::ZERO)))
+    }
+
+    /// Returns the number of times that the endurance became unknown.
+    pub fn endurance_losses(&self) -> u32 {
+        self.endurance.first().map_or(0, |it| it.losses)
+    }
+
+    /// Returns true while the relay requests to leave because of its endurance.
+    pub fn leaves_by_endurance(&self) -> bool {
+        let is_own = self.endurance.first().is_some_and(|it| it.is_own);
+        is_own && self.node.leaves().is_some()
+    }
+
+    /// Returns true if the pilot has to fly the drone home now.
+    ///
+    /// The drone may leave, or the relay has requested that and only the way home and the reserve are left. Takes constant time.
+    pub fn must_leave(&self) -> bool {
+        let leaves = self.node.leaves();
+        leaves.is_some_and(|is_free| is_free || self.is_at_reserve())
+    }
+
+    /// Returns true while the endurance is no more than the way home and the reserve. See [`Event::AtReserve`].
+    pub fn is_at_reserve(&self) -> bool {
+        self.endurance.first().is_some_and(|it| it.is_spent)
+    }
+
+    /// Forgets the endurance of a drone on the ground. A departure goes on.
+    pub(crate) fn reset_endurance(&mut self) {
+        self.endurance = self.endurance.map(|it| Endurance {
+            reserve: it.reserve,
+            losses: it.losses,
+            raised_at: it.raised_at,
+            is_own: it.is_own,
+            ..Endurance::default()
+        });
+        if self.leaves_by_endurance() {
+            self.node.set_spent(true);
+        }
+    }
+
+    /// Records an order of the firmware. After `stay` the limit is at most half of the present margin.
+    pub(super) fn override_endurance(&mut self, now: Instant, stays: bool) {
+        if let Some(endurance) = self.endurance.first_mut() {
+            let limit = endurance.limit(&self.node.member().settings);
+            let margin = endurance.margin(now).or(limit).filter(|_| stays);
+            endurance.limit = margin.map(|margin| Instant::from_micros(margin.as_micros() / 2));
+            (endurance.since, endurance.is_own) = ([Instant::ZERO; 4], false);
+        }
+    }
+
+    /// Compares the margin of the endurance with its limit. Reports an unknown endurance of a drone that is `flown`.
+    pub(super) fn review_endurance(&mut self, now: Instant, flown: bool) {
+        if let Some(endurance) = self.endurance.first_mut() {
+            if flown && endurance.known(now).is_none() {
+                endurance.lose(now, &mut self.node);
+            }
+            endurance.review(now, &mut self.node);
+        }
+    }
+
+    /// Returns the time of the next comparison of margin and limit; `None` if none is due.
+    pub(super) fn endurance_timeout(&self) -> Option<Instant> {
+        let endurance = self.endurance.first()?;
+        let is_compared = endurance.reserve.is_some() && endurance.end.is_some();
+        is_compared.then_some(endurance.reviewed_at + REVIEW)
+    }
+}
