@@ -33,7 +33,7 @@ pub(crate) fn planning() {
 
 /// Solves a chain of `relays` relays by the joint method, in several calls of the solver.
 ///
-/// Returns the total instructions, those of the most expensive call, and the number of calls.
+/// Returns three numbers: all instructions, the instructions of the most expensive call, and the number of calls.
 fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);

@@ -33,8 +33,8 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the drone's newest position received since the last call. Passes measurements to `on_sample` and logs the
-    /// first invalid line. Work: that of [`Fifo::read`].
+    /// Returns the drone's newest position received since the last call. Passes measurements to `on_sample` and logs
+    /// the first invalid line. The work is the work of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,

@@ -39,7 +39,8 @@ const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 
 /// Time after which a drone that does not come nearer to its setpoint is reported.
 ///
-/// Reports have the setpoint every eighth time only: a drone on its way to a new one may fly away from the one before for 10 s.
+/// Reports have the setpoint every eighth time only: a drone on its way to a new setpoint may therefore seem to fly
+/// away from the previous setpoint for 10 s.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Distance from a setpoint below which a drone has reached it, m.
