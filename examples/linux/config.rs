@@ -22,7 +22,7 @@ const TOLERANCE: f64 = 1e-4;
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Path-loss parameters of the channel in the file; `None` for the default channel, which is the channel of the
+    /// Path-loss parameters of the channel in the file. `None` for the default channel, which is the channel of the
     /// paper.
     pub channel: Option<Channel>,
     /// Distribution of the interference along x given by the file, if any.

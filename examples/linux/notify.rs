@@ -66,7 +66,7 @@ fn address(name: &OsStr) -> Option<SocketAddr> {
     SocketAddr::from_pathname(name).ok()
 }
 
-/// Returns half of the watchdog timeout that systemd requests of this process; `None` without a timeout.
+/// Returns half of the watchdog timeout that systemd requests of this process. `None` without a timeout.
 fn watchdog() -> Option<Duration> {
     let micros: u64 = std::env::var("WATCHDOG_USEC").ok()?.parse().ok()?;
     let pid = std::env::var("WATCHDOG_PID").ok();

@@ -63,7 +63,7 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Side of the neighbour that the drone's directional antenna points to; `None` without such an antenna.
+    /// Side of the neighbour that the drone's directional antenna points to. `None` without such an antenna.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
 }

@@ -64,7 +64,7 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the setpoint or arrival to log at `now` for a drone at the position `drone`; `None` for nothing. Also
+    /// Returns the setpoint or arrival to log at `now` for a drone at the position `drone`. `None` for nothing. Also
     /// returns the time of the next call.
     pub(crate) fn poll(
         &mut self,

@@ -91,7 +91,7 @@ pub(crate) struct Preview {
 pub(crate) struct Uploading {
     /// Values of the page; `None` for an upload of the command line.
     form: Option<Form>,
-    /// Version of the new mission; `None` until the version of the flown mission is known; the new version is one
+    /// Version of the new mission; `None` until the version of the flown mission is known. The new version is one
     /// more.
     version: Option<u16>,
     stage: Stage,

@@ -56,7 +56,7 @@ pub(super) struct Association {
     /// True while the messages to the neighbour request an open chain. In an open chain all relays are at least the
     /// minimum separation apart along x.
     open_sent: bool,
-    /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without a halt request.
+    /// Number of reminders, one per second, until the neighbour's halt request expires. 0 without a halt request.
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
@@ -216,7 +216,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the notice that this relay has left the association (session) with its neighbour; `None` if no notice
+    /// Returns the notice that this relay has left the association (session) with its neighbour. `None` if no notice
     /// must be sent.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
@@ -300,7 +300,7 @@ impl Association {
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the pending message of a relay that does not fly to setpoints or has just started; `None` if there is
+    /// Returns the pending message of a relay that does not fly to setpoints or has just started. `None` if there is
     /// none.
     ///
     /// The message contains the relay's position, and a halt request to forward. The message is valid without an
@@ -332,7 +332,7 @@ pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
     /// is lost.
     lost: Option<(u16, f32)>,
-    /// x at which this relay will be the minimum separation away from a lost relay, m; NaN if no lost relay is near.
+    /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if no lost relay is near.
     /// Until this relay is at this x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this relay along x.

@@ -550,7 +550,7 @@ impl Guard {
         }
     }
 
-    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if no move has waited so long.
+    /// Returns the reason why a move toward `side` has waited for five seconds. `None` if no move has waited so long.
     /// The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;

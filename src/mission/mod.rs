@@ -615,7 +615,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay whose position is computed after the position of relay `index`; `None` if relay `index` is
+    /// Returns the relay whose position is computed after the position of relay `index`. `None` if relay `index` is
     /// the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {

@@ -214,7 +214,7 @@ pub(crate) struct Effects {
     /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
     /// proves that the neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that this relay has received or made in this step; `None` without a proposal.
+    /// Origin of the view proposal that this relay has received or made in this step. `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
     /// True while a view proposal awaits its decision. During this time no pass (message along the chain) continues.
     pub(crate) view_proposed: bool,

@@ -274,7 +274,7 @@ impl Reporting {
         None
     }
 
-    /// Returns the next node to which a handshake must be sent that requests a reply; `None` if there is none.
+    /// Returns the next node to which a handshake must be sent that requests a reply. `None` if there is none.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         let mut watched = self.watched.iter_mut();
         watched.find_map(|watched| watched.to_greet.take().map(NonZeroU16::get))
@@ -334,7 +334,7 @@ const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
     }
 }
 
-/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one; `None` while there is neither.
+/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one. `None` while there is neither.
 fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
     let end = beyond(member, side, 1);
     match neighbours.at(side).node() {

@@ -44,7 +44,7 @@ pub(crate) enum Sender {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's; false if both epochs are the same.
+    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are the same.
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
@@ -147,7 +147,7 @@ pub(crate) struct Session {
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     last_number: u32,
-    /// Claim of another node to this relay's node number, as shown by a handshake; `None` once the claim has been
+    /// Claim of another node to this relay's node number, as shown by a handshake. `None` once the claim has been
     /// read.
     rival: Option<Rival>,
     /// Number of uses of session table entries so far, wrapping. By this number the entries are ordered by their last use.

@@ -123,7 +123,7 @@ impl Case {
         }
     }
 
-    /// Returns the number of relays, the argument `N` of this case, if the case has this argument; otherwise `None`.
+    /// Returns the number of relays, the argument `N` of this case, if the case has this argument. Otherwise `None`.
     pub fn relays(&self) -> Option<usize> {
         self.args.get("N")?.as_u64()?.try_into().ok()
     }

@@ -99,7 +99,7 @@ pub struct Flight {
     pub losses: Vec<Loss>,
     /// Agreed views (memberships of the chain): time, number of the view, and number of its relays.
     pub views: Vec<(f64, u32, u16)>,
-    /// Closest approach of two relays in the air; `None` if two relays were never in the air at the same time.
+    /// Closest approach of two relays in the air. `None` if two relays were never in the air at the same time.
     pub nearest: Option<Nearest>,
 }
 

@@ -76,7 +76,7 @@ pub(crate) struct Computation {
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, collected by a message along the chain.
     pub(super) seats: Seats,
-    /// Position that the joint method has computed for this relay in this view; `None` until the position is
+    /// Position that the joint method has computed for this relay in this view. `None` until the position is
     /// computed.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude of the position that the chain has agreed on for this relay.
@@ -185,7 +185,7 @@ impl Computation {
         self.meter.restart();
     }
 
-    /// Returns the shares of this relay's slots at the agreed positions; `None` unless the slots were fitted (each
+    /// Returns the shares of this relay's slots at the agreed positions. `None` unless the slots were fitted (each
     /// slot as long as its hop needs).
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         self.fitted.first()?.agreed

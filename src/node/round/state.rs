@@ -78,7 +78,7 @@ pub(crate) enum Arrival {
 }
 
 impl Arrival {
-    /// Returns the action for a pass message that is not new; `None` for a new message, which must be handled.
+    /// Returns the action for a pass message that is not new. `None` for a new message, which must be handled.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,

@@ -24,7 +24,7 @@ use crate::mission::{Mission, Profile};
 use crate::place::Placement;
 use crate::sir::{self, Sender};
 
-/// Number of bisection steps for the x at which both hops have the same SIR; the result is exact to a step of an f32.
+/// Number of bisection steps for the x at which both hops have the same SIR. The result is exact to a step of an f32.
 const HALVINGS: u8 = 40;
 
 /// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field the SIR is

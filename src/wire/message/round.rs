@@ -458,7 +458,7 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict the measurements of the other relays; 0 for none. The
+    /// Node number of a relay whose measurements contradict the measurements of the other relays. 0 for none. The
     /// measurements of that relay are left out of `sums`. Set in replies only.
     pub excluded: u16,
 }

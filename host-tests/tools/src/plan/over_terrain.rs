@@ -58,7 +58,7 @@ pub struct OverTerrain {
     /// Gain of the plan compared with the positions that ignore the terrain, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_gain_db: Option<f64>,
-    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist; absent if they can be
+    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist. Absent if they can be
     /// flown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_problem: Option<String>,
