@@ -114,7 +114,8 @@ impl FileOptions {
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
-    /// Adds an option whose value is a path relative to the file's folder, if the file has a value for this option.
+    /// Adds an option whose value is a path relative to the file's folder. Does nothing if the file has no value for
+    /// this option.
     pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
@@ -153,8 +154,7 @@ impl FileOptions {
         })
     }
 
-    /// Removes the options of the file that the command line also gives, or that another option of the command line
-    /// excludes.
+    /// Removes the options of the file that the command line also gives or excludes by another option.
     ///
     /// Returns the remaining options, and the overrides. An override is a removed option whose value differs from the
     /// value on the command line.

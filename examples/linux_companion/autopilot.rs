@@ -273,7 +273,7 @@ impl Companion {
         })
     }
 
-    /// Returns the log text about a missing autopilot: its port, and the checks that the operator should make.
+    /// Returns the log text about a missing autopilot: its port, and the checks for the operator.
     fn unanswered(&self, answer: Received) -> String {
         match (answer, &self.port) {
             (Received::Nothing, Port::Udp(datagrams)) => {

@@ -196,7 +196,7 @@ impl Uploading {
         }
     }
 
-    /// Uploads the mission that the page has previewed, if the chain still flies the mission of the preview.
+    /// Uploads the previewed mission, if the chain still flies the mission on which the preview is based.
     ///
     /// # Errors
     /// The reason why this preview cannot be uploaded, or not again.

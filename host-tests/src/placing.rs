@@ -146,7 +146,7 @@ pub struct Mixed {
 }
 
 impl Mixed {
-    /// Simulates a chain of unlike relays, checks that it meets its agreed target SIR, and adds it to the counts.
+    /// Simulates a chain of unlike relays and counts it. Checks that the chain meets its agreed target SIR.
     ///
     /// The SIR must not exceed the optimum.
     pub fn meet_what_they_agree_on(&mut self, link: &Link) {
@@ -186,7 +186,7 @@ pub struct DrawnHop {
     pub index: u16,
     /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// SIR of the hop without noise, linear, if the receiver is equally far from the sender and the interferer.
+    /// SIR of the hop without noise, linear, if sender and interferer are equally far from the receiver.
     pub gain: f64,
     relays: u16,
 }

@@ -40,7 +40,7 @@ const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 /// Interval between two requests for the reports of all relays. Each request goes to another relay in reach.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay, after which the station sends its hellos to the next relay.
+/// Number of unanswered hellos to one relay, after which the station sends hellos to the next relay.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
@@ -782,7 +782,7 @@ pub enum Progress {
         /// is farther from the station.
         by: u16,
     },
-    /// The upload is outdated: a relay has stored a newer mission, or another mission with the same version.
+    /// The upload is outdated: a relay has stored a newer mission, or another one with the same version.
     Outdated {
         /// Version of the newer mission that the relay has stored.
         version: u16,

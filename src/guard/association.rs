@@ -104,9 +104,9 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance along x by which this relay is on the correct side of its neighbour at `side`, m. The
-    /// neighbour's last received x counts. The result is negative on the wrong side, and NaN if a position is
-    /// unknown.
+    /// Returns the distance, m, by which this relay is on the correct side of its neighbour along x. The neighbour is
+    /// at `side`. The neighbour's last received x counts. The result is negative on the wrong side, and NaN if a
+    /// position is unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -187,7 +187,7 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association (session) that this relay or its neighbour has left. If
+    /// Returns true if a message belongs to a left association (session). This relay or its neighbour has left it. If
     /// this relay has left the association, its leave notice is sent again, until the neighbour starts a new
     /// association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
@@ -479,8 +479,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay has the minimum separation from the lost relay, at x =
-    /// `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. It has the minimum
+    /// separation at x = `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

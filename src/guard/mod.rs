@@ -496,8 +496,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position, and a report has shown the relay at this position since
-    /// then. The agreed position is limited to the geofence.
+    /// Returns true if the setpoint is the agreed position and a report has shown the relay there. The agreed
+    /// position is limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {

@@ -71,7 +71,7 @@ pub(crate) struct Context<'a> {
     pub(crate) member: &'a Member,
     /// Identifier of the newest mission that this relay has stored. The active mission may still be an older mission.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last relay of its chain: it has no neighbour on the side away from the leader.
+    /// True if this relay is the last of its chain: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,
     /// Remaining lease times of other relays. Until they have ended, the positions of a new view must not be used.
     pub(crate) other_leases: OtherLeases,
@@ -230,7 +230,7 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour of a relay: the previous or the next relay, in the order from the leader to the last relay.
+/// Neighbour of a relay: the previous or the next relay. The order is from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,

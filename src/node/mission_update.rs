@@ -446,8 +446,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Replaces the Tx and Rx positions in use by the positions of the stored mission, which becomes active. Returns
-    /// true if the positions have changed, which makes all relay positions invalid.
+    /// Replaces the Tx and Rx positions in use by the positions of the stored mission. This mission becomes active.
+    /// Returns true if the positions have changed, which makes all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();

@@ -27,7 +27,8 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries to receive Rx well enough, with data in both directions.
+/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only with data in both
+/// directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of points of an interference field that one call evaluates. One target may need more.
@@ -549,7 +550,7 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         self.closes() && (self.plainly().closes() || self.place(0).is_some())
     }
 
-    /// Returns true if the chain meets its target with every relay at its reach: the last hop is short enough.
+    /// Returns true if the chain meets its target with every relay at its reach. The last hop is then short enough.
     pub(crate) fn closes(&self) -> bool {
         self.ends(|_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
     }

@@ -421,9 +421,9 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference at a receiver: its measurement if there is one, otherwise the mission's field.
-    /// `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field
-    /// include the receiver noise.
+    /// Returns the interference at a receiver. It is the receiver's measurement if there is one, otherwise the
+    /// mission's field. `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both
+    /// measurement and field include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),

@@ -495,7 +495,8 @@ fn replayed(text: String) -> String {
     }
 }
 
-/// Returns the position of a relay at `now`, between two reported positions that are at most [`GAP`] apart in time.
+/// Returns the position of a relay at `now`, interpolated between two reported positions. `None` if these are more
+/// than [`GAP`] apart in time.
 fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     let after = track.partition_point(|(at, _)| *at < now);
     let (t0, one) = track.get(after.checked_sub(1)?)?;

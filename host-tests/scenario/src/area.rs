@@ -259,7 +259,7 @@ fn cross(one: [[f64; 2]; 2], other: [[f64; 2]; 2]) -> bool {
     sides(one, other) && sides(other, one) && overlap(0) && overlap(1)
 }
 
-/// Returns true if the second edge, which begins where the first edge ends, goes back along the first edge.
+/// Returns true if the second edge goes back along the first edge. The second edge begins where the first edge ends.
 fn is_spike(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> bool {
     let [[a, b], [_, c]] = [first, second];
     let back = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);

@@ -92,7 +92,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if its table also has a key that excludes it, for example `power_w` excludes `power_dbm`.
+    /// Rejects `key` if its table also has a key that excludes it. For example, `power_w` excludes `power_dbm`.
     fn check_exclusive(
         &self,
         path: &str,

@@ -5,8 +5,8 @@
 
 use crate::snapshot::{Alarm, Urgency};
 
-/// Number of alarms above which ended alarms are dropped: the least urgent first, and of equally urgent alarms the
-/// oldest. Alarms that still last are not dropped.
+/// Number of alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
+/// alarms the oldest. Alarms that still last are not dropped.
 pub const MOST: usize = 200;
 
 /// Reason of an alarm.

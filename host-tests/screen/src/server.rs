@@ -28,7 +28,7 @@ use crate::snapshot::{LogLine, Snapshot};
 /// Largest number of open connections. Further connections get the status 503.
 pub const MAX_CONNECTIONS: usize = 64;
 
-/// Largest number of open connections from one other computer, so that connections remain for other computers.
+/// Largest number of open connections from one other computer. Connections thus remain for other computers.
 pub const MAX_PER_ADDRESS: usize = 16;
 
 /// Largest number of streams of snapshots, so that they leave room for files and tasks.
@@ -142,7 +142,7 @@ enum Stage {
     Streaming,
 }
 
-/// Newest snapshot that is not yet written as JSON, and the log lines since the last snapshot that was written.
+/// Newest snapshot that is not yet written as JSON. Also the log lines since the last written snapshot.
 #[derive(Debug, Default)]
 struct Inbox {
     snapshot: Option<Snapshot>,

@@ -144,7 +144,7 @@ impl<'a> Ground<'a> {
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)
     }
 
-    /// Returns the largest distance of two points of a profile, m: a quarter of a cell of the elevation model.
+    /// Returns the largest distance of two points of a profile, m. It is a quarter of a cell of the elevation model.
     pub const fn step_m(&self) -> f64 {
         self.step_m
     }

@@ -729,8 +729,8 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the profile of relay `index`: its own profile if it was collected, otherwise the mission's common
-    /// profile.
+    /// Returns the profile of relay `index`. It is its own profile if this was collected, otherwise the mission's
+    /// common profile.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);

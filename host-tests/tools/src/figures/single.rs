@@ -323,7 +323,7 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the cells of the caption's table, which compares the paper's averages with computed averages.
+/// Returns the cells of the caption's table. It compares the paper's averages with computed averages.
 ///
 /// The first row has the printed averages. Then there is a row for each kind of average, with the pair of powers
 /// whose averages are nearest to the printed averages. The last rows are for the pairs of powers that the figure

@@ -317,7 +317,7 @@ impl<'a> Search<'a> {
         Ok(crests.collect::<Result<Vec<_>, String>>()?.concat())
     }
 
-    /// Returns the candidate positions around each relay of `chain`, in steps of `step_m` along x and `climb_m` in
+    /// Returns the candidate positions around each relay of `chain`. The steps are `step_m` along x and `climb_m` in
     /// altitude.
     fn around(
         &self,

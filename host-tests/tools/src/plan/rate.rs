@@ -25,7 +25,8 @@ const MOST_SLOW: u16 = 20;
 /// Largest number of relays for which rates are computed, if the positions are optimised for the rate.
 const MOST_SEARCHED: u16 = 60;
 
-/// Number of relays up to which rates are always computed if each time slot is as long as its hop needs.
+/// Number of relays up to which rates are always computed with fitted time slots. A fitted slot is as long as its hop
+/// needs.
 ///
 /// The list is shorter only if so many relays do not fit on the line, or if it is proven that more relays do not
 /// increase the rate.

@@ -333,8 +333,8 @@ pub struct PlanReport {
     /// Name of the algorithm that found the relays' positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub how: Option<&'static str>,
-    /// True if it is proven that no positions are better, or for a requested SIR that no fewer relays suffice. False
-    /// if this is unknown; absent if there is no plan.
+    /// True if it is proven that no positions are better. For a requested SIR: that no fewer relays suffice. False if
+    /// this is unknown; absent if there is no plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
     /// Number of the paper's theorem, 1 to 3, that placed the only relay. 4 means one relay beside the line, and 5
