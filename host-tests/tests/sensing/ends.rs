@@ -43,7 +43,7 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     (0..count(20)).into_par_iter().map(one).collect()
 }
 
-/// Returns the first relay's estimate of the interference power at the receiver, W; `None` without one.
+/// Returns the first relay's estimate of the interference power at the receiver, W; `None` without an estimate.
 fn measured_at_rx(outcome: &Outcome) -> Option<f64> {
     match outcome.relays.first()?.believed.estimate {
         InterferenceEstimate::Source { receiver_w, .. } if receiver_w > 0.0 => {

@@ -800,7 +800,7 @@ impl Autopilot {
 }
 
 impl Autopilot {
-    /// Exchanges data with the relay of the same drone, in both directions, and handles the link's timeouts.
+    /// Exchanges data with the relay of the same drone, and handles the link's timeouts. Data go in both directions.
     ///
     /// In this documentation the *link* is this object, the link to the autopilot. A call takes five steps:
     ///
