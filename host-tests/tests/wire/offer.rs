@@ -79,8 +79,7 @@ pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     (digest, offer.number("version") as u16)
 }
 
-/// Returns the mission digest `digest` combined with the offer's positions of Tx and Rx, if the offer has these
-/// positions.
+/// Returns the mission digest `digest` combined with the Tx and Rx positions of `offer`, if any.
 pub(crate) fn between(offer: &WireMessage, digest: u16) -> u16 {
     let sites = &offer.body()[SITES_AT..KEPT];
     if sites.iter().all(|byte| *byte == 0) {

@@ -291,7 +291,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
     from(row.over_random_percent, PRINTED_PERCENT.0).max(from(other, PRINTED_PERCENT.1))
 }
 
-/// Describes in two paragraphs how many computed averages agree with the averages that the paper prints.
+/// Describes in two paragraphs how many computed averages agree with the paper's averages.
 fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);

@@ -44,7 +44,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     }
 }
 
-/// Returns the relays' positions and altitudes by the joint method; `None` if the method finds no positions.
+/// Returns the relays' positions and altitudes by the joint method. `None` if the method finds no positions.
 fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
     solved(mission, |index| {

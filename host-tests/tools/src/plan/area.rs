@@ -50,7 +50,8 @@ const ROUNDING_M: f64 = 0.01;
 /// Number of x, y and altitudes of the first grid, where they are free.
 const GRID: [u32; 3] = [40, 7, 5];
 
-/// Largest number of search windows around the relays, and factor on the width of a window that gains little.
+/// Largest number of search windows around the relays, and factor on the width of a window. The factor applies to a
+/// window that gains little.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
 /// Largest number of times that the windows begin again with their full width.

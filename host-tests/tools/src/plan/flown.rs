@@ -19,7 +19,7 @@ pub struct Flown {
     pub plan: Plan,
     /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
-    /// Data rate at the relays' positions, and the best rate found; both divided by the bandwidth, bit/s/Hz. Only for
+    /// Data rate at the relays' positions, and the best rate found. Both divided by the bandwidth, bit/s/Hz. Only for
     /// fitted slots (as long as each hop needs): the rate then counts instead of the SIR.
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.

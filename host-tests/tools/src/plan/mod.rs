@@ -408,7 +408,7 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the minimum separation of the relays does not cost any SIR, or if there is none.
+/// Returns true if the minimum separation of the relays does not cost any SIR, or if they have none.
 ///
 /// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR without the
 /// separation is not higher than with it, and `None` if it finds no chain.

@@ -168,7 +168,7 @@ pub struct FlownRelay {
     pub x_m: f32,
     /// Altitude of its position above the line between the sites, m.
     pub altitude_m: f32,
-    /// Interval of x, m, in which no hop gets worse while its neighbours are in theirs.
+    /// Interval of x, m, in which no hop gets worse while its neighbours are in their intervals.
     ///
     /// Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]

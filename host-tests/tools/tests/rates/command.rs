@@ -4,7 +4,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// Writes a scenario file: the default scenario with `rx_w` as power of Rx, W, and the section `[link]`.
+/// Writes a scenario file: the default one with `rx_w` as power of Rx, W, and the section `[link]`.
 fn scenario(rx_w: f64, link: &str) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     let powers = format!("uav_w = 1.0\nrx_w = {rx_w:?}\n");
