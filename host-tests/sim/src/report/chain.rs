@@ -422,7 +422,8 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
         .collect()
 }
 
-/// Returns the mission that the chain flies at the end of a run: the mission of `setup`, or an uploaded mission.
+/// Returns the mission that the chain flies at the end of a run. It is the mission of `setup`, or an uploaded
+/// mission.
 pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
     let version = version(outcome);
     let mut uploads = setup.uploads.iter().map(|spec| spec.upload);

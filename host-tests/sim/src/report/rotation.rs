@@ -12,7 +12,7 @@ use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSp
 pub struct RotationReport {
     /// Number of drones that are meant to fly.
     pub flying: u16,
-    /// Figures of runs in which drones with a low battery announce that they leave, and replacements join first.
+    /// Figures of runs in which tired drones announce that they leave. Replacements then join first.
     pub announced: RotationFigures,
     /// Losses instead of departures.
     ///

@@ -60,7 +60,7 @@ impl FleetSpec {
     }
 }
 
-/// Returns a geographic line of `distance_m` metres at an arbitrary place, for a scenario without such a line.
+/// Returns a geographic line of `distance_m` metres at an arbitrary place. It is for a scenario without such a line.
 ///
 /// The line leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {

@@ -72,7 +72,7 @@ pub enum TimelineEvent {
     Adopted(u16),
     /// The relay's setpoint controls its drone from now on: the pilot has handed the drone over.
     Engaged,
-    /// The relay's setpoint no longer controls its drone: the pilot, or the autopilot alone, flies the drone.
+    /// The relay's setpoint no longer controls the drone: the pilot or the autopilot alone flies it.
     Released,
     /// The autopilot no longer reports the position of the relay's drone.
     Blind,
@@ -82,7 +82,7 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The relay found that one other node's measurements do not agree with the measurements of the other nodes.
+    /// The relay found that the measurements of one node do not agree with the other nodes.
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
