@@ -373,8 +373,8 @@ fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     }
 }
 
-/// Checks that an attacker without the key can make relays report a duplicate, but makes no relay passive. A passive
-/// relay gets no setpoint.
+/// Checks that an attacker without the key makes no relay passive. The attacker can make relays report a duplicate. A
+/// passive relay gets no setpoint.
 #[test]
 fn forged_frames_make_no_relay_passive() {
     let mission = mission(3);

@@ -98,7 +98,7 @@ impl Medium {
         }
     }
 
-    /// Returns the receiver's index and the next bytes that have arrived there by `now`; `None` if no bytes have
+    /// Returns the receiver's index and the next bytes that have arrived there by `now`. `None` if no bytes have
     /// arrived.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
