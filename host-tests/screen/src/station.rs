@@ -68,7 +68,7 @@ struct Known {
     unleased_at: Option<Instant>,
     /// Slowly decaying maximum of the age that a report of this relay has when the next report arrives.
     longest_age: Duration,
-    /// Least distance from the setpoint, m, and its time; `None` while the drone need not fly to the setpoint.
+    /// Least distance from the setpoint, m, and its time. `None` while the drone need not fly to the setpoint.
     nearest: Option<(Instant, f32)>,
 }
 
