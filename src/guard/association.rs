@@ -92,8 +92,8 @@ impl Association {
         }
     }
 
-    /// Returns true if there is no neighbour on this side that flies to its setpoints. The chain ends here, or the
-    /// neighbour's drone is in manual control or on the ground.
+    /// Returns true if there is no neighbour on this side that flies to its setpoints. Either the chain ends here, or
+    /// the neighbour's drone is in manual control or on the ground.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }

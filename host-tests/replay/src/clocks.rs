@@ -20,8 +20,8 @@ const WINDOW: f64 = 20.0;
 /// this amount also counts.
 const STEP: f64 = 2.0;
 
-/// Maximum time without a common frame for which two files count as one flight, s. The same limit holds for the time between two frames of
-/// one flight.
+/// Maximum time without a common frame, s, up to which two capture files count as one flight. The same limit holds
+/// for the time between two frames of one flight.
 const APART: f64 = 3_600.0;
 
 /// Offset of a file's clock from the clock of the first file, with the quality of this offset.

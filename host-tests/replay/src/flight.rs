@@ -244,7 +244,7 @@ fn instant(at: f64) -> Instant {
     Instant::from_micros((at * 1e6).round() as u64)
 }
 
-/// State of the computation between two snapshots.
+/// State of the replay's computation between two snapshots of the flight.
 struct Recorder<'a> {
     reports: &'a [Report],
     loaded: Option<&'a Loaded>,
