@@ -12,12 +12,14 @@ const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
-    /// Line of sight between drones and the ground: the path-loss factor eta is `mu_los`, as between two drones.
+    /// Line of sight between drones and the ground. The path-loss factor eta of these links is `mu_los`, as between
+    /// two drones.
     Los,
-    /// Obstructed links between drones and the ground: the path-loss factor eta is `mu_nlos`, as between two ground
-    /// stations.
+    /// Obstructed links between drones and the ground. The path-loss factor eta of these links is `mu_nlos`, as
+    /// between two ground stations.
     Nlos,
-    /// Partial line of sight with the weight w, 0 to 1: the path-loss factor eta is w `mu_los` + (1 - w) `mu_nlos`.
+    /// Partial line of sight with the weight w, 0 to 1. The path-loss factor eta of links to the ground is w `mu_los`
+    /// + (1 - w) `mu_nlos`.
     Weighted(f64),
 }
 

@@ -27,7 +27,7 @@ const FRAMES: u64 = 8;
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain, as two numbers: 3 and 20 stand for
+/// Maximum fraction of the channel's capacity for the frames of an idle chain. The two numbers 3 and 20 stand for
 /// 3/20. The rest is for other messages, retransmissions, and waits for a free channel.
 const SHARE: [u64; 2] = [3, 20];
 

@@ -13,7 +13,7 @@ use crate::side::Side;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Event {
-    /// `Relay::setpoint` has changed: fly to the new setpoint, or hold the position if there is no setpoint.
+    /// `Relay::setpoint` has changed: fly to it, or without a setpoint hold the position.
     SetpointChanged,
     /// The chain has agreed on positions. If the interference is known, the chain has also agreed on a target SIR
     /// (`Relay::target`).
@@ -227,8 +227,8 @@ impl NodeEvent {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pending {
     events: u32,
-    /// Raised events that concern a node on one side: entry 0 for the upstream side, entry 1 for the downstream side.
-    /// Bit i stands for `NodeEvent::ALL[i]`.
+    /// Raised events that concern a node on one side. Entry 0 is for the upstream side, entry 1 for the downstream
+    /// side. Bit i stands for `NodeEvent::ALL[i]`.
     kinds: [u16; 2],
     nodes: [[u16; NodeEvent::ALL.len()]; 2],
 }

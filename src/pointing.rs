@@ -97,7 +97,7 @@ fn length(a: f32, b: f32) -> f32 {
     }
 }
 
-/// Returns the angle whose tangent is `opposite` / `adjacent`, rad, in the quadrant given by the two signs. 0 if both
+/// Returns the angle whose tangent is `opposite` / `adjacent`, rad. The two signs give the quadrant. 0 if both
 /// arguments are 0.
 fn angle(opposite: f32, adjacent: f32) -> f32 {
     let large = opposite.abs().max(adjacent.abs());

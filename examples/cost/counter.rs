@@ -13,8 +13,8 @@ pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
     before.wrapping_sub(SYST::get_current()) & TOP
 }
 
-/// Returns the number of instructions that `work` takes, without those of the measurement. The counter wraps after
-/// 780 000.
+/// Returns the number of instructions that `work` takes. The instructions of the measurement itself are not counted.
+/// The counter wraps after 780 000.
 pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
     let empty = ticks(|| ());
     // 128 ns at 168 MHz are 21.504 ticks, 2 688 / 125: the largest count of ticks times 125 is still a u32.

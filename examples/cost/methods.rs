@@ -53,7 +53,7 @@ impl Flight {
     }
 
     /// Runs the chain until all relays hold their agreed positions, for at most `turns` rounds of timers. Returns
-    /// true if they do.
+    /// true if all relays then hold them.
     fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {

@@ -62,7 +62,7 @@ pub(crate) fn paint() {
 
 /// Returns the number of stack bytes that no longer have the pattern of [`paint`].
 ///
-/// Its array is at the same stack addresses as that of [`paint`], and is not initialised.
+/// The array of this function is at the same stack addresses as the array of [`paint`], and is not initialised.
 #[inline(never)]
 pub(crate) fn unpainted_bytes() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();

@@ -80,8 +80,8 @@ struct SweepCost {
     settled: bool,
 }
 
-/// Prints the costs of a sweep (search for positions along the chain). They are measured for a mission with traffic
-/// in one direction, and for one with traffic in both.
+/// Prints the costs of a sweep (search for positions along the chain). The costs are measured for two missions: with
+/// traffic in one direction, and with traffic in both directions.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
@@ -207,8 +207,9 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions with which relay 1 of 100 computes the target SIR from the mission. It does so in
-/// several calls, before it sends any message. Prints the cost of the most expensive call, and the number of calls.
+/// Measures the instructions with which relay 1 of 100 computes the target SIR from the mission. The relay does this
+/// in several calls, before it sends its first message. Prints the cost of the most expensive call, and the number of
+/// calls.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);

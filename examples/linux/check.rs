@@ -2,7 +2,7 @@
 
 use uav_relay::{Duration, Instant};
 
-/// Result of one item of a check, as a text. An `Err` is red.
+/// Result of one item of a check, as a text. `Ok` is green, `Err` is red.
 pub type Finding = Result<String, String>;
 
 /// Returns the colour of an item of a check.

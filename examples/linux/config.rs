@@ -20,7 +20,8 @@ use crate::site::degrees;
 /// Settings that only the `--config` file can give, because they have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Path-loss parameters of the channel in the file; `None` for the default channel, that of the paper.
+    /// Path-loss parameters of the channel in the file. `None` for the default channel, which is the channel of the
+    /// paper.
     pub channel: Option<Channel>,
     /// Distribution of the interference along x given by the file, if any.
     pub field: Option<Interference>,
@@ -28,7 +29,7 @@ pub struct FileOnlySettings {
     pub profiles: Vec<(u16, Profile)>,
     /// Indices of the relays whose altitude the file fixes. The method chooses only the altitudes of the other relays.
     pub held: Vec<u16>,
-    /// Positions of the relays in the file's plan; empty without one.
+    /// Positions of the relays in the file's plan; empty without a plan.
     pub places: Vec<Placement>,
     /// Elevation model below the line from Tx to Rx, if the file has one.
     pub terrain: Option<TerrainSpec>,
@@ -111,7 +112,8 @@ impl FileOptions {
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
-    /// Adds an option whose value is a path relative to the file's folder, if the file has it.
+    /// Adds an option whose value is a path relative to the file's folder. Does nothing if the file has no value for
+    /// this option.
     pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
@@ -150,9 +152,10 @@ impl FileOptions {
         })
     }
 
-    /// Removes those options of the file that the command line also gives, or excludes by another option.
+    /// Removes the options of the file that the command line also gives or excludes by another option.
     ///
-    /// Returns the remaining options, and as overrides the removed ones whose value differs from the command line's.
+    /// Returns the remaining options, and the overrides. An override is a removed option whose value differs from the
+    /// value on the command line.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
@@ -202,7 +205,7 @@ fn value_of(line: &[OsString], name: &str) -> Option<String> {
 }
 
 /// Returns true if two values of an option are the same text, or the same list of numbers. An empty `other` also
-/// counts as the same, because an option without a value has an empty one.
+/// counts as the same, because an option without a value has an empty value.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
@@ -249,7 +252,7 @@ const EXCLUDES: [(&str, &[&str]); 6] = [
 /// `section` reads the file's section that only this program has.
 ///
 /// # Errors
-/// One line that says what is wrong with the file.
+/// One line that states the fault in the file.
 pub fn read<T: Parser>(
     section: fn(&Deployment, &mut FileOptions),
 ) -> Result<(Vec<OsString>, FileOnlySettings), String> {

@@ -54,8 +54,8 @@ pub struct RejectionReasons {
 }
 
 impl RejectionReasons {
-    /// Returns a text about a reason why frames are rejected; `None` if there is no new one. Each reason is returned
-    /// once. `signs` is true if this relay signs.
+    /// Returns a text about a reason why frames are rejected; `None` if there is no new reason. Each reason is
+    /// returned once. `signs` is true if this relay signs.
     pub fn next_reason(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.check_at {
             return None;

@@ -11,7 +11,7 @@ use uav_relay_scenario::number::{narrow, watts};
 
 use crate::log::Log;
 
-/// Maximum length of an input line, bytes; a longer one is rejected.
+/// Maximum length of an input line, bytes; a longer line is rejected.
 pub const LONGEST: usize = 200;
 
 /// Description of the permitted powers, for error messages.

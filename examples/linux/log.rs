@@ -15,7 +15,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use uav_relay::Instant;
 
-/// Maximum number of log lines waiting for the writer thread; further ones are dropped.
+/// Maximum number of log lines waiting for the writer thread; further lines are dropped.
 const QUEUE: usize = 1_024;
 
 /// Options of the log.

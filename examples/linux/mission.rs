@@ -125,10 +125,11 @@ impl MissionOptions {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// Returns the mission's parameters for `relays` relays. If `channel` is `None`, the channel is the paper's.
+    /// Returns the mission's parameters for `relays` relays. If `channel` is `None`, the channel is the channel of
+    /// the paper.
     ///
     /// # Errors
-    /// One line that says what is wrong.
+    /// One line that states the fault.
     pub fn config(
         &self,
         relays: u16,

@@ -65,7 +65,7 @@ impl Replug {
         self.tap = Some(tap);
     }
 
-    /// Closes a tty that has failed, and tries to reopen it when that is due. Logs each loss and each return once.
+    /// Closes a tty that has failed, and tries to reopen it when it is time. Logs each loss and each return once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {

@@ -79,8 +79,8 @@ impl Service {
     /// Handles signals and status requests, and reports to systemd's watchdog. Returns the time by which to call it
     /// again, if any.
     ///
-    /// `answer` returns the answer to a request. It gets `None` for a status request, or a command and its sender.
-    /// `who` names the program in the log line after a SIGHUP.
+    /// `answer` returns the answer to a request. The argument of `answer` is `None` for a status request; otherwise
+    /// it is a command and its sender. `who` names the program in the log line after a SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,

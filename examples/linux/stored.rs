@@ -37,7 +37,7 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
 }
 
 /// Returns the epoch of this start, which is one more than the number in `file`. The file is updated before the epoch
-/// is used, so that even a power failure never makes a relay use an epoch twice.
+/// is used, so that a relay never uses an epoch twice, even after a power failure.
 ///
 /// A missing file counts as the clock's seconds since 1970, so that the epoch does not restart from 1.
 ///
@@ -144,10 +144,11 @@ impl StoredFile {
         })
     }
 
-    /// Begins to write `record` unless it was written before. Returns true once its write has ended, even if it has
-    /// failed.
+    /// Begins to write `record`, unless it is already written. Returns true once the write has ended, even if the
+    /// write has failed.
     ///
-    /// After a failure the program flies on, because a drone in the air must not fall silent for a full disk.
+    /// After a failure the program flies on, because a drone in the air must not become silent because of a full
+    /// disk.
     pub fn store(&mut self, record: &[u8]) -> bool {
         if self.record.as_deref() != Some(record) {
             self.record = Some(record.to_vec());
@@ -159,8 +160,8 @@ impl StoredFile {
         is_tried
     }
 
-    /// Handles the end of a write, and begins the next write if there is one. A failed write is retried when due.
-    /// Returns the time of that retry, if any.
+    /// Handles the end of a write, and begins the next write if there is one. A failed write is retried after a
+    /// pause. Returns the time of the retry, if any.
     pub fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);

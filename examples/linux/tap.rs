@@ -16,7 +16,8 @@ use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, Interface};
 use crate::log::Log;
 use crate::replug::Replug;
 
-/// Maximum number of reads and writes that wait for the capture's writer thread. Further ones are not captured.
+/// Maximum number of reads and writes that wait for the capture's writer thread. Further reads and writes are not
+/// captured.
 const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
@@ -92,7 +93,7 @@ impl Tap {
     }
 }
 
-/// Captures all further traffic of `ttys` in the file `asked`. Logs the name of the file if another one had to be
+/// Captures all further traffic of `ttys` in the file `asked`. Logs the name of the file if another name had to be
 /// used.
 ///
 /// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if

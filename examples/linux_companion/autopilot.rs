@@ -63,7 +63,7 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Side of the neighbour that the drone's directional antenna points to; `None` without one.
+    /// Side of the neighbour that the drone's directional antenna points to. `None` without such an antenna.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
     /// Time of flight with a full battery, s, NaN if unknown; speeds of the return and of the descent, m/s.
@@ -80,7 +80,7 @@ pub(crate) enum Port {
 }
 
 impl Port {
-    /// Reads bytes from the autopilot's port; returns their number, or `None` if there are none.
+    /// Reads bytes from the autopilot's port; returns their number, or `None` if no byte was received.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> Option<usize> {
         let count = match self {
             Self::Tty(tty) => tty.read(into).ok(),
@@ -89,7 +89,7 @@ impl Port {
         count.filter(|count| *count > 0)
     }
 
-    /// Sends a frame; what a full tty does not take is lost.
+    /// Sends a frame. If the tty is full, the rest of the frame is lost.
     pub(crate) fn write(&mut self, frame: &[u8]) {
         match self {
             Self::Tty(tty) => drop(tty.write(frame)),
@@ -189,7 +189,7 @@ impl Companion {
         self.off_line.place(now)
     }
 
-    /// Exchanges bytes with the autopilot and data with the relay, and logs what has happened.
+    /// Exchanges bytes with the autopilot and data with the relay, and logs the events.
     pub(crate) fn exchange(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
         if let Port::Tty(tty) = &mut self.port {
             tty.tend(now, log);
@@ -230,8 +230,8 @@ impl Companion {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Reports a drone far from the line between transmitter and receiver, if a report is due. It goes to the log,
-    /// and may go to the operator.
+    /// Reports a drone far from the line between transmitter and receiver, if it is time for a report. The report
+    /// goes to the log, and may go to the operator.
     fn check_fence(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -280,7 +280,7 @@ impl Companion {
         })
     }
 
-    /// Returns the log text about a missing autopilot: its port, and what the operator has to check.
+    /// Returns the log text about a missing autopilot: its port, and the checks for the operator.
     fn unanswered(&self, answer: Received) -> String {
         match (answer, &self.port) {
             (Received::Nothing, Port::Udp(datagrams)) => {

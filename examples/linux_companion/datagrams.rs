@@ -54,7 +54,7 @@ impl Datagrams {
         })
     }
 
-    /// Reads one datagram; returns its length, 0 if there is none.
+    /// Reads one datagram; returns its length, 0 if no datagram was received.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> usize {
         let count = self.call(|socket| socket.recv(into));
         self.read += count as u64;
@@ -87,7 +87,7 @@ impl Datagrams {
         self.read
     }
 
-    /// Returns a text for the log about an address that does not answer, and what to check.
+    /// Returns a text for the log about an address that does not answer. The text names the things to check.
     pub(crate) fn silence(&self) -> String {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
@@ -136,7 +136,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that a refused datagram causes the loss of neither the next sent nor the next received one.
+    /// Checks that after a refused datagram neither the next sent nor the next received datagram is lost.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

@@ -13,13 +13,13 @@ const SETTLES: Duration = Duration::from_millis(3_000);
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
 /// Returns the reasons why the drone waits for its neighbours. The first is for the neighbour toward the transmitter,
-/// the second for the one toward the receiver. `None` if the drone does not wait.
+/// the second for the neighbour toward the receiver. `None` if the drone does not wait.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Log of the reasons why the drone waits for its neighbours. It has the logged reasons, and newer ones that have not
-/// lasted long enough to be logged.
+/// Log of the reasons why the drone waits for its neighbours. The log has the logged reasons, and newer reasons that
+/// have not lasted long enough to be logged.
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],

@@ -64,7 +64,8 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns what to log at `now` for a drone at `drone`, if anything, and the time of the next call.
+    /// Returns the setpoint or arrival to log at `now` for a drone at the position `drone`. `None` for nothing. Also
+    /// returns the time of the next call.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -122,7 +123,7 @@ impl Movement {
 
     /// Returns the drone's arrival at `goal`, if it must be logged; `None` otherwise.
     ///
-    /// `goal` is the agreed position, and `None` while the setpoint differs from it.
+    /// `goal` is the agreed position, and `None` while the setpoint differs from the agreed position.
     fn arrival(
         &mut self,
         now: Instant,

@@ -66,9 +66,9 @@ impl OffLineMonitor {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Returns the report of a drone outside its geofence, if one is due. The drone's position is `off_line`, or if
-    /// that is `None` the newest measured one. The geofence is the line between the Tx and Rx positions `sites`, with
-    /// the mission's `lateral` range on either side.
+    /// Returns the report of a drone outside its geofence, if it is time for a report. The drone's position is
+    /// `off_line`; if `off_line` is `None`, it is the newest measured position. The geofence is the line between the
+    /// Tx and Rx positions `sites`, with the mission's `lateral` range on either side.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -120,8 +120,8 @@ impl OffLineMonitor {
     }
 }
 
-/// Line between the positions of Tx and Rx. Also the line with their latitude and longitude swapped, if that is
-/// valid.
+/// Line between the positions of Tx and Rx. Also the line with latitude and longitude swapped, if the swapped
+/// positions are valid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,

@@ -66,7 +66,7 @@ impl Ports {
         }
     }
 
-    /// Reopens lost ttys when due; returns the time of the next attempt, if any.
+    /// Reopens lost ttys when it is time. Returns the time of the next attempt, if any.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         self.ttys()
             .filter_map(|tty| {

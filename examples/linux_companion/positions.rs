@@ -34,9 +34,10 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position and times received since the last call.
+    /// Returns the drone's newest position and times received since the last call.
     ///
-    /// The times are the remaining one of flight and that of the way home, s. Invalid times are NaN. Passes measurements to `on_sample` and logs the first invalid line. Work: that of [`Fifo::read`].
+    /// The times are the remaining time of flight and the time of the way home, s. Invalid times are NaN. Passes measurements to `on_sample` and
+    /// logs the first invalid line. The work is the work of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,

@@ -48,8 +48,8 @@ pub(crate) fn resume_views(
     Ok((StoredFile::new(VIEWS, file, stored)?, stored.is_some()))
 }
 
-/// Restores a mission that was uploaded before this start into `relay`. Returns true if there is one. `mission` is
-/// the mission of the relay's options, on which the upload is based.
+/// Restores a mission that was uploaded before this start into `relay`. Returns true if such a mission was restored.
+/// `mission` is the mission of the relay's options, on which the upload is based.
 ///
 /// An unusable file is logged and ignored.
 pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, log: &Log) -> bool {
@@ -72,7 +72,7 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
     })
 }
 
-/// Reads a mission that was uploaded before this start; `None` without one.
+/// Reads a mission that was uploaded before this start; `None` without such a mission.
 ///
 /// # Errors
 /// A line that names the file and the fault.

@@ -81,7 +81,7 @@ impl Report {
         );
     }
 
-    /// Logs the signing epoch, a number that rises at every start. `None` says that frames are not signed.
+    /// Logs the signing epoch, a number that rises at every start. `None` means that frames are not signed.
     pub(crate) fn signing(&self, epoch: Option<u32>) {
         match epoch {
             Some(epoch) => self.log.signed(epoch),
@@ -176,8 +176,8 @@ impl Report {
         }
     }
 
-    /// Logs a new setpoint, or the drone's arrival at its agreed position, if due. `drone` is the drone's present
-    /// position. Returns the time of the next check.
+    /// Logs a new setpoint, or the drone's arrival at its agreed position, if it is time for a line. `drone` is the
+    /// drone's present position. Returns the time of the next check.
     pub(crate) fn log_movement(
         &mut self,
         now: Instant,

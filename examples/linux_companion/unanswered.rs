@@ -5,14 +5,14 @@ use uav_relay::{Duration, Instant};
 /// Time without a HEARTBEAT after which a missing autopilot is reported. An autopilot sends one every second.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
-/// Kind of the data received from the autopilot's port since the start; the most specific kind counts.
+/// Kind of the data received from the autopilot's port since the start. The most specific kind is the result.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Received {
     /// No byte has been received from the autopilot's port.
     Nothing,
     /// Bytes were received, but no intact MAVLink 2 frame.
     Noise,
-    /// MAVLink 2 frames were received, but none from a known autopilot.
+    /// MAVLink 2 frames were received, but no frame from a known autopilot.
     Others,
 }
 
@@ -51,7 +51,7 @@ impl AnswerMonitor {
         self.reported
     }
 
-    /// Returns the kind of fault that was reported; `None` if none was, or if the autopilot is found.
+    /// Returns the kind of fault that was reported. `None` if no fault was reported, or if the autopilot is found.
     pub(crate) fn missing(&self) -> Option<Received> {
         self.newest.and(self.reported)
     }

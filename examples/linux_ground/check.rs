@@ -11,7 +11,8 @@ use crate::uploading::{Fault, Outcome};
 /// Age from which a report is too old.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Time for which all relays must be green. Only every eighth entry has neighbours and version.
+/// Time for which all relays must be green. The time has to be so long because only every eighth report of a relay
+/// has its neighbours and version.
 const GREEN_FOR: Duration = Duration::from_millis(2_000);
 
 /// Check of a chain in progress.
@@ -100,7 +101,7 @@ impl Check {
     }
 }
 
-/// Returns what is wrong with a relay before flight; nothing for a green one.
+/// Returns the faults of a relay before flight; an empty result for a green relay.
 fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'static str> {
     let Report {
         relay,

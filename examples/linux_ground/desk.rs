@@ -39,7 +39,7 @@ const OLDEST_S: f64 = 5.0;
 /// Largest number of characters of a task's answer in the log.
 const LOGGED: usize = 300;
 
-/// Time after a refused task in which further ones are not logged.
+/// Time after a refused task in which further refused tasks are not logged.
 const QUIET: Duration = Duration::from_millis(1_000);
 
 /// Largest number of tasks that are handled at once.
@@ -71,7 +71,7 @@ struct Confirmed {
 /// Tasks of the page and of the status socket.
 #[derive(Debug)]
 pub(crate) struct Desk {
-    /// Tasks of the page; `None` without one.
+    /// Tasks that the page gives to the program; `None` without a page.
     posts: Option<Receiver<Post>>,
     /// Number of previews so far.
     previews: u32,

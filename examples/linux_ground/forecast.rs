@@ -40,7 +40,7 @@ struct Chain {
 }
 
 impl Chain {
-    /// Creates simulated relays that fly the mission `flown`, or without it the one loaded before flight.
+    /// Creates simulated relays that fly the mission `flown`. With `None` they fly the mission loaded before flight.
     fn flying(loaded: &Loaded, flown: Option<&Upload>) -> Option<Self> {
         let relays = (1..=loaded.mission.relays()).map(|index| {
             let identity = Identity { network: 0, index };

@@ -7,7 +7,7 @@ use uav_relay_linux::log::Log;
 
 use crate::report;
 
-/// Time without an answer after which a relay counts as lost. It leaves time to repeat a handshake that was lost.
+/// Time without an answer after which a relay counts as lost. This time is enough to repeat a lost handshake.
 const LOST_AFTER: Duration = Duration::from_millis(5_000);
 
 /// State of a nearby relay that has answered this station at least once.

@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(500);
 
 const READS: usize = 16;
 
-/// Number of bytes read from the end of a file: enough for its last line and the one before.
+/// Number of bytes read from the end of a file: enough for its last two lines.
 const TAIL: u64 = 1_024;
 
 /// Minimum time between two measurements sent to the relays, so that they do not fill the channel.
@@ -35,8 +35,8 @@ enum Source {
     File(Watched),
 }
 
-/// Watched file with measurements. `seen` tells if the file has changed since the last read: its inode, its length,
-/// and its modification time in s and ns.
+/// Watched file with measurements. `seen` has its inode, its length, and its modification time in s and ns, by which
+/// a change since the last read is detected.
 #[derive(Debug)]
 struct Watched {
     path: PathBuf,

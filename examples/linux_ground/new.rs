@@ -66,7 +66,7 @@ pub(crate) struct NewOptions {
 /// companion's default position error.
 const ORDER_M: f32 = 2.0;
 
-/// Largest distance of a new line Tx-Rx from the present one, m, in addition to the new line's length. A new line
+/// Largest distance of a new line Tx-Rx from the present line, m, in addition to the new line's length. A new line
 /// farther away is rejected, because the drones' positions could not be converted to it.
 const FAR_M: f64 = 100_000.0;
 
@@ -80,8 +80,8 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Returns the mission loaded before flight as the basis of a new one. `sited` are its Tx and Rx positions, if
-    /// given.
+    /// Returns the mission loaded before flight as the basis of a new mission. `sited` are its Tx and Rx positions,
+    /// if given.
     pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
         Self {
             config: *loaded.config(),
@@ -90,8 +90,8 @@ impl Basis {
         }
     }
 
-    /// Returns an uploaded mission as the basis of a new one. If the upload has no Tx and Rx positions, they are
-    /// `sited`.
+    /// Returns an uploaded mission as the basis of a new mission. If the upload has no Tx and Rx positions, the basis
+    /// has the positions `sited`.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),
@@ -248,8 +248,8 @@ impl NewOptions {
     }
 }
 
-/// Returns an error if the new line Tx to Rx is too far from the present one. The drones' positions could then not be
-/// converted to the new line.
+/// Returns an error if the new line Tx to Rx is too far from the present line. The drones' positions could then not
+/// be converted to the new line.
 fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String> {
     let away_m = |tx, rx| {
         let ends = [tx, rx].map(|site| before.away_m(site).unwrap_or(f64::INFINITY));

@@ -107,7 +107,8 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     log.event(now, "current", fields, what);
 }
 
-/// Returns the error text for an upload that relay `by` refused. It names the value that most likely caused it.
+/// Returns the error text for an upload that relay `by` refused. The text names the value that most likely caused the
+/// refusal.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("upload of version {version} refused by relay {by}, or by a relay beyond it");
@@ -129,7 +130,7 @@ pub(crate) struct FenceViolation {
 
 impl FenceViolation {
     /// Returns the first value of `upload` that exceeds the geofence, if any. The relays are assumed to have the
-    /// default geofence, that of the loaded mission.
+    /// default geofence, which is the geofence of the loaded mission.
     pub(crate) fn of(loaded: &Mission, upload: &Upload) -> Option<Self> {
         let (loaded, new) = (loaded.config(), upload.config());
         let fence = |config: &MissionConfig| {

@@ -77,7 +77,8 @@ impl Web {
         Ok((web, posts))
     }
 
-    /// Shows a snapshot if it is due; returns the time of the next one. It does not wait for a browser.
+    /// Shows a snapshot if it is time for the next one. Returns the time of the next snapshot. The function does not
+    /// wait for a browser.
     pub(crate) fn turn(
         &mut self,
         now: Instant,

@@ -49,7 +49,7 @@ struct Station<'a> {
 /// Runs the station until the chain flies the new mission; with `--stand` until SIGINT or SIGTERM.
 ///
 /// # Errors
-/// One line that says why it could not start, or why the chain does not fly the mission.
+/// One line that states why the station could not start, or why the chain does not fly the mission.
 pub(crate) fn stand(plan: &Plan) -> Result<(), Fault> {
     let mut station = Station::begin(plan)?;
     station.service.ready();

@@ -36,7 +36,7 @@ impl Elevation {
         })
     }
 
-    /// Returns the profile of a line; `None` if the elevation files do not have all of it.
+    /// Returns the profile of a line; `None` if the elevation files do not cover the whole line.
     ///
     /// # Errors
     /// One line with the reason, once for each line.

@@ -16,7 +16,7 @@ use uav_relay_screen::Tiles;
 /// Largest size of a picture or a directory, bytes.
 const MOST: usize = 4 * 1024 * 1024;
 
-/// File that is read where it is. A memory map would end the program if another one truncated the file.
+/// File that is read with ordinary reads. A memory map would end this program if another program truncated the file.
 struct Archive(File);
 
 impl Archive {
@@ -71,7 +71,7 @@ impl AsyncBackend for Archive {
     }
 }
 
-/// Returns the result of a future that never waits; `None` for one that does.
+/// Returns the result of a future that never waits; `None` for a future that waits.
 fn at_once<T>(future: impl Future<Output = PmtResult<T>>) -> PmtResult<Option<T>> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(result) => result.map(Some),

@@ -56,7 +56,8 @@ enum Stage {
     /// Waiting until a relay reports the mission that it flies, with its values. `Some` is the time at which a relay
     /// first reported only the mission's version.
     Querying(Option<Instant>),
-    /// A thread computes the relays' new positions. The time is that of the next look at it.
+    /// A thread computes the relays' new positions. The field is the time of the next check if the thread has
+    /// finished.
     Computing(Instant),
     Confirming,
     Uploading,
@@ -90,7 +91,8 @@ pub(crate) struct Preview {
 pub(crate) struct Uploading {
     /// Values of the page; `None` for an upload of the command line.
     form: Option<Form>,
-    /// Version of the new mission; `None` until the version of the flown one is known, which is one less.
+    /// Version of the new mission; `None` until the version of the flown mission is known. The new version is one
+    /// more.
     version: Option<u16>,
     stage: Stage,
     /// Mission to upload; `None` until a relay has reported the mission that it is based on.
@@ -112,7 +114,7 @@ pub(crate) struct Uploading {
 impl Uploading {
     /// Starts an upload by asking the chain for the mission that it flies.
     ///
-    /// `version` is that of the command line. The page's `form` gets the next version.
+    /// `version` is the version on the command line. The page's `form` gets the next version.
     pub(crate) fn begin(
         now: Instant,
         plan: &Plan,
@@ -152,7 +154,7 @@ impl Uploading {
         self.is_confirming() && self.form.is_none()
     }
 
-    /// Returns true if nothing is under way, so that another upload may replace this one.
+    /// Returns true if no upload is in progress, so that another upload may replace this upload.
     pub(crate) const fn is_idle(&self) -> bool {
         self.has_ended() || self.is_confirming() && self.form.is_some()
     }
@@ -162,7 +164,7 @@ impl Uploading {
         self.form.as_ref().map(|form| form.number)
     }
 
-    /// Returns the preview for the page; `Null` before there is one.
+    /// Returns the preview for the page; `Null` without a preview.
     pub(crate) const fn shown(&self) -> &Value {
         &self.shown
     }
@@ -194,7 +196,7 @@ impl Uploading {
         }
     }
 
-    /// Uploads what the page has previewed, if the chain still flies the mission of the preview.
+    /// Uploads the previewed mission, if the chain still flies the mission on which the preview is based.
     ///
     /// # Errors
     /// The reason why this preview cannot be uploaded, or not again.
@@ -276,7 +278,7 @@ impl Uploading {
         self.finish(ground, outcome)
     }
 
-    /// Records the result of an upload that has ended. A failed one is no longer offered to the chain.
+    /// Records the result of an upload that has ended. A failed upload is no longer offered to the chain.
     fn finish(&mut self, ground: &mut Ground, outcome: Outcome) -> Outcome {
         if let Some(outcome) = &outcome {
             self.stage = Stage::Ended;

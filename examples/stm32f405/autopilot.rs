@@ -126,8 +126,8 @@ impl Autopilot {
         self.link.handle_event(event);
     }
 
-    /// Sends the autopilot frames for the relay's state; returns the time of the next call. `now` must be that of
-    /// [`listen`](Self::listen).
+    /// Sends the autopilot frames for the relay's state; returns the time of the next call. `now` must be the `now`
+    /// of the call of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &mut Relay) -> Instant {
         // Its ports have been served since the last exchange: the newest setpoint is sent in this turn.
         self.link.exchange(relay, now);

@@ -11,7 +11,7 @@ pub const NETWORK: u16 = 7;
 
 /// Returns the mission of the paper's chain with `relays` relays, without a minimum separation.
 ///
-/// Its path losses are those of the f64 reference model.
+/// Its path losses are as in the f64 reference model.
 ///
 /// # Panics
 /// No mission has this number of relays.

@@ -109,7 +109,7 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
 }
 
 /// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list. Without a
-/// profile of its own, a relay has the mission's common one.
+/// profile of its own, a relay has the mission's common profile.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();

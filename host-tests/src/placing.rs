@@ -16,7 +16,7 @@ use uav_relay_sim::simulator::outcome::Outcome;
 /// Relative spacing of f32 numbers: the machine epsilon, 2^-23.
 pub const SINGLE: f64 = f32::EPSILON as f64;
 
-/// Returns the profile of relay `index`: its entry in `own` if any, else the mission's common one.
+/// Returns the profile of relay `index`: its entry in `own` if any, else the common profile.
 pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
     own.iter()
         .find(|(of, _)| *of == index)
@@ -25,7 +25,7 @@ pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Prof
 
 /// Returns the agreement that the leader of the chain predicts; `None` if no target SIR can be met.
 ///
-/// `own` has the relays whose profile differs from the common one.
+/// `own` has the relays whose profile differs from the common profile.
 pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
     let of = |index| profile_of(mission, own, index);
     plan::solve(mission, Schedule::Bracketed, of).ok()
@@ -146,7 +146,7 @@ pub struct Mixed {
 }
 
 impl Mixed {
-    /// Simulates a chain of unlike relays, checks that it meets its agreed target SIR, and adds it to the counts.
+    /// Simulates a chain of unlike relays and counts it. Checks that the chain meets its agreed target SIR.
     ///
     /// The SIR must not exceed the optimum.
     pub fn meet_what_they_agree_on(&mut self, link: &Link) {
@@ -186,7 +186,7 @@ pub struct DrawnHop {
     pub index: u16,
     /// Distance of the hop's sender from Tx along the line to Rx, m.
     pub from: f32,
-    /// SIR of the hop without noise, linear, if the receiver is equally far from the sender and the interferer.
+    /// SIR of the hop without noise, linear, if sender and interferer are equally far from the receiver.
     pub gain: f64,
     relays: u16,
 }
@@ -228,7 +228,7 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
 
 /// Counters of hops for which the receiver's farthest x that meets a target SIR was tested.
 ///
-/// The crate's x is compared with that of the reference.
+/// The crate's x is compared with the x of the reference.
 #[derive(Debug, Default)]
 pub struct Reaches {
     /// Number of hops whose receiver cannot be as far as Rx, because the target SIR limits its x.

@@ -21,7 +21,8 @@ struct Function {
     /// Unit of the absolute error, as a text.
     unit: &'static str,
     error: Error,
-    /// Range of the test points x. The points of a range above 0 are spaced logarithmically, those of others evenly.
+    /// Range of the test points x. The points of a range above 0 are spaced logarithmically, the points of other
+    /// ranges evenly.
     range: [f64; 2],
     /// Function that maps a test point x to the arguments of the tested function. A tested function of one argument ignores the second
     /// argument.

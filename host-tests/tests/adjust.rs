@@ -49,7 +49,7 @@ fn judged(link: &Link, outcome: &Outcome) -> (f64, f64) {
     (sir(link, &places).unwrap(), apart)
 }
 
-/// Runs Algorithm 2's search of one relay to its end. Returns a position better than the relay's present one, if
+/// Runs Algorithm 2's search of one relay to its end. Returns a position better than the relay's present position, if
 /// found.
 fn searched(mut search: LocalSearch) -> Option<Placement> {
     loop {

@@ -89,7 +89,7 @@ fn the_recorded_places_reach_the_recorded_optimum() {
     }
 }
 
-/// Checks that the recorded optima agree with those of a joint solver and of a general optimiser.
+/// Checks that the recorded optima agree with a joint solver and with a general optimiser.
 ///
 /// Both are separate programs. The general optimiser searches all (x, y, h) from 24 starts.
 #[test]
@@ -284,7 +284,8 @@ fn closing_in(low: f64, high: f64, steps: i32, grids: u32, of: impl Fn(f64) -> f
     best.0
 }
 
-/// Checks that the recorded optimal SIR of a chain with one relay equals that of a search. The search varies the relay's x, y and altitude.
+/// Checks that the recorded optimal SIR of a chain with one relay equals the result of a search. The search varies
+/// the relay's x, y and altitude.
 #[test]
 fn one_relay_agrees_with_brute_force() {
     let plane = of("figures aside").step_by(18);

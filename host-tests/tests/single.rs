@@ -93,7 +93,7 @@ fn the_algorithm_agrees_with_the_reference() {
     assert!(same > 400);
 }
 
-/// Checks a field of interference in which the first target SIR that can be met is not the best one.
+/// Checks a field of interference in which the first target SIR that can be met is not the best.
 ///
 /// That target is 0.00998, the best SIR 0.12195. Upsilon = E[1/I] (I is the interference power) is 0.1, and from x =
 /// 90 m on it is 100.

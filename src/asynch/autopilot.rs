@@ -87,7 +87,7 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers at a setpoint.
+    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }

@@ -17,7 +17,8 @@ use crate::stats::bump;
 use crate::time::{Duration, Instant};
 use crate::wire::frame::{FrameBuf, MAX_FRAME};
 
-/// Pause before a port that has failed or ended is used again, in byte times (128: 11 ms at 115 200 baud).
+/// Pause before a port that has failed or ended is used again, in byte times. 128 byte times are 11 ms at 115 200
+/// baud.
 const PAUSE: u32 = 128;
 
 /// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.

@@ -13,7 +13,7 @@ pub(crate) use in_noise::InNoise;
 /// range than all measurements.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
-/// Point of a [`Field`]: an x, and Upsilon = E[1/I], the mean of the inverse interference power at this x.
+/// Point of a [`Field`]: an x, and Upsilon = E[1/I] at this x. Upsilon is the mean of the inverse interference power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FieldPoint {

@@ -37,10 +37,10 @@ const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 /// Maximum number of relays whose reports are stored, 11 KB in all; 0 without the feature `telemetry`.
 const REPORTED: usize = if TELEMETRY { 128 } else { 0 };
 
-/// Interval between two requests for the reports of all relays; each request goes to another relay in reach.
+/// Interval between two requests for the reports of all relays. Each request goes to another relay in reach.
 const WATCH_EVERY: Duration = Duration::from_millis(5_000);
 
-/// Number of unanswered hellos to one relay, after which the station sends its hellos to the next relay.
+/// Number of unanswered hellos to one relay, after which the station sends hellos to the next relay.
 const QUERIES_PER_RELAY: u8 = 3;
 
 /// Ground station at the transmitter or the receiver: uploads missions and reports interference. Sans-IO.
@@ -86,7 +86,7 @@ pub struct Ground {
     /// Distance of the relay that is polled now, in relays along the chain: 1 for the nearest.
     distance: u16,
     unanswered: u8,
-    /// Newest mission that the polled relay has stored, by its last hello; `None` until a hello is received.
+    /// Newest mission that the polled relay has stored, by its last hello. `None` until a hello is received.
     relay_mission: Option<MissionId>,
     /// True from a hello to the polled relay until that relay's next hello, which is the reply.
     query_sent: bool,
@@ -782,7 +782,7 @@ pub enum Progress {
         /// is farther from the station.
         by: u16,
     },
-    /// The upload is outdated: a relay has stored a newer mission, or another mission with the same version.
+    /// The upload is outdated: a relay has stored a newer mission, or another one with the same version.
     Outdated {
         /// Version of the newer mission that the relay has stored.
         version: u16,

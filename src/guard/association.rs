@@ -56,7 +56,7 @@ pub(super) struct Association {
     /// True while the messages to the neighbour request an open chain. In an open chain all relays are at least the
     /// minimum separation apart along x.
     open_sent: bool,
-    /// Number of reminders, one per second, until the neighbour's halt request expires; 0 without a halt request.
+    /// Number of reminders, one per second, until the neighbour's halt request expires. 0 without a halt request.
     halt_reminders_left: u8,
     /// True while the messages to the neighbour request that the chain halts.
     halt_sent: bool,
@@ -92,8 +92,8 @@ impl Association {
         }
     }
 
-    /// Returns true if there is no neighbour on this side that flies to its setpoints. The chain ends here, or the
-    /// neighbour's drone is in manual control or on the ground.
+    /// Returns true if there is no neighbour on this side that flies to its setpoints. Either the chain ends here, or
+    /// the neighbour's drone is in manual control or on the ground.
     pub(super) const fn has_no_flown_neighbour(&self) -> bool {
         self.node == 0 || self.is_absent()
     }
@@ -104,9 +104,9 @@ impl Association {
         (self.seen_m, self.seen_reminders_left) = (x_m, SEEN_REMINDERS);
     }
 
-    /// Returns the distance along x by which this relay is on the correct side of its neighbour at `side`, m. The
-    /// neighbour's last received x counts. The result is negative on the wrong side, and NaN if a position is
-    /// unknown.
+    /// Returns the distance, m, by which this relay is on the correct side of its neighbour along x. The neighbour is
+    /// at `side`. The neighbour's last received x counts. The result is negative on the wrong side, and NaN if a
+    /// position is unknown.
     fn beyond_m(&self, own: &Own, side: Side) -> f32 {
         let x_m = own.reported.map_or(f32::NAN, |place| place.x_m);
         match side {
@@ -187,7 +187,7 @@ impl Association {
         }
     }
 
-    /// Returns true if a message belongs to an association (session) that this relay or its neighbour has left. If
+    /// Returns true if a message belongs to a left association (session). This relay or its neighbour has left it. If
     /// this relay has left the association, its leave notice is sent again, until the neighbour starts a new
     /// association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
@@ -216,7 +216,7 @@ impl Association {
         self.leave_notice.is_some()
     }
 
-    /// Returns the notice that this relay has left the association (session) with its neighbour; `None` if no notice
+    /// Returns the notice that this relay has left the association (session) with its neighbour. `None` if no notice
     /// must be sent.
     pub(super) fn poll_leave_notice(&mut self) -> Option<Fence> {
         let leave_notice = self.leave_notice.as_mut()?;
@@ -300,7 +300,7 @@ impl Association {
         self.seen_reminders_left = self.seen_reminders_left.saturating_sub(1);
     }
 
-    /// Returns the pending message of a relay that does not fly to setpoints or has just started; `None` if there is
+    /// Returns the pending message of a relay that does not fly to setpoints or has just started. `None` if there is
     /// none.
     ///
     /// The message contains the relay's position, and a halt request to forward. The message is valid without an
@@ -332,7 +332,7 @@ pub(super) struct KeepOut {
     /// Number of the nearest lost node on this side, and the limit of x because of lost nodes, m. `None` if no node
     /// is lost.
     lost: Option<(u16, f32)>,
-    /// x at which this relay will be the minimum separation away from a lost relay, m; NaN if no lost relay is near.
+    /// x at which this relay will be the minimum separation away from a lost relay, m. NaN if no lost relay is near.
     /// Until this relay is at this x, perhaps only lateral offset and altitude keep the two apart.
     near_m: f32,
     /// True if a lost relay was last reported on the wrong side of this relay along x.
@@ -479,8 +479,8 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay has the minimum separation from the lost relay, at x =
-    /// `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
+    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. It has the minimum
+    /// separation at x = `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {
             if let Some((_, limit_m)) = &mut self.lost {

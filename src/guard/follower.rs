@@ -210,9 +210,9 @@ impl FenceFollower {
         self.has_fence() && own.is_close(own.target_m() - self.target_m)
     }
 
-    /// Agrees to the distance along x that the neighbour upstream requests, unless this distance is too small. This
-    /// relay's two neighbours must stay at least the separation apart: the requested distance plus `downstream_m`,
-    /// the distance to the neighbour downstream, must be at least the separation.
+    /// Agrees to the distance along x that the neighbour upstream requests, if it is large enough. This relay's two
+    /// neighbours must stay at least the separation apart: the requested distance plus `downstream_m`, the distance
+    /// to the neighbour downstream, must be at least the separation.
     pub(super) fn agree(&mut self, own: &Own, downstream_m: f32) {
         let missing_m = own.config.separation_m - self.requested_m;
         let enough = missing_m <= downstream_m + own.config.rounding();

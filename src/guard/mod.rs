@@ -496,8 +496,8 @@ impl Guard {
         follower || owner || leaves
     }
 
-    /// Returns true if the setpoint is the agreed position, and a report has shown the relay at this position since
-    /// then. The agreed position is limited to the geofence.
+    /// Returns true if the setpoint is the agreed position and a report has shown the relay there. The agreed
+    /// position is limited to the geofence.
     pub fn has_arrived(&self) -> bool {
         let own = &self.own;
         match (own.target, own.setpoint) {
@@ -550,7 +550,7 @@ impl Guard {
         }
     }
 
-    /// Returns the reason why a move toward `side` has waited for five seconds; `None` if no move has waited so long.
+    /// Returns the reason why a move toward `side` has waited for five seconds. `None` if no move has waited so long.
     /// The reason is `NotFlown` if the neighbour does not fly to setpoints, else `Pending`.
     fn pending(&self, side: Side) -> Option<HoldReason> {
         let own = &self.own;

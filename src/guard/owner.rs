@@ -19,13 +19,13 @@ pub(super) struct FenceOwner {
     /// x of the newest fence that this relay has announced, m; infinite if there is none. The neighbour downstream
     /// stays beyond this x.
     fence_m: f32,
-    /// Distance along x that this relay asks to keep before its fence, m; infinite until this relay asks for a
+    /// Distance along x that this relay asks to keep before its fence, m. Infinite until this relay asks for a
     /// distance.
     requested_m: f32,
     /// Distance along x that must be kept to the downstream neighbour now, m. It is the agreed distance, or a larger
     /// distance that was requested later. Infinity stands for the minimum separation.
     agreed_m: f32,
-    /// Lowest x that the downstream neighbour may reach, m; negative infinity until a message of this neighbour is
+    /// Lowest x that the downstream neighbour may reach, m. Negative infinity until a message of this neighbour is
     /// received.
     follower_low_m: f32,
     /// x of the position that the chain has agreed on for the neighbour toward Rx, m.

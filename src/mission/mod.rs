@@ -567,7 +567,8 @@ impl Mission {
         }
     }
 
-    /// Returns the receiver noise divided by the interferer's power received at 1 m, 1/m^2: nu = N eta / `p_MSI`.
+    /// Returns the receiver noise divided by the interferer's power received at 1 m, 1/m^2. This is nu = N eta /
+    /// `p_MSI`.
     ///
     /// The result is 0 without noise. It is also 0 in an interference field, because Upsilon of the field includes
     /// the noise.
@@ -608,7 +609,8 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, which computes its position first: 1, or N in an interference field.
+    /// Returns the index of the leader, the first relay to compute its position. It is 1, or N in an interference
+    /// field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -616,7 +618,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay whose position is computed after the position of relay `index`; `None` if relay `index` is
+    /// Returns the relay whose position is computed after the position of relay `index`. `None` if relay `index` is
     /// the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
@@ -672,10 +674,10 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Returns G, m^2, which determines the optimal position of a single relay that sends with `power_w` watts. G is
-    /// K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is (`p_u` /
-    /// `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and of Tx.
-    /// `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
+    /// Returns G, m^2, which determines the optimal position of a single relay. The relay sends with `power_w` watts.
+    /// G is K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is
+    /// (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and
+    /// of Tx. `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
     /// ground.
     #[doc(hidden)]
     pub fn last_to_first(&self, power_w: f32) -> f64 {
@@ -735,8 +737,8 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, at which the relays between it and Rx still have room for their
-    /// minimum separation.
+    /// Returns the largest x of relay `index`, m, that leaves enough room toward Rx. The relays between it and Rx
+    /// then have room for their minimum separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }

@@ -30,8 +30,8 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply, if the relays on the path do long computations before they forward the message.
-/// Their frames are then twice as long, and each relay may take thirty steps of a computation.
+/// Factor on the wait for a reply if the relays on the path compute for long. They do so before they forward the
+/// message. Their frames are then twice as long, and each relay may take thirty steps of a computation.
 const SLOW: u32 = 4;
 
 /// Number of retransmissions after which the wait before the next retransmission no longer doubles. After n
@@ -95,7 +95,7 @@ pub(crate) struct Circulation {
     is_lossy: bool,
     /// Number of further messages for which the channel still counts as lossy, after a lost message.
     lossy_messages: u8,
-    /// Number of times that the reply will still be repeated without a request, because the channel is lossy.
+    /// Number of times that the reply will still be repeated without a request. Reason: the channel is lossy.
     replies_left: u8,
     jitter: Jitter,
     timer: Option<Instant>,

@@ -71,7 +71,7 @@ pub(crate) struct Context<'a> {
     pub(crate) member: &'a Member,
     /// Identifier of the newest mission that this relay has stored. The active mission may still be an older mission.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last relay of its chain: it has no neighbour on the side away from the leader.
+    /// True if this relay is the last of its chain: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,
     /// Remaining lease times of other relays. Until they have ended, the positions of a new view must not be used.
     pub(crate) other_leases: OtherLeases,
@@ -214,7 +214,7 @@ pub(crate) struct Effects {
     /// Neighbour that has replied to a message of this relay, and the time at which that message was sent. The reply
     /// proves that the neighbour was alive after that time. `None` without a reply.
     pub(crate) alive: Option<(Peer, Instant)>,
-    /// Origin of the view proposal that this relay has received or made in this step; `None` without a proposal.
+    /// Origin of the view proposal that this relay has received or made in this step. `None` without a proposal.
     pub(crate) proposed_by: Option<Proposer>,
     /// True while a view proposal awaits its decision. During this time no pass (message along the chain) continues.
     pub(crate) view_proposed: bool,
@@ -230,7 +230,7 @@ pub(crate) enum Ignored {
     Duplicate,
 }
 
-/// Neighbour of a relay: the previous or the next relay, in the order from the leader to the last relay.
+/// Neighbour of a relay: the previous or the next relay. The order is from the leader to the last relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Peer {
     Next,

@@ -58,15 +58,15 @@ const FIRST_CLAIM: Duration = Duration::from_millis(250);
 /// relays need for their first agreement. A relay that becomes active again waits as long.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum of the doubling intervals between claims that this relay sends to its node number without a request. Later
-/// claims follow every `dead_after`.
+/// Maximum of the doubling intervals between claims to this relay's node number. These claims are sent without a
+/// request. Later claims follow every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
 /// Number of claims by which this relay defends its node number against another node's claim. The interval between
 /// these claims is [`least_interval`].
 const DEFENCES: u8 = 32;
 
-/// Number of claims that this relay sends after a frame that has its own node number but states no claim.
+/// Number of claims that this relay sends after a frame with its own node number but without a claim.
 ///
 /// With signed frames: number of claims that this relay sends after it has raised its claim number.
 const REPEATED_CLAIMS: u8 = 8;
@@ -94,8 +94,8 @@ pub(crate) struct IndexClaims {
     /// Last contact with another node of this node number: its time, and a flag. The flag is true if this relay
     /// already had a position at the first contact. `None` without a contact.
     contest: Option<(Instant, bool)>,
-    /// Times at which two nodes were last seen to use this relay's number (entry 0), or a neighbour's number (entry
-    /// 1).
+    /// Times at which two nodes were last seen to use one number. Entry 0 is for this relay's number, entry 1 for a
+    /// neighbour's number.
     observed: [Option<Instant>; 2],
     /// Time at which this relay last received one of its own frames; `None` if none has been received.
     echoed: Option<Instant>,

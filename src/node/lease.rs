@@ -89,8 +89,8 @@ pub(crate) struct Lease {
     circulation: Circulation,
     /// Orders of the leader in the last renewal of this view.
     orders: Orders,
-    /// Requests that the last completed renewal of this view has collected, from the last relay to this relay. `None`
-    /// until a renewal is completed.
+    /// Requests collected by the last completed renewal of this view, from the last relay to this relay. `None` until
+    /// a renewal is completed.
     requests: Option<Requests>,
     /// Requests of this relay, and its knowledge of departures. Empty without the feature `departures`.
     departures: [Departures; DEPARTURES as usize],
@@ -102,8 +102,8 @@ struct Departures {
     requests: Requests,
     /// Number of relays of the view when no relay requested to leave.
     complement: u16,
-    /// Relay that requests to leave, 0 for none, and the time since which this relay requests it, also in earlier
-    /// views.
+    /// Relay that requests to leave, 0 for none, and the time of its first request. Requests in earlier views count,
+    /// too.
     leaver: (u16, Instant),
     /// Time of the first renewal of this view: all relays then had new positions.
     settled_at: Instant,

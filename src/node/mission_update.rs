@@ -112,7 +112,7 @@ pub(crate) struct MissionUpdate {
 /// State of mission uploads, which only builds with the feature `upload` have.
 #[derive(Clone, Copy, Debug)]
 struct Uploads {
-    /// Newest mission that was uploaded to this relay; `None` if it has only the mission loaded before flight.
+    /// Newest mission that was uploaded to this relay. `None` if it has only the mission loaded before flight.
     upload: Option<Upload>,
     /// Positions of Tx and Rx that the active mission states; `None` if the configured positions apply. All x are
     /// measured along the line between them.
@@ -387,7 +387,7 @@ impl MissionUpdate {
         Ok(mission)
     }
 
-    /// Returns the stored mission if it was uploaded; `None` if only the mission loaded before flight is known.
+    /// Returns the stored mission if it was uploaded. `None` if only the mission loaded before flight is known.
     pub(crate) const fn upload(&self) -> Option<&Upload> {
         match self.uploads() {
             Some(uploads) => uploads.upload.as_ref(),
@@ -446,8 +446,8 @@ impl MissionUpdate {
         between(member.digest, self.sites())
     }
 
-    /// Replaces the Tx and Rx positions in use by the positions of the stored mission, which becomes active. Returns
-    /// true if the positions have changed, which makes all relay positions invalid.
+    /// Replaces the Tx and Rx positions in use by the positions of the stored mission. This mission becomes active.
+    /// Returns true if the positions have changed, which makes all relay positions invalid.
     pub(crate) fn use_sites(&mut self) -> bool {
         let sites = self.upload().and_then(Upload::sites);
         let uploads = self.uploads.first_mut();

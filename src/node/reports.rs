@@ -32,26 +32,28 @@ use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 /// Time for which a relay sends reports after its last Watch. A Watch is a ground station's request for reports.
 const WATCHED: Duration = Duration::from_millis(60_000);
 
-/// Time for which a relay sends its reports to the node from which it received the last Watch (request for reports).
-/// Four lost Watches in a row do not change this destination.
+/// Time for which a relay sends its reports to the sender of the last Watch. A Watch is a request for reports. Four
+/// lost Watches in a row do not change this destination.
 const DESTINED: Duration = Duration::from_millis(25_000);
 
 /// Time without any frame from a relay after which no more reports are sent to it.
 const UNHEARD: Duration = Duration::from_millis(2_500);
 
-/// Time without a report from a relay after which the Watch (request for reports) to this relay is repeated.
+/// Time without a report from a relay after which the Watch to it (request for reports) is repeated.
 const UNCONFIRMED: Duration = Duration::from_millis(3000);
 
-/// Maximum number of times that the interval doubles between repetitions of a Watch (request for reports).
+/// Maximum number of times that the interval between repetitions of a Watch doubles. A Watch is a request for
+/// reports.
 const MOST_DOUBLINGS: u8 = 3;
 
-/// Minimum time between two repetitions of a Watch (request for reports) to relays that have not received it.
+/// Minimum time between two repetitions of a Watch to relays that have not received it. A Watch is a request for
+/// reports.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
 /// Maximum time by which a report is delayed on a shared channel while the relays agree on positions.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 
-/// Maximum time by which a report is delayed on a shared channel during the first agreement on positions.
+/// Maximum time by which a report is delayed on a shared channel during the first agreement.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
 /// Time by which a report that begins an alarm may be sent early. Other reports wait until the telemetry's share of
@@ -135,7 +137,7 @@ struct Watched {
     to_until: Instant,
     /// Time of the last frame from node `to`, whatever the destination of the frame.
     heard: Instant,
-    /// Number of the last Watch (request for reports) from the relay that is four numbers nearer to the station.
+    /// Number of the last Watch from the relay four numbers nearer to the station. A Watch is a request for reports.
     far_number: u16,
     /// Nodes to which the Watch (request for reports) must be forwarded at the time `hand_on_at`. A bit mask of their
     /// distances from this relay.
@@ -163,7 +165,7 @@ struct Watched {
     stores_alarm: bool,
 }
 
-/// State that this relay reports about itself: a number for its condition, setpoint and agreed position.
+/// State that this relay reports about itself: a number for its condition, setpoint, agreed position.
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
@@ -274,7 +276,7 @@ impl Reporting {
         None
     }
 
-    /// Returns the next node to which a handshake must be sent that requests a reply; `None` if there is none.
+    /// Returns the next node to which a handshake must be sent that requests a reply. `None` if there is none.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         let mut watched = self.watched.iter_mut();
         watched.find_map(|watched| watched.to_greet.take().map(NonZeroU16::get))
@@ -334,7 +336,7 @@ const fn beyond(member: &Member, side: Side, distance: u16) -> u16 {
     }
 }
 
-/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one; `None` while there is neither.
+/// Returns the neighbour at `side`, or Tx or Rx if this relay is the last one. `None` while there is neither.
 fn next(member: &Member, neighbours: &Neighbours, side: Side) -> Option<u16> {
     let end = beyond(member, side, 1);
     match neighbours.at(side).node() {
@@ -623,7 +625,7 @@ fn micros(span: Duration) -> u32 {
     u32::try_from(span.as_micros()).unwrap_or(u32::MAX)
 }
 
-/// Returns the number of relays from this relay to the end of the chain at `side`, including this relay.
+/// Returns the number of relays from this relay (included) to the end of the chain at `side`.
 const fn from_end(member: &Member, side: Side) -> u16 {
     match side {
         Side::Upstream => member.node,

@@ -27,7 +27,7 @@ pub(crate) struct Steering {
 /// Base-2 logarithm of the number of steps in a motion to a new agreed position.
 const STEPS: u32 = 5;
 
-/// Motion to a new agreed position: position at its start, time of its start, duration, and time of the next step.
+/// Motion to a new agreed position: start position, start time, duration, and time of the next step.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from: Placement,

@@ -228,7 +228,8 @@ pub struct LocalSearch {
     best_row: (f32, f32),
     /// Best position found so far if it is better than the relay's current position; else `None`.
     found: Option<Placement>,
-    /// Linear SIR of the worse hop at the position found, or at the current position if no better position is found.
+    /// Linear SIR of the worse hop at the best position found. Without a better position it is the SIR at the current
+    /// position.
     best_sir: f32,
     /// Number of evaluations at the current altitude, counted for traffic in both directions only.
     evaluations: u16,
@@ -262,8 +263,8 @@ impl LocalSearch {
         }
     }
 
-    /// Continues the search by at most `budget` evaluations of both hops, plus the evaluations of one altitude. One
-    /// altitude takes 24 evaluations, or 194 for traffic in both directions.
+    /// Continues the search by at most `budget` evaluations of both hops, plus those of one altitude. One altitude
+    /// takes 24 evaluations, or 194 for traffic in both directions.
     ///
     /// Ready at the end of the search, with the best position if it is strictly better than the current one.
     pub fn step(&mut self, budget: u16) -> Poll<Option<Placement>> {

@@ -27,7 +27,8 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries to receive Rx well enough, with data in both directions.
+/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only with data in both
+/// directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of points of an interference field that one call evaluates. One target may need more.

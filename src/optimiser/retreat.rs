@@ -155,7 +155,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x in [end, `from_m`] from which the sender meets `target`; `None` if there is none.
+    /// Returns the smallest x in [end, `from_m`] from which the sender meets `target`. `None` if there is none.
     ///
     /// `target` is a linear SIR above zero. `from_m` is the receiver's x, from 0 to the x of Rx, m. `quiet` is above
     /// 0: Upsilon = E[1/I] at the receiver divided by the field's largest Upsilon, and 1 at Rx. The result is rounded
@@ -168,7 +168,7 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest x, m, at which this hop's sender receives the backward hop; `None` if there is none.
+    /// Returns the smallest x, m, at which this hop's sender receives the backward hop. `None` if there is none.
     ///
     /// The x is at least `place` and below `most_m`. This hop's receiver, at x = `from_m`, sends the backward hop.
     /// `c` is the gain for the field's largest Upsilon, divided by the target. Work: at most one root for each field
@@ -421,9 +421,9 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference at a receiver: its measurement if there is one, otherwise the mission's field.
-    /// `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field
-    /// include the receiver noise.
+    /// Returns the interference at a receiver. It is the receiver's measurement if there is one, otherwise the
+    /// mission's field. `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both
+    /// measurement and field include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),

@@ -62,9 +62,9 @@ const DEPTH: f32 = 1e-12;
 /// difference is the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Width of the bracket after a pass divided by its width before, above which the pass counts as stalled. The bracket
-/// is the interval that contains the best target. After such a pass the next targets are spread evenly over the
-/// bracket, and not around an interpolated optimum.
+/// Width of the bracket after a pass, divided by its width before; above this ratio the pass stalls. The bracket is
+/// the interval that contains the best target. After such a pass the next targets are spread evenly over the bracket,
+/// and not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -77,7 +77,8 @@ pub struct Search {
     tolerance: f32,
     /// Upper bound of the chain's SIR, linear. It is the maximum SIR of the leader's hop to the nearer end, Tx or Rx.
     ceiling: f32,
-    /// First target of the fixed-step schedule, and upper bound of the bracketed schedule: gamma_0 of the paper.
+    /// First target of the fixed-step schedule, and upper bound of the bracketed schedule. It is gamma_0 of the
+    /// paper.
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,

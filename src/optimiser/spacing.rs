@@ -164,8 +164,8 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Returns this hop together with the backward hop (direction from Rx to Tx), if the mission has traffic in both
-    /// directions. `power_w` is the power of the relay that receives this hop, W.
+    /// Returns this hop together with the backward hop, if the mission has traffic in both directions. The backward
+    /// hop is toward Tx. `power_w` is the power of the relay that receives this hop, W.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {

@@ -120,8 +120,8 @@ const ANOTHER: f64 = 64.0;
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of a moving interferer's track from the fit, divided by the fit's variance. If the
-/// deviation is larger, the position is not predicted from the track.
+/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. If the deviation
+/// is larger, the position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
 /// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
@@ -146,7 +146,8 @@ const GUESSED: f64 = 16.0;
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information in the measurements: number of positions divided by the variance of the error at one position.
+    /// Information in the measurements. It is the number of positions divided by the variance of the error at one
+    /// position.
     information: f64,
     /// Expected mean square relative error of the current estimate.
     chance: f64,
@@ -436,7 +437,7 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Minimum squared deviation from the track, divided by the track's variance, that shows another interferer. The
+/// Minimum squared deviation from the track that shows another interferer. It is divided by the track's variance. The
 /// track then starts again.
 const ELSEWHERE: f32 = 49.0;
 

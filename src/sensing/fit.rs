@@ -141,7 +141,7 @@ pub struct Fit {
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
-    /// Degrees of freedom: number of measured positions minus the number of unknowns; 0 if the difference is
+    /// Degrees of freedom: number of measured positions minus the number of unknowns. 0 if the difference is
     /// negative.
     beyond: f64,
     count: f64,

@@ -45,7 +45,7 @@ pub trait SerialPort {
     /// [`Fault`] for a byte with a reception error; the next call continues with the next byte.
     fn read(&mut self, into: &mut [u8]) -> Result<usize, Fault>;
 
-    /// Takes bytes to send from the front of `bytes` (never empty), and returns their number; 0 if the port is full.
+    /// Takes bytes to send from the front of `bytes` (never empty), and returns their number. 0 if the port is full.
     ///
     /// # Errors
     /// [`Fault`] if no byte was accepted for another reason than lack of room; the same bytes are offered again.

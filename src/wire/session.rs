@@ -44,7 +44,7 @@ pub(crate) enum Sender {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's; false if both epochs are the same.
+    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are the same.
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
@@ -53,8 +53,8 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number, so that it wins against a node that starts later. Of
-/// two nodes with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number. It thus wins against a node that starts later. Of two
+/// nodes with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -147,7 +147,7 @@ pub(crate) struct Session {
     claim: u32,
     /// Lower half of the last nonce that this relay has created.
     last_number: u32,
-    /// Claim of another node to this relay's node number, as shown by a handshake; `None` once the claim has been
+    /// Claim of another node to this relay's node number, as shown by a handshake. `None` once the claim has been
     /// read.
     rival: Option<Rival>,
     /// Number of uses of session table entries so far, wrapping. By this number the entries are ordered by their last use.

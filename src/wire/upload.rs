@@ -19,7 +19,7 @@ pub struct Upload {
     /// Valid parameters of the uploaded mission. Its interference comes from a single interferer, because a mission
     /// with an interference field (known distribution along x) cannot be uploaded.
     config: MissionConfig,
-    /// Positions of Tx and Rx of this mission; `None` if relays must use the positions of their configuration. The
+    /// Positions of Tx and Rx of this mission. `None` if relays must use the positions of their configuration. The
     /// positions are valid, but each relay still checks that they fit the mission.
     sites: Option<Sites>,
 }
@@ -148,7 +148,7 @@ impl Upload {
         &self.config
     }
 
-    /// Positions of Tx and Rx in the upload; `None` if relays must use the positions of their configuration.
+    /// Positions of Tx and Rx in the upload. `None` if relays must use the positions of their configuration.
     pub const fn sites(&self) -> Option<Sites> {
         self.sites
     }

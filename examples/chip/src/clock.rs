@@ -143,7 +143,8 @@ const SCALE_1: u32 = 1 << 14;
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
 /// Bit of PWR_CSR that is set once the voltage scale is reached.
 const SCALE_READY: u32 = 1 << 14;
-/// Bit of the over-drive, at the same place in two registers. PWR_CR: enable it. PWR_CSR: it is ready.
+/// Bit of the over-drive, at the same place in two registers. In PWR_CR the bit enables the over-drive; in PWR_CSR it
+/// shows that the over-drive is ready.
 const OVER_DRIVE: u32 = 1 << 16;
 /// Bit of the switch to the over-drive, at the same place in two registers. PWR_CR: switch. PWR_CSR: it is in use.
 const OVER_DRIVE_SWITCH: u32 = 1 << 17;
@@ -199,7 +200,8 @@ pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
 }
 
 /// Returns the frequencies that [`start`] reaches, and leaves the core on the oscillator HSI. Intended for a HAL that
-/// sets up the clocks itself but waits for them without a limit: it is then given only clocks that work.
+/// sets up the clocks itself and waits for them without a time limit. Such a HAL should be given only clocks that
+/// work.
 pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {

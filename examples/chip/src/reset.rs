@@ -65,8 +65,8 @@ mod tests {
     use crate::mock::MockRegisters;
     use crate::registers::{Register, Registers as _};
 
-    /// Checks that RCC_CSR gives the right reset cause, and that reading it clears the reset flags. The register values are those that the
-    /// reference manuals state.
+    /// Checks that RCC_CSR gives the right reset cause, and that reading it clears the reset flags. The register
+    /// values are from the reference manuals.
     #[test]
     fn the_reset_cause_is_read_once() {
         for (status, cause) in [

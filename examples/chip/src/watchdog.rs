@@ -20,8 +20,8 @@ pub const TURN_MS: u64 = 500;
 /// Lateness of the relay's timer, ms, from which on the main loop must not feed the watchdog any more.
 pub const LATE_MS: u64 = 1_000;
 
-/// Returns true if the main loop may feed the watchdog at `now_us`. The relay's next timer is due at `due_us`, and
-/// must be less than [`LATE_MS`] late. `None` means that no timer is set.
+/// Returns true if the main loop may feed the watchdog at `now_us`. The relay's next timer expires at `due_us`;
+/// `None` means that no timer is set. The timer must be less than [`LATE_MS`] late.
 pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     match due_us {
         Some(due_us) => now_us < due_us.saturating_add(1_000 * LATE_MS),

@@ -20,12 +20,13 @@ pub const BLANK: u32 = u32::MAX;
 /// Number of words of a record in addition to its payload: its sequence number and its CRC.
 pub const OVERHEAD: usize = 2;
 
-/// Maximum number of attempts to write one journal record. Each is at another place, because flash cells may be worn.
+/// Maximum number of attempts to write one journal record. Each attempt is at another place in the flash, because
+/// flash cells may be worn.
 const TRIES: usize = 4;
 
 /// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
 pub trait Flash {
-    /// Returns the number of words in a sector; 0 if there is none.
+    /// Returns the number of words in a sector; 0 if there is no such sector.
     fn words(&self, sector: usize) -> usize;
 
     /// Returns the number of words in use in a sector: up to the last word that is not [`BLANK`].
@@ -68,7 +69,7 @@ impl<F: Flash> Flash for &mut F {
 pub enum WhenFull {
     /// The new record is refused.
     Refuse,
-    /// The sector without the newest record is erased, and the new record stored there.
+    /// The sector without the newest record is erased, and the new record is stored in it.
     Erase,
 }
 
@@ -83,7 +84,7 @@ pub struct Journal<F> {
 #[derive(Clone, Copy)]
 struct Found {
     newest: Option<Newest>,
-    /// Number of records in the sector, valid or not, up to the last one that is not blank.
+    /// Number of records in the sector, valid or not, up to the last record that is not blank.
     used: usize,
     room: usize,
 }
@@ -107,7 +108,8 @@ impl<F: Flash> Journal<F> {
 
     /// Returns the payload of the newest record, if any. `WORDS` must be the payload's length, words.
     ///
-    /// Work: linear in the words of the sectors, and a CRC for the newest record and each one stored after it.
+    /// Work: linear in the words of the sectors, and a CRC for the newest valid record and each record stored after
+    /// it.
     pub fn newest<const WORDS: usize>(&mut self) -> Option<[u32; WORDS]> {
         let mut payload = [BLANK; WORDS];
         self.read_newest(&mut payload)?;

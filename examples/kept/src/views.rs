@@ -46,8 +46,8 @@ impl Views {
     /// Restores the votes from before the reboot into a new `relay`. Call it before any other use of the relay, but
     /// after a stored upload was restored.
     ///
-    /// If a record exists, `votes_restored` gets true if the relay accepts it; a record of another firmware may be
-    /// refused.
+    /// If a record exists, `votes_restored` is called: with true if the relay accepts the record, with false if not.
+    /// A record of another firmware may be refused.
     pub fn resume<F: Flash>(
         relay: &mut Relay,
         now: Instant,
@@ -64,9 +64,10 @@ impl Views {
         Self { is_stored: kept }
     }
 
-    /// Stores the relay's changed votes. Returns `Some` when storing begins to work (true) or to fail (false).
+    /// Stores the relay's changed votes. Returns `Some(true)` when storing begins to work, `Some(false)` when it
+    /// begins to fail, and otherwise `None`.
     ///
-    /// If the write fails the relay flies on, because a drone in the air must not be stopped for it.
+    /// If the write fails the relay flies on, because a drone in the air must not be stopped for a failed write.
     #[inline(never)] // rarely called
     pub fn store<F: Flash>(&mut self, record: &ViewRecord, mut log: Journal<F>) -> Option<bool> {
         let before = self.is_stored;

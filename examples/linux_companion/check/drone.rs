@@ -21,7 +21,7 @@ const LINK: u8 = 1;
 /// Silence after which the autopilot, or its position, counts as missing.
 const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Time between two heartbeats, and between two requests for what is still missing.
+/// Time between two heartbeats, and between two requests for the missing data.
 const EVERY: Duration = Duration::from_millis(1_000);
 
 /// Number of parameters that are requested at a time.
@@ -30,7 +30,8 @@ const AT_A_TIME: usize = 6;
 /// Names of the parameter with the autopilot's own MAVLink system number.
 const SYSTEM: [&str; 2] = ["MAV_SYS_ID", "SYSID_THISMAV"];
 
-/// Names of ArduCopter's parameters up to 4.6 and from 4.7 on, and the old unit in the new one. An autopilot has one of the two.
+/// Names of ArduCopter's parameters: up to version 4.6, and from 4.7 on. The number is the old unit divided by the
+/// new unit. An autopilot has one of the two names.
 const NEW_NAMES: [(&str, &str, f64); 2] = [
     ("RTL_ALT", "RTL_ALT_M", 100.0),
     ("SYSID_THISMAV", "MAV_SYSID", 1.0),
@@ -117,7 +118,7 @@ impl Drone {
         self.is_in_air || self.heard.is_some_and(|heard| heard.is_armed)
     }
 
-    /// Reads the autopilot's messages, and requests what is missing.
+    /// Reads the autopilot's messages, and requests the missing data.
     pub(super) fn exchange(&mut self, now: Instant) {
         let mut bytes = [0; 1_024];
         while let Some(count) = self.port.read(&mut bytes) {

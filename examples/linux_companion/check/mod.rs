@@ -42,7 +42,7 @@ const TURN: Span = Span::from_millis(20);
 /// Least free space of a disk for the files of a flight, bytes.
 const FREE: u64 = 64 << 20;
 
-/// Seconds from 1970 to 2024. A clock before that is not set.
+/// Seconds from 1970 to 2024. A clock that shows an earlier time is not set.
 const YEAR_2024_S: u64 = 1_704_067_200;
 
 /// Files with the udev rules of a bundle: beside the configuration, or where they are installed.
@@ -230,7 +230,7 @@ fn clock(now: SystemTime) -> Result<String, String> {
     Ok(text.to_string())
 }
 
-/// Returns the free space for `file`, bytes, after bytes were written there.
+/// Returns the free space for `file`, bytes, after a test write in its folder.
 fn space(file: &Path) -> Result<u64, String> {
     let failed = |error: std::io::Error| format!("cannot be written: {error}");
     let folder = file
@@ -319,7 +319,7 @@ fn records(plan: &Plan) -> Vec<Line> {
     lines
 }
 
-/// Checks the udev rules of the bundle; none without rules and without a port that needs them.
+/// Checks the udev rules of the bundle; no line without rules and without a port that needs rules.
 fn rules(plan: &Plan) -> Option<Line> {
     let options = &plan.options;
     let ports = [&options.upstream, &options.downstream, &options.shared];

@@ -54,7 +54,7 @@ struct Heard {
     received: Option<Instant>,
     /// Time of the last frame to this relay with the right key.
     verified: Option<Instant>,
-    /// Time of the neighbour's last message that says that it receives this relay.
+    /// Time of the neighbour's last message that states that the neighbour receives this relay.
     hears: Option<Instant>,
     /// True if its drone flies.
     flies: bool,
@@ -383,7 +383,7 @@ impl Radio {
 }
 
 impl Heard {
-    /// Takes what a message says about the flight of its sender.
+    /// Records the data in a message about the flight of its sender.
     fn observe(&mut self, content: &Content) {
         let Content::Message(message) = content else {
             return;
@@ -420,7 +420,7 @@ impl Content {
     }
 }
 
-/// Returns header and content of an intact frame; `None` for a damaged one.
+/// Returns header and content of an intact frame; `None` for a damaged frame.
 fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
     let mut deframer = Deframer::new();
     let (last, start) = frame.split_last()?;

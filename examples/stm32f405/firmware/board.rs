@@ -23,8 +23,9 @@ pub(crate) fn unmask(interrupt: Interrupt) {
 
 /// Returns a seed that differs between boards and between starts.
 ///
-/// After power-up it hashes the noise in the RAM, which is specific to the chip; after a reset, the value left there by the last
-/// call. It does not use the chip's unique number, because the emulator has none at its address.
+/// After power-up it hashes the noise in the RAM, which is specific to the chip; after a reset, the value left there
+/// by the last call. The function does not use the chip's unique number, because the emulator has no such number at
+/// its address.
 pub(crate) fn seed() -> u32 {
     const WORDS: usize = 64;
     #[unsafe(link_section = ".uninit.leftover")]

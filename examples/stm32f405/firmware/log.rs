@@ -349,7 +349,7 @@ pub(crate) fn cannot_sign() {
     );
 }
 
-/// Logs that the relay rejects the configuration, mostly because this image lacks a feature for it.
+/// Logs that the relay rejects the configuration. The usual reason is that this image lacks a feature.
 pub(crate) fn cannot_fly(error: SetupError) {
     error!(
         "configuration refused: not supported by this image: {}",

@@ -55,11 +55,11 @@ pub struct Frame<'a> {
     pub at: Duration,
     /// Bytes of the frame on the wire: COBS, with the final delimiter.
     pub bytes: &'a [u8],
-    /// Length of the whole frame, bytes. It is larger than that of `bytes` if `bytes` is cut.
+    /// Length of the whole frame, bytes. It is larger than the length of `bytes` if `bytes` is cut.
     pub len: usize,
     /// Direction of the frame, relative to the node that writes the capture.
     pub direction: Direction,
-    /// Comment on the frame in the capture; empty if there is none.
+    /// Comment on the frame in the capture; empty without a comment.
     pub comment: &'a str,
 }
 

@@ -50,7 +50,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
 
 /// Prints the requested help, or the error in the options. Returns the exit status.
 ///
-/// An error is one line that says what is allowed.
+/// An error is one line that states the permitted values.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         print(&error.to_string());

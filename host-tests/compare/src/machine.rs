@@ -32,7 +32,7 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Clock that measures the processor time of this thread, without that of other programs.
+/// Clock that measures the processor time of this thread, without the time of other programs.
 ///
 /// On Linux it is the CPU time that the kernel accounts, with a resolution of some milliseconds. On other systems it
 /// is the wall-clock time.

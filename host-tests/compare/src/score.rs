@@ -27,9 +27,10 @@ pub(crate) enum Refusal {
     Side(usize, f64),
     /// A relay is outside the range of altitudes: its index from 1, and its altitude, m.
     Altitude(usize, f64),
-    /// A relay has a smaller x than the relay before it: its index, from 1.
+    /// A relay has a smaller x than the previous relay. The field is the index of the relay, from 1.
     Order(usize),
-    /// A relay is too close to the relay before it: its index from 1, and their distance, m.
+    /// A relay is too close to the previous relay. The fields are the index of the relay, from 1, and the distance of
+    /// the two, m.
     Separation(usize, f64),
     /// The SIR is wrong: that reported by the solver, and that computed from its chain.
     Sir(f64, f64),
@@ -103,9 +104,9 @@ pub(crate) struct Score {
     pub(crate) sir: f64,
     /// SIR (linear) of the worst hop if positions are rounded to f32, as in a relay's setpoints.
     pub(crate) flown: f64,
-    /// Processor time until the first chain that is good enough, s; `None` if there was none.
+    /// Processor time until the first chain that is good enough, s; `None` without such a chain.
     pub(crate) good_after_s: Option<f64>,
-    /// Processor time until the first chain as good as this crate's, s; `None` if there was none.
+    /// Processor time until the first chain as good as this crate's, s; `None` without such a chain.
     pub(crate) level_after_s: Option<f64>,
 }
 

@@ -73,8 +73,8 @@ impl<'s> Draw<'s> {
         self.hinted(layout, &mut |_, _| None)
     }
 
-    /// Draws random values for all fields of a message. For each number, `hint` may return a value, even one outside
-    /// the permitted range. If `hint` returns `None`, the value is random and within the range.
+    /// Draws random values for all fields of a message. For each number, `hint` may return a value, even a value
+    /// outside the permitted range. If `hint` returns `None`, the value is random and within the range.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
         obey_rules(&layout.name, &mut fields);

@@ -39,7 +39,7 @@ pub fn stuffed(plain: &[u8]) -> Vec<u8> {
 /// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS.
 ///
 /// Returns the decoded bytes, and true if the last run is complete. Published decoders return no bytes of a truncated
-/// frame, but tests need those before the cut.
+/// frame, but tests need the bytes before the cut.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
     let mut plain = Vec::with_capacity(stuffed.len());
     let (mut rest, mut whole) = (stuffed, true);

@@ -17,7 +17,7 @@ pub enum Refusal {
     Crc(u32, u32),
     /// The version of the frame format or the flags are unknown: both values.
     Version(u8, u8),
-    /// Unknown tag, the byte that tells the kind of message.
+    /// Unknown tag, the byte that states the kind of message.
     UnknownTag(u8),
     /// Body that is not the canonical encoding of any message; with the fault.
     Malformed(String),

@@ -44,7 +44,7 @@ impl TagCheck {
 
 /// Number of a node's latest nonces with which a tag is verified.
 ///
-/// Several are tried, because frames that were signed before a new handshake may arrive after it.
+/// Several nonces are tried, because frames that were signed before a new handshake may arrive after it.
 const TRIED: usize = 4;
 
 /// Network number, sender and destination of frames, by which the sender's nonces are stored.
@@ -58,7 +58,7 @@ pub struct TagVerifier {
 }
 
 impl TagVerifier {
-    /// Creates a verifier without nonces, for a network with this key, if it is known.
+    /// Creates a verifier without nonces, for a network with the key `key`; `None` if the key is unknown.
     pub fn new(key: Option<[u8; 32]>) -> Self {
         Self {
             key: key.map(Key::new),

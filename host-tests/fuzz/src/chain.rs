@@ -17,7 +17,7 @@ const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of simulated frames in transit to one relay. A further frame displaces the oldest one.
+/// Maximum number of simulated frames in transit to one relay. A further frame displaces the oldest frame.
 const MAX_IN_TRANSIT: usize = 24;
 
 /// Maximum number of rounds in one operation. In a round each relay receives a frame.
@@ -341,8 +341,8 @@ impl Chain {
         }
     }
 
-    /// Checks the separation of relay `at` (from 0) from the relay before it, if one pass placed both. A pass is a
-    /// round of messages along the chain.
+    /// Checks the separation of relay `at` (from 0) from the previous relay, if the same pass placed both. A pass is
+    /// a round of messages along the chain.
     fn check_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

@@ -64,7 +64,7 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
 
 /// Field that a sweep message has between the sender's power and its list of positions.
 ///
-/// The list has one position for each target SIR: the farthest one at which the next relay meets the target.
+/// The list has one position for each target SIR: the farthest position at which the next relay meets the target.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,

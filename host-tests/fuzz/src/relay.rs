@@ -119,7 +119,7 @@ impl Bench {
     }
 
     /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake. The relay does not
-    /// send its handshake to Tx or Rx before it has received theirs.
+    /// send its handshake to Tx or Rx before it has received a handshake from Tx or Rx.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -252,7 +252,7 @@ impl Bench {
 
     /// Delivers a message with a valid CRC to the relay.
     ///
-    /// Header and port are mostly those of a neighbour; sometimes one of them has another value.
+    /// Header and port mostly belong to a neighbour; sometimes the header or the port has another value.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);

@@ -12,7 +12,7 @@ use super::input::Input;
 
 /// Interference along Tx-Rx in some fuzzed missions: equally strong everywhere.
 ///
-/// It is a constant, like the next ones, because a `Field` borrows its points until the program ends.
+/// This field and the following fields are constants, because a `Field` borrows its points until the program ends.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
 /// Interference along Tx-Rx in some fuzzed missions: slightly uneven.
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);

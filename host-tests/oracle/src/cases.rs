@@ -123,37 +123,37 @@ impl Case {
         }
     }
 
-    /// Returns the number of relays, the argument `N` of this case, if it has one.
+    /// Returns the number of relays, the argument `N` of this case, if the case has this argument. Otherwise `None`.
     pub fn relays(&self) -> Option<usize> {
         self.args.get("N")?.as_u64()?.try_into().ok()
     }
 
-    /// Returns the argument `name` of this case as a number; `None` if it is not one.
+    /// Returns the argument `name` of this case as a number; `None` if it is not a number.
     pub fn arg(&self, name: &str) -> Option<f64> {
         number(self.args.get(name)?)
     }
 
-    /// Returns the argument `name` of this case as a list of numbers; `None` if it is not one.
+    /// Returns the argument `name` of this case as a list of numbers; `None` if it is not a list.
     pub fn arg_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.args.get(name)?)
     }
 
-    /// Returns the result of this case if it is a single number.
+    /// Returns the result of this case if it is a single number; otherwise `None`.
     pub fn value(&self) -> Option<f64> {
         number(&self.out)
     }
 
-    /// Returns the result of this case if it is a list of numbers.
+    /// Returns the result of this case if it is a list of numbers; otherwise `None`.
     pub fn values(&self) -> Option<Vec<f64>> {
         list(&self.out)
     }
 
-    /// Returns the part `name` of the case's result as a number; `None` if it is not one.
+    /// Returns the part `name` of the case's result as a number; `None` if it is not a number.
     pub fn part(&self, name: &str) -> Option<f64> {
         number(self.out.get(name)?)
     }
 
-    /// Returns the part `name` of the case's result as a list of numbers; `None` if it is not one.
+    /// Returns the part `name` of the case's result as a list of numbers; `None` if it is not a list.
     pub fn part_list(&self, name: &str) -> Option<Vec<f64>> {
         list(self.out.get(name)?)
     }

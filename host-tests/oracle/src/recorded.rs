@@ -57,7 +57,7 @@ struct Row {
     #[serde(default)]
     apart_m: f64,
     tx_w: f64,
-    /// Transmit power of every relay, W; a single number if they are alike.
+    /// Transmit power of every relay, W; a single number if all relays have the same power.
     relay_w: Vec<f64>,
     /// Interferer's power, W, and its position x and y, m.
     interferer: [f64; 3],

@@ -33,7 +33,7 @@ struct StandTold {
     at_s: f64,
     /// Relays that changed: index, true if switched on, and x, y, altitude in m.
     ///
-    /// The position is `None` before the relay has agreed on one.
+    /// The position is `None` until the relay has agreed on a position.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
     /// Linear SIR of every hop from Tx to Rx, over the relays that are on and have a position. Empty if there are no
     /// such relays.

@@ -25,7 +25,7 @@ const NAME: &str = "the page";
 /// Number of simulator events between two checks that the run is not longer than permitted.
 const HAPPENINGS: u64 = 20_000;
 
-/// Longest run, s of virtual time: a longer one is an error, so that the page stays responsive.
+/// Longest run, s of virtual time: a longer run is an error, so that the page stays responsive.
 const LONGEST_S: u64 = 3_600;
 
 /// Result of a run in the page, as JSON: the report, the recording, and an error message.

@@ -12,18 +12,19 @@ use uav_relay_capture::Direction;
 
 use crate::recording::{Frame, Recording};
 
-/// Time window for which one clock offset is determined, s. Clocks drift by 100 ppm at most: 2 ms in it.
+/// Time window for which one clock offset is determined, s. Clocks drift by at most 100 ppm, which is 2 ms in this
+/// window.
 const WINDOW: f64 = 20.0;
 
-/// Change of the clock offset between two consecutive frames that counts as a step of a clock, s. Also a backward
-/// jump by as much.
+/// Change of the clock offset between two consecutive frames that counts as a step of a clock, s. A backward jump by
+/// this amount also counts.
 const STEP: f64 = 2.0;
 
-/// Maximum time without a common frame for which two files count as one flight, s. The same limit holds for the time between two frames of
-/// one flight.
+/// Maximum time without a common frame, s, up to which two capture files count as one flight. The same limit holds
+/// for the time between two frames of one flight.
 const APART: f64 = 3_600.0;
 
-/// Offset of a file's clock from that of the first file, with its quality.
+/// Offset of a file's clock from the clock of the first file, with the quality of this offset.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
     /// Name of the capture file.
@@ -101,7 +102,7 @@ fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
 }
 
 /// Frames of aligned files by their bytes: time by the reference clock, and direction. Sent frames replace received
-/// ones.
+/// frames.
 type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
 
 fn add(aligned: &mut Aligned, frames: &[Frame]) {
@@ -119,7 +120,7 @@ fn add(aligned: &mut Aligned, frames: &[Frame]) {
 pub struct Merged {
     /// Frames, sorted by the clock of the first file, each once.
     pub frames: Vec<Frame>,
-    /// Relation of each file's clock to that of the first file, in the order of the files.
+    /// Relation of each file's clock to the clock of the first file, in the order of the files.
     pub files: Vec<Alignment>,
     /// Warnings about the captured files, one line each.
     pub warnings: Vec<String>,

@@ -17,7 +17,8 @@ use crate::recording::Frame;
 /// flight's duration.
 const PERIOD: f64 = 0.5;
 
-/// Largest number of stored snapshots besides the last one. Of a longer flight only every k-th is stored.
+/// Largest number of stored snapshots besides the last snapshot. Of a longer flight only every k-th snapshot is
+/// stored.
 const MOST: f64 = 7_200.0;
 
 /// Longest time between two reported positions for which a position in between is interpolated, s.
@@ -30,7 +31,7 @@ pub struct Loaded {
     pub mission: Mission,
     /// Relays with an altitude or a power of their own.
     pub profiles: Vec<(u16, Profile)>,
-    /// Line on earth from Tx to Rx, if the scenario has one.
+    /// Line on earth from Tx to Rx, if the scenario has such a line.
     pub axis: Option<Axis>,
 }
 
@@ -41,15 +42,15 @@ pub struct Loss {
     pub relay: u16,
     /// Time of the last report before the silence, s.
     pub from: f64,
-    /// Time of the first report after the silence, s; `None` if there is none.
+    /// Time of the first report after the silence, s; `None` if there is no later report.
     pub until: Option<f64>,
     /// True if another relay has reported the relay as lost.
     pub is_reported: bool,
 }
 
 impl Loss {
-    /// Returns true if the relay was silent only because all relays were. `all` is that outage; up to 5 s before or
-    /// after it count, too.
+    /// Returns true if the relay was silent only because all relays were silent. `all` is the silence of all relays.
+    /// Up to 5 s before and after it also count.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -77,9 +78,9 @@ pub struct Flight {
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
-    /// Time between two stored snapshots, s. The last one is at the end of the flight.
+    /// Time between two stored snapshots, s. The last snapshot is at the end of the flight.
     pub period: f64,
-    /// Stored snapshots as JSON, each as its difference from the one before.
+    /// Stored snapshots as JSON, each as its difference from the previous snapshot.
     pub steps: Vec<Value>,
     /// Last snapshot of the flight.
     pub last: Snapshot,
@@ -98,7 +99,7 @@ pub struct Flight {
     pub losses: Vec<Loss>,
     /// Agreed views (memberships of the chain): time, number of the view, and number of its relays.
     pub views: Vec<(f64, u32, u16)>,
-    /// Closest approach of two relays in the air; `None` if there is none.
+    /// Closest approach of two relays in the air. `None` if two relays were never in the air at the same time.
     pub nearest: Option<Nearest>,
 }
 
@@ -243,7 +244,7 @@ fn instant(at: f64) -> Instant {
     Instant::from_micros((at * 1e6).round() as u64)
 }
 
-/// State of the computation between two snapshots.
+/// State of the replay's computation between two snapshots of the flight.
 struct Recorder<'a> {
     reports: &'a [Report],
     loaded: Option<&'a Loaded>,
@@ -262,8 +263,8 @@ struct Recorder<'a> {
     open: BTreeMap<u16, Loss>,
     /// Last time at which no relay was reporting its state.
     silent_at: Instant,
-    /// Time of the first agreement, s, and three numbers of snapshots since then. They count all snapshots, those
-    /// with all relays agreed, and those with all members agreed.
+    /// Time of the first agreement, s, and three numbers of snapshots since then. The numbers count all snapshots,
+    /// the snapshots with all relays agreed, and the snapshots with all members agreed.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -294,7 +295,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Returns the snapshot at `now`, and adds its figures to those of the flight. `frames` are all frames up to then.
+    /// Returns the snapshot at `now`, and adds its figures to the figures of the flight. `frames` are all frames up
+    /// to `now`.
     fn advance(&mut self, flight: &mut Flight, now: f64, frames: &[Frame]) -> Snapshot {
         for frame in frames.get(self.used[1]..).unwrap_or_default() {
             match &frame.message {
@@ -480,7 +482,8 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Removes from a station's alarm what a replay cannot know: the station's received frames.
+/// Removes from the text of a station's alarm the part about the station's received frames. A replay does not know
+/// these frames.
 fn replayed(text: String) -> String {
     match text.split_once("nothing received from the chain") {
         Some(("", rest)) => {
@@ -492,7 +495,8 @@ fn replayed(text: String) -> String {
     }
 }
 
-/// Returns the position of a relay at `now`, between two reported ones that are at most [`GAP`] apart.
+/// Returns the position of a relay at `now`, interpolated between two reported positions. `None` if these are more
+/// than [`GAP`] apart in time.
 fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     let after = track.partition_point(|(at, _)| *at < now);
     let (t0, one) = track.get(after.checked_sub(1)?)?;
@@ -542,9 +546,10 @@ fn round(value: &mut Value) {
     }
 }
 
-/// Returns what changes `old` to `new`, as the page applies it; `None` for no change.
+/// Returns the changes from `old` to `new`, in the form that the page applies; `None` for no change.
 ///
-/// The changes of an object or an array are an object of the changed values by key or index; `#` is the new length of an array.
+/// The changes of an object or an array are an object of the changed values by key or index; `#` is the new length of
+/// an array.
 fn difference(old: &Value, new: &Value) -> Option<Value> {
     let mut changes = serde_json::Map::new();
     match (old, new) {

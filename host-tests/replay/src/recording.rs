@@ -14,8 +14,8 @@ use uav_relay_decode::source::{Item, Packet, SourceError, read};
 /// Intact frame of a capture.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time of the frame, s since 1970. Before a merge the clock is that of the frame's own file; after a merge it is that of the first
-    /// file.
+    /// Time of the frame, s since 1970. Before a merge the clock is that of the frame's own file; after a merge it is
+    /// the clock of the first file.
     pub at: f64,
     /// Direction of the frame, relative to the node that wrote the file.
     pub direction: Direction,

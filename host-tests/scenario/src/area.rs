@@ -48,7 +48,7 @@ const LEAST_M2: f64 = 1.0;
 const CORNERS: u32 = 64;
 
 impl Area {
-    /// Returns the point of the area nearest to `at`; `at` itself if it is inside.
+    /// Returns the point of the area nearest to `at`; `at` itself if `at` is inside.
     pub fn nearest(&self, at: [f64; 2]) -> [f64; 2] {
         match self {
             Self::Circle { centre, radius_m } => {
@@ -83,7 +83,8 @@ impl Area {
         distance_m(self.nearest(at), at)
     }
 
-    /// Returns the centre of gravity, or the point of the area nearest to it.
+    /// Returns the centre of gravity of the area. If this centre is outside, returns the point of the area nearest to
+    /// it.
     pub fn centre(&self) -> [f64; 2] {
         let corners = match self {
             Self::Circle { centre, .. } => return *centre,
@@ -138,10 +139,10 @@ impl Area {
         }
     }
 
-    /// Creates the polygon with these corners, in order. The last corner may repeat the first one.
+    /// Creates the polygon with these corners, in order. The last corner may repeat the first corner.
     ///
     /// # Errors
-    /// A text that says what is wrong: too few corners, no surface, or edges that cross or touch.
+    /// A text that states the fault: too few corners, no surface, or edges that cross or touch.
     pub fn polygon(mut corners: Vec<[f64; 2]>) -> Result<Self, String> {
         if corners.len() > 1 && corners.first() == corners.last() {
             corners.pop();
@@ -258,7 +259,7 @@ fn cross(one: [[f64; 2]; 2], other: [[f64; 2]; 2]) -> bool {
     sides(one, other) && sides(other, one) && overlap(0) && overlap(1)
 }
 
-/// Returns true if the second edge, which begins where the first one ends, goes back along it.
+/// Returns true if the second edge goes back along the first edge. The second edge begins where the first edge ends.
 fn is_spike(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> bool {
     let [[a, b], [_, c]] = [first, second];
     let back = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1]);

@@ -92,7 +92,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if its table also has a key that excludes it, as `power_w` excludes `power_dbm`.
+    /// Rejects `key` if its table also has a key that excludes it. For example, `power_w` excludes `power_dbm`.
     fn check_exclusive(
         &self,
         path: &str,
@@ -234,7 +234,7 @@ impl Check<'_> {
 /// Least similarity (Jaro-Winkler, 0 to 1) at which an error message suggests a known key.
 const ALIKE: f64 = 0.8;
 
-/// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if none is similar.
+/// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if no known key is similar.
 fn nearest(name: &str, keys: impl IntoIterator<Item = &'static Key>) -> String {
     let alike = keys
         .into_iter()
@@ -263,7 +263,7 @@ fn as_number(value: &Value) -> Option<f64> {
 
 /// Creates the error for a table that [`table`] accepts but serde cannot convert.
 ///
-/// It is a bug of this crate: the table of allowed keys and the Rust types differ.
+/// Such an error is a bug of this crate: the table of allowed keys and the Rust types differ.
 pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
     ScenarioError {
         file: file.to_owned(),

@@ -44,9 +44,9 @@ pub struct Network {
     pub method: Option<String>,
     /// Data rate of the serial ports between relays, bit/s, 1200 to 4000000.
     pub baud: Option<u32>,
-    /// Time without a frame from a neighbour before the relay probes it, ms, 1 to 3600000.
+    /// Time without a frame from a neighbour after which the relay probes this neighbour, ms, 1 to 3600000.
     pub probe_after_ms: Option<u32>,
-    /// Time without a frame from a neighbour after which it counts as lost, ms, 1 to 3600000.
+    /// Time without a frame from a neighbour after which this neighbour counts as lost, ms, 1 to 3600000.
     pub dead_after_ms: Option<u32>,
 }
 

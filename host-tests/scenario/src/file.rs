@@ -75,7 +75,7 @@ struct RawArea {
     circle_deg: Option<[f64; 3]>,
 }
 
-/// Power of an interferer, or the least and the greatest one.
+/// Power of an interferer, or its least and its greatest power.
 #[derive(Deserialize, Clone, Copy)]
 #[serde(untagged)]
 enum RawPowers {
@@ -84,7 +84,7 @@ enum RawPowers {
 }
 
 impl RawPowers {
-    /// Returns the least power (`end` 0) or the greatest one (`end` 1).
+    /// Returns the least power (`end` 0) or the greatest power (`end` 1).
     fn end(self, end: usize) -> f64 {
         match self {
             Self::One(one) => one,
@@ -818,7 +818,7 @@ pub(super) struct RelayArea<'a> {
 }
 
 impl RawSource {
-    /// Returns the least EIRP (`end` 0) or the greatest one (`end` 1), W.
+    /// Returns the least EIRP (`end` 0) or the greatest EIRP (`end` 1), W.
     fn eirp_w(&self, file: &str, table: &str, end: usize) -> Result<f64, ScenarioError> {
         let of = |powers: Option<RawPowers>| powers.map(|powers| powers.end(end));
         let said = GivenPower {
@@ -832,7 +832,7 @@ impl RawSource {
     }
 }
 
-/// Converts the areas of the `[[interferer]]` tables. Returns an error if one contains Tx or Rx.
+/// Converts the areas of the `[[interferer]]` tables. Returns an error if an area contains Tx or Rx.
 fn source_areas(
     file: &str,
     raw: &[RawSource],

@@ -30,7 +30,7 @@ const REPORTED: usize = 60_000;
 
 /// Largest lateral distance y_H of the interferer in the search, as a multiple of the scene's size.
 ///
-/// At this distance the interference is already the same at all relay positions to a thousandth, so a larger one
+/// At this distance the interference is already the same at all relay positions to a thousandth, so a larger distance
 /// would change nothing. The size of the scene is its largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
@@ -343,7 +343,7 @@ pub struct BestPower {
     /// Error that remains: the integral of |p / d^2 - S| over the quadrature points.
     ///
     /// p is this interferer's power, d its distance, and S the sum of p / d^2 over the true interferers. The unit is
-    /// W for an integral over distance and altitude, and W/m for one over distance only.
+    /// W for an integral over distance and altitude, and W/m for an integral over distance only.
     pub error: f64,
 }
 

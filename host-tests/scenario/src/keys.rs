@@ -25,7 +25,7 @@ pub(super) enum Rule {
     /// Text "los" (line of sight) or "nlos" (obstructed), or a number within this range.
     LinkOrNumber(Range),
     Flag,
-    /// Number within this range, or a list of the least and the greatest one.
+    /// Number within this range, or a list of two such numbers: the least and the greatest.
     NumberOrTwo(Range),
     /// List of exactly one number for each of these ranges.
     Numbers(&'static [Range]),

@@ -128,8 +128,8 @@ impl RateModel {
     }
 }
 
-/// Returns the data rate of the worse direction, bit/s, for comparing plans. It is the smaller one of the rate to Rx
-/// and the rate to Tx divided by `reverse`. If `reverse` is 0, only the rate to Rx counts.
+/// Returns the data rate of the worse direction, bit/s, for comparing plans. It is the smaller of two rates: the rate
+/// to Rx, and the rate to Tx divided by `reverse`. If `reverse` is 0, only the rate to Rx counts.
 pub fn worse_bps([there_bps, back_bps]: [f64; 2], reverse: f64) -> f64 {
     if reverse > 0.0 {
         there_bps.min(back_bps / reverse)

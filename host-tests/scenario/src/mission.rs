@@ -74,8 +74,8 @@ impl std::error::Error for Refusal {}
 
 /// Converts a scenario to a mission of `uavs` relays. Also returns the relays that differ from the others.
 ///
-/// They are the relays with an altitude or a power of their own, as index (from 1) and profile. Several interferers
-/// are replaced by a single one.
+/// These are the relays with an altitude or a power of their own, as index (from 1) and profile. Several interferers
+/// are replaced by a single interferer.
 ///
 /// # Errors
 /// [`Refusal`] for missions that cannot be flown, and for parameters that relays reject.
@@ -159,7 +159,7 @@ pub fn mission(
 
 /// Returns `mission` with the fitted slots of the scenario, if it has any.
 ///
-/// It is the mission of relays with the method `joint`. Other methods have equal slots on board.
+/// Only relays with the method `joint` fly this mission. With other methods the relays have equal slots.
 ///
 /// # Errors
 /// [`Refusal::Steps`] for fitted slots with a table of rate steps; [`Refusal::Mission`] if the SNR gap is out of

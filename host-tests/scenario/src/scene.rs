@@ -63,8 +63,8 @@ pub struct Scene {
     pub sources: Vec<Source>,
     /// Areas of the sources that may be anywhere in them, by index in `sources`.
     ///
-    /// Each receiver gets the interference from the nearest point of the area. An SIR is then that of the source's worst position
-    /// for this hop, and the SIR of the worst hop is that of the source's worst position.
+    /// Each receiver gets the interference from the nearest point of the area. The SIR of a hop is then its SIR for
+    /// the source's worst position for this hop.
     pub areas: BTreeMap<usize, Area>,
     /// Least and greatest altitude of the sources, m, by index in `sources`.
     ///

@@ -21,7 +21,7 @@ pub struct Scenario {
     pub line: Option<Line>,
     /// Distance D from Tx to Rx, m, 1 to 1e6.
     pub distance_m: f64,
-    /// Altitude of all relays that have none of their own, m, 0.1 to 1e4.
+    /// Altitude of all relays without an altitude of their own, m, 0.1 to 1e4.
     pub altitude_m: f64,
     /// Lowest altitude for methods that choose altitudes, m, 0.1 to `altitude_m` (its default).
     pub altitude_min_m: f64,
@@ -86,7 +86,7 @@ pub struct TerrainSpec {
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
-    /// The ground between antennas counts as higher by it.
+    /// The ground between antennas counts as higher by this error.
     pub error_m: f64,
 }
 
@@ -142,7 +142,7 @@ pub struct ListenSpec {
 }
 
 impl ListenSpec {
-    /// Returns the measurement settings of a chain of `uavs` relays; missing ones have their defaults.
+    /// Returns the measurement settings of a chain of `uavs` relays; missing settings have their defaults.
     pub fn of(&self, uavs: u16) -> Listen {
         let default = if self.following {
             Listen::following(uavs)
@@ -170,7 +170,8 @@ pub struct Noise {
     pub bandwidth_hz: f64,
     /// Noise figure of the receivers, dB, 0 to 60; 6 by default.
     pub figure_db: f64,
-    /// Noise power, dBm, -200 to 0. If given, it is used instead of the one computed from bandwidth and noise figure.
+    /// Noise power, dBm, -200 to 0. If given, it is used instead of the noise power computed from bandwidth and noise
+    /// figure.
     pub power_dbm: Option<f64>,
     /// Antenna gains, dBi, -30 to 60: of the relays, then of Rx. The default is 0.
     pub gains_dbi: [f64; 2],
@@ -283,7 +284,7 @@ pub struct RelayOverride {
     /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. It may be outside
     /// `altitude_min_m` to `altitude_max_m`.
     pub altitude_m: Option<f64>,
-    /// EIRP of this relay, W, 1e-6 to 1e6; `None` for the common one.
+    /// EIRP of this relay, W, 1e-6 to 1e6; `None` for the common EIRP.
     pub power_w: Option<f64>,
 }
 

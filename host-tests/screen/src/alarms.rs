@@ -5,7 +5,8 @@
 
 use crate::snapshot::{Alarm, Urgency};
 
-/// Number of alarms beyond which ended ones are dropped: the least urgent first, of these the oldest. Lasting ones stay.
+/// Number of alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
+/// alarms the oldest. Alarms that still last are not dropped.
 pub const MOST: usize = 200;
 
 /// Reason of an alarm.
@@ -102,8 +103,8 @@ impl Reason {
 
 /// Alarm that lasts: its reason, its subject, its reporters and a note.
 ///
-/// The subject is the relay that it is about; 0 if it is about its reporters or the station. The reporters are the relays that have
-/// reported it, sorted. The note is appended to the text of the reason.
+/// The subject is the relay that the alarm is about; 0 if the alarm is about its reporters or the station. The
+/// reporters are the relays that have reported it, sorted. The note is appended to the text of the reason.
 pub type Lasting = (Reason, u16, Vec<u16>, String);
 
 #[derive(Debug)]
@@ -130,7 +131,7 @@ pub struct Alarms {
 impl Alarms {
     /// Begins an alarm, or adds the reporter `by` to the same alarm that lasts already.
     ///
-    /// `subject` is the relay that it is about; 0 if it is about its reporters.
+    /// `subject` is the relay that the alarm is about; 0 if the alarm is about its reporters.
     pub fn begin(&mut self, time_s: f64, reason: Reason, subject: u16, by: u16) {
         let known = self
             .lasting()

@@ -29,7 +29,7 @@ pub struct Chain<'a> {
     pub end: Side,
     /// Number of relays that are listed even if they have not reported.
     pub relays: u16,
-    /// Altitude and power of relays that differ from the mission's common ones, by number.
+    /// Profiles (altitude and power) that differ from the mission's common profile, by relay number.
     pub profiles: &'a [(u16, Profile)],
     /// True if the relays have estimated the interferer of the mission.
     pub is_estimated: bool,

@@ -355,7 +355,8 @@ pub(crate) fn picture(tile: Option<(&str, Vec<u8>)>) -> Vec<u8> {
     response
 }
 
-/// Returns the response with the program's answer to a task: an error if it does not do it.
+/// Returns the response with the program's answer to a task. The response is an error if the program does not do the
+/// task.
 pub(crate) fn replied(reply: &Result<String, String>) -> String {
     let (status, reason, media, text) = match reply {
         Ok(json) => (200, "OK", "application/json", json),

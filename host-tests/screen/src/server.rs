@@ -25,10 +25,10 @@ use crate::request::{
 };
 use crate::snapshot::{LogLine, Snapshot};
 
-/// Largest number of open connections. Further ones get the status 503.
+/// Largest number of open connections. Further connections get the status 503.
 pub const MAX_CONNECTIONS: usize = 64;
 
-/// Largest number of open connections from one other computer, so that it leaves room for others.
+/// Largest number of open connections from one other computer. Connections thus remain for other computers.
 pub const MAX_PER_ADDRESS: usize = 16;
 
 /// Largest number of streams of snapshots, so that they leave room for files and tasks.
@@ -64,7 +64,7 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Time without a new snapshot after which a comment is sent, to detect a browser that has left.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Number of tasks that wait for the program. Further ones get the status 503.
+/// Number of tasks that wait for the program. Further tasks get the status 503.
 const TASKS: usize = 4;
 
 /// Time in which the program has to answer a task.
@@ -88,7 +88,7 @@ const STACK: usize = 1024 * 1024;
 pub struct Tiles {
     /// Smallest and largest zoom level.
     pub zooms: [u8; 2],
-    /// Text that names the source of the pictures, which the page shows. Empty without one.
+    /// Text that names the source of the pictures, which the page shows. Empty without pictures.
     pub attribution: String,
     /// Returns media type and bytes of the tile at a zoom level, column and row; `None` if there is none.
     ///
@@ -142,7 +142,7 @@ enum Stage {
     Streaming,
 }
 
-/// Newest snapshot that is not yet written as JSON, and the log lines since the last one that was.
+/// Newest snapshot that is not yet written as JSON. Also the log lines since the last written snapshot.
 #[derive(Debug, Default)]
 struct Inbox {
     snapshot: Option<Snapshot>,
@@ -152,7 +152,7 @@ struct Inbox {
 /// Newest snapshot and log lines as JSON.
 #[derive(Debug, Default)]
 struct Outbox {
-    /// Number of snapshots written so far; 0 before the first one.
+    /// Number of snapshots written so far; 0 if none was written.
     number: u64,
     /// Newest snapshot, as an event of the stream.
     event: Arc<str>,
@@ -204,7 +204,7 @@ impl Post {
         !self.is_settled.swap(true, Ordering::SeqCst)
     }
 
-    /// Answers the task: with JSON, or with the reason why the program does not do it. It never waits.
+    /// Answers the task: with JSON, or with the reason why the program does not do the task. The call never waits.
     pub fn reply(self, reply: Result<String, String>) {
         // A browser may have left.
         _ = self.reply.try_send(reply);
@@ -498,7 +498,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Returns the address under which a computer is counted.
 ///
-/// It is one for all loopback addresses, and one for an IPv6 network of 64 bits.
+/// All loopback addresses count as one address, and so do all addresses of an IPv6 network of 64 bits.
 fn counted_as(peer: IpAddr) -> IpAddr {
     let peer = peer.to_canonical();
     match peer {
@@ -539,7 +539,8 @@ impl Counted {
         })
     }
 
-    /// Records that the request has been accepted. Returns false if it is for a stream too many.
+    /// Records that the request has been accepted. Returns false if it requests a stream, and too many streams are
+    /// open.
     fn accept(&mut self, answer: Answer) -> bool {
         let stage = match answer {
             Answer::Events => Stage::Streaming,
@@ -661,7 +662,7 @@ fn is_timeout(error: &io::Error) -> bool {
     )
 }
 
-/// Returns the time left until `until`; an error if there is none.
+/// Returns the time left until `until`; an error if no time is left.
 fn left(until: Instant) -> io::Result<Duration> {
     let left = until.saturating_duration_since(Instant::now());
     if left.is_zero() {

@@ -39,7 +39,8 @@ const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 
 /// Time after which a drone that does not come nearer to its setpoint is reported.
 ///
-/// Reports have the setpoint every eighth time only: a drone on its way to a new one may fly away from the one before for 10 s.
+/// Reports have the setpoint every eighth time only: a drone on its way to a new setpoint may therefore seem to fly
+/// away from the previous setpoint for 10 s.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Distance from a setpoint below which a drone has reached it, m.
@@ -58,15 +59,16 @@ pub struct Frames {
 #[derive(Clone, Copy, Debug)]
 struct Known {
     report: Report,
-    /// True from the control by the relay until the pilot takes it, also without a link to the autopilot.
+    /// True from the time when the relay takes control of the drone until the pilot takes control. Also true without
+    /// a link to the autopilot.
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
     /// Time of the first report of an agreed position without a lease; `None` while that is not so.
     unleased_at: Option<Instant>,
-    /// Slowly decaying maximum of the ages of its reports at the arrival of the next one.
+    /// Slowly decaying maximum of the age that a report of this relay has when the next report arrives.
     longest_age: Duration,
-    /// Least distance from the setpoint, m, and its time; `None` while the drone need not fly there.
+    /// Least distance from the setpoint, m, and its time. `None` while the drone need not fly to the setpoint.
     nearest: Option<(Instant, f32)>,
 }
 
@@ -83,7 +85,7 @@ impl Known {
         }
     }
 
-    /// Replaces the report by a newer one. The first report is taken, too.
+    /// Replaces the stored report of the relay by a newer report. The first report is stored, too.
     fn take(&mut self, now: Instant, report: Report) {
         let before = std::mem::replace(&mut self.report, report);
         let decayed = Duration::from_micros(self.longest_age.as_micros() * 7 / 8);
@@ -111,9 +113,10 @@ impl Known {
         });
     }
 
-    /// Returns the age of its report from which the relay counts as silent. Where reports often take long, it is longer.
+    /// Returns the age of its last report from which the relay counts as silent. If the reports of this relay often
+    /// take long, the result is longer.
     ///
-    /// Before a relay's first agreement its reports may wait 6 s for it.
+    /// Before a relay's first agreement its reports may be delayed by 6 s.
     fn silent_after(&self) -> Duration {
         let Report { phase, agreed, .. } = self.report;
         let is_idle = matches!(phase, Phase::Holding | Phase::Infeasible | Phase::NoQuorum);
@@ -153,9 +156,9 @@ pub struct StationView {
     /// Neighbours that have reported a relay as silent, by relay, and the time of their last such report.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     frames: Frames,
-    /// Time of the last accepted frame; that of the start before the first one.
+    /// Time of the last accepted frame; before the first frame it is the time of the start.
     frame_at: Instant,
-    /// Time of the last frame that ended a silence of the whole chain. Ages of reports count from it.
+    /// Time of the last frame that ended a silence of the whole chain. The ages of reports count from this time.
     resumed_at: Instant,
     rejected_at: Option<Instant>,
     /// Newest version of the mission that is flown, and the time when it became known.
@@ -163,7 +166,7 @@ pub struct StationView {
 }
 
 impl StationView {
-    /// Returns the newest version of the mission that relays report; `None` before the first report of one.
+    /// Returns the newest version of the mission that relays report; `None` until a report has a version.
     pub fn version(&self) -> Option<u16> {
         self.version.map(|(version, _)| version)
     }
@@ -198,7 +201,7 @@ impl StationView {
         }
     }
 
-    /// Takes a report and logs what has changed; returns false if it is not newer than the known one.
+    /// Stores a report and logs the changes. Returns false if the report is not newer than the stored report.
     fn take(&mut self, now: Instant, report: Report, log: &mut Vec<LogLine>) -> bool {
         let number = report.relay;
         let before = self.known.get(&number).map(|it| it.report);
@@ -251,9 +254,9 @@ impl StationView {
         self.frames = frames;
     }
 
-    /// Drops the claims about relays that have reported since.
+    /// Drops the statements of neighbours about relays that have sent a report since then.
     ///
-    /// A claim that the newest report of a neighbour still has stays.
+    /// A statement that the newest report of a neighbour still contains is kept.
     fn drop_answered_claims(&mut self, now: Instant) {
         let known = &self.known;
         for (number, claims) in &mut self.claims {
@@ -378,7 +381,8 @@ impl StationView {
     }
 }
 
-/// Returns the distance of a drone from its setpoint, m. `None` if it is not engaged or has to wait.
+/// Returns the distance of a drone from its setpoint, m. `None` if the relay does not control the drone, or has to
+/// wait.
 fn distance_to_fly_m(report: &Report) -> Option<f32> {
     let flies = report.control == Some(State::Engaged) && report.hold_reasons == [None; 2];
     let (at, to) = (report.position?, report.setpoint?);
@@ -397,7 +401,7 @@ fn silent(report: &Report) -> impl Iterator<Item = u16> {
     pairs.filter_map(|(beside, is_silent)| beside.filter(|_| is_silent))
 }
 
-/// Returns a line for each difference of a relay's report from the one before.
+/// Returns a line for each difference of a relay's report from the previous report.
 fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     let Some(old) = before else {
         let words = |it| format!(", {}", control(it));

@@ -68,7 +68,7 @@ fn connect(screen: &Screen) -> TcpStream {
     stream
 }
 
-/// Sends `request` and returns the response; empty if the server closed the connection without one.
+/// Sends `request` and returns the response. Empty if the server closed the connection without a response.
 fn asked(screen: &Screen, request: &[u8]) -> String {
     let mut stream = connect(screen);
     _ = stream.write_all(request);

@@ -284,7 +284,7 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Checks that of two relays with one number the later one gets no setpoint. Both relays must report the duplicate.
+/// Checks that of two relays with one number the later relay gets no setpoint. Both relays must report the duplicate.
 ///
 /// Runs `COUNT` chains for each loss rate; `COUNT` is an environment variable.
 #[test]
@@ -373,8 +373,8 @@ fn with_a_key_the_duplicate_with_the_larger_epoch_stays() {
     }
 }
 
-/// Checks that an attacker without the key can make relays report a duplicate, but makes none passive. A passive
-/// relay gets no setpoint.
+/// Checks that an attacker without the key makes no relay passive. The attacker can make relays report a duplicate. A
+/// passive relay gets no setpoint.
 #[test]
 fn forged_frames_make_no_relay_passive() {
     let mission = mission(3);

@@ -146,7 +146,7 @@ fn cut(after: u16, from: u64, until: u64) -> Partition {
 
 /// Returns the setups of runs with all pairs of different partitions of eight relays.
 ///
-/// Both partitions begin at the same time, or the second one begins later.
+/// Both partitions begin at the same time, or the second partition begins later.
 fn cuts() -> Vec<Setup> {
     let mut all = Vec::new();
     for one in 1..8 {
@@ -236,7 +236,7 @@ fn one_way_links(seed: u64) -> Vec<Setup> {
     all
 }
 
-/// Describes what is wrong at the end of a run with a one-way link; `None` if nothing is.
+/// Describes the fault at the end of a run with a one-way link. `None` without a fault.
 ///
 /// All relays except one at the failed link must have positions in one view, without changes in the last [`STILL_S`].
 fn wrong(setup: &Setup, outcome: &Outcome) -> Option<String> {

@@ -50,7 +50,7 @@ pub struct Medium {
 impl Medium {
     /// Creates links for `senders` sending ports, one port of a drone each. No bytes are in transit at `now`.
     ///
-    /// The times in `link` are those of the drones' own clocks. `seed` determines the random `faults`.
+    /// The times in `link` are on the drones' own clocks. `seed` determines the random `faults`.
     pub fn new(senders: usize, link: LinkSpec, faults: Faults, seed: u64, now: Instant) -> Self {
         Self {
             link,
@@ -98,7 +98,8 @@ impl Medium {
         }
     }
 
-    /// Returns the receiver's index and the next bytes that have arrived there by `now`; `None` if none.
+    /// Returns the receiver's index and the next bytes that have arrived there by `now`. `None` if no bytes have
+    /// arrived.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
             return None;

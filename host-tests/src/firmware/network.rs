@@ -41,7 +41,7 @@ pub type Hearers = Vec<Vec<usize>>;
 
 /// Returns the topology of a chain of `drones` with wires: each port leads to one neighbour.
 ///
-/// Each drone has two ports, the upstream one first.
+/// Each drone has two ports, the upstream port first.
 pub fn chain(drones: usize) -> Hearers {
     let downstream_of = |drone: usize| drone.checked_sub(1).map(|before| 2 * before + 1);
     let upstream_of = |drone: usize| (drone < drones).then_some(2 * drone);

@@ -10,7 +10,7 @@ use super::journal::{BLANK, Flash};
 pub struct Ram {
     /// Content of each flash sector, in words of 32 bits.
     pub sectors: [Vec<u32>; 2],
-    /// Number of word writes and erases after which power fails, in the middle of the last one.
+    /// Number of word writes and erases after which power fails, in the middle of the last write or erase.
     ///
     /// 0 while the power is off; `None` if power does not fail.
     pub power: Option<usize>,
@@ -29,7 +29,7 @@ enum Power {
 }
 
 impl Ram {
-    /// Creates two blank flash sectors of `words` words each; `seed` is that of the random faults.
+    /// Creates two blank flash sectors of `words` words each; `seed` is the seed of the random faults.
     pub fn blank(words: usize, seed: u64) -> Self {
         Self {
             sectors: [vec![BLANK; words], vec![BLANK; words]],

@@ -106,7 +106,7 @@ struct Tile {
     nodata: Option<f32>,
 }
 
-/// Height at one node (point) of the terrain grid, or why there is none.
+/// Height at one node (point) of the terrain grid, or the reason why it is unknown.
 enum Node<'a> {
     Height(f64),
     /// The node is in this file, which has this invalid value instead of a height there.
@@ -470,7 +470,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
     })
 }
 
-/// Returns the value of the item `role` of GDAL's metadata; `None` if there is none.
+/// Returns the value of the item `role` of GDAL's metadata; `None` without such an item.
 fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
     let (_, after) = text.split_once(&format!("role=\"{role}\""))?;
     let (_, value) = after.split_once('>')?;

@@ -20,7 +20,7 @@ use crate::grid::Terrain;
 /// Fraction of the radius of the first Fresnel zone that a clear hop keeps free of the ground.
 pub const FREE: f64 = 0.6;
 
-/// Largest number of points of a profile, apart from its first one.
+/// Largest number of points of a profile, apart from its first point.
 const MOST_POINTS: f64 = 20_000.0;
 
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
@@ -56,7 +56,7 @@ pub struct Node {
 /// Ground below a hop, and the antennas at its two ends.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Profile {
-    /// Antennas of the hop, the one nearer to Tx first.
+    /// Antennas of the hop, the antenna nearer to Tx first.
     pub nodes: [Node; 2],
     /// Distances from the first antenna, increasing from 0, and heights of the ground, m.
     pub points: Vec<Point>,
@@ -144,7 +144,7 @@ impl<'a> Ground<'a> {
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)
     }
 
-    /// Returns the largest distance of two points of a profile, m: a quarter of a cell of the elevation model.
+    /// Returns the largest distance of two points of a profile, m. It is a quarter of a cell of the elevation model.
     pub const fn step_m(&self) -> f64 {
         self.step_m
     }

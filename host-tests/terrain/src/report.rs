@@ -29,7 +29,7 @@ pub struct HopReport {
     pub obstacle_lon_deg: f64,
     /// Diffraction loss of the hop by Recommendation ITU-R P.526, dB; the same in both directions.
     pub diffraction_db: f64,
-    /// SIR of the hop in the direction to Rx, dB, with this loss. The interferers have none.
+    /// SIR of the hop in the direction to Rx, dB, with this loss. The signals of the interferers have no such loss.
     pub sir_db: f64,
     /// SIR of the hop in the direction to Tx, dB, with this loss; absent if it is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,7 +89,7 @@ pub struct FreeSpace<'a> {
     pub sirs: &'a [f64],
     /// SIRs in the direction to Tx; empty if they are unknown.
     pub sirs_back: &'a [f64],
-    /// Required SIR toward Tx as a fraction of that toward Rx; 0 if only the direction to Rx counts.
+    /// Required SIR toward Tx as a fraction of the SIR toward Rx; 0 if only the direction to Rx counts.
     pub reverse: f64,
 }
 
@@ -187,7 +187,7 @@ impl TerrainReport {
 
     /// Returns a line that names the relays lower than `least_m` above the highest ground.
     ///
-    /// `None` if there are none.
+    /// `None` if no relay is too low.
     pub fn too_low(&self, least_m: f64) -> Option<String> {
         let low = self
             .heights
@@ -203,7 +203,7 @@ impl TerrainReport {
 
     /// Returns a line that names the relays higher than `most_m` above the ground.
     ///
-    /// `None` if there are none.
+    /// `None` if no relay is too high.
     pub fn too_high(&self, most_m: f64) -> Option<String> {
         let high = self
             .heights

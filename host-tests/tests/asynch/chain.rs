@@ -48,7 +48,7 @@ pub(crate) struct Drone {
 /// Result of a simulated chain: recorded outputs of each relay, and the frames on each serial line.
 pub(crate) struct Flown {
     pub(crate) drones: Vec<Drone>,
-    /// Frames on each wire: first the wires toward Rx, then those toward Tx. A shared channel is one entry.
+    /// Frames on each wire: first the wires toward Rx, then the wires toward Tx. A shared channel is one entry.
     pub(crate) lines: Vec<Vec<TimedFrame>>,
 }
 

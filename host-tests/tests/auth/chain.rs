@@ -138,7 +138,7 @@ fn a_rebooted_relay_rejoins_by_new_handshakes() {
     }
 }
 
-/// Checks that frames of a neighbour with another key, or none, are refused and counted by their cause.
+/// Checks that frames of a neighbour with another key, or without a key, are refused and counted.
 #[test]
 fn a_relay_with_another_key_is_ignored() {
     let stranger = Key::new([1; 32]);

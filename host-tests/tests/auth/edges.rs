@@ -132,7 +132,7 @@ fn a_tag_for_other_nonces_counts_as_forged() {
     assert_eq!(link.send_with_counter(5), Some("received"));
 }
 
-/// Checks what the documentation of `Auth::epoch` warns of: a relay must not start with a used epoch.
+/// Checks the warning in the documentation of `Auth::epoch`: a relay must not start with a used epoch.
 ///
 /// If it does, its neighbour ignores the relay's frames as replayed, and the relay accepts old frames of the
 /// neighbour.

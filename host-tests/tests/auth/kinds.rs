@@ -297,7 +297,7 @@ impl Attacker {
         Some((frame, "forged"))
     }
 
-    /// Draws a frame counter: the recorded one, a slightly larger one or an arbitrary one.
+    /// Draws a frame counter: the recorded counter, a slightly larger counter or an arbitrary counter.
     pub(crate) fn counter(&mut self, recorded: &Plain) -> u32 {
         match self.rng.random_range(0..3) {
             0 => recorded.counter(),

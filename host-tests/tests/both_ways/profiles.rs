@@ -105,8 +105,9 @@ impl Tally {
     }
 }
 
-/// Compares Algorithm 1 with the reference search (the judge) in random scenes. Scenes are for both directions and
-/// for one. `change` modifies each scene; `what` names the change in the output. The judge is an independent search.
+/// Compares Algorithm 1 with the reference search (the judge) in random scenes. Some scenes are for both directions,
+/// others for one direction. `change` modifies each scene; `what` names the change in the output. The judge is an
+/// independent search.
 ///
 /// For both directions the scenes must be within 1e-4 of the judge's SIR if `is_exact`, else at least 80 % of them
 /// within 5 %.

@@ -15,7 +15,7 @@ const MARGIN: usize = 3;
 /// Factor on `dead_after`: the silence after which a neighbour must be reported as lost in any case.
 pub(crate) const LONGEST: u32 = 8;
 
-/// Model of what a relay knows about the life of a neighbour.
+/// Model of a relay's knowledge about a neighbour's signs of life.
 #[derive(Debug)]
 pub(crate) struct Signs {
     /// Sequence number and time of every heartbeat request that the relay has sent to the neighbour.

@@ -16,7 +16,8 @@ pub(crate) struct Tally {
     sequences: BTreeMap<(Kind, bool), u64>,
 }
 
-/// Events that must occur: each with the number of sequences among which at least one must have it.
+/// Events that must occur. Each has a number of test sequences; at least one of so many sequences must have the
+/// event.
 const EXPECTED: [(&str, u64); 18] = [
     ("frames in bursts", 1),
     ("frames delayed", 1),

@@ -35,7 +35,7 @@ fn count(case: &Case, name: &str) -> u32 {
     case.args[name].as_u64().unwrap().try_into().unwrap()
 }
 
-/// Checks the single interferer that is fitted to several ones against values of a separate program.
+/// Checks the single interferer that replaces several against values of a separate program.
 ///
 /// That program computes the error of the fit as a sum over a grid of nx times nh points.
 #[test]

@@ -60,7 +60,7 @@ fn for_one_source_the_optimum_is_that_of_the_reference() {
     assert!(worst < 1e-9, "{worst}");
 }
 
-/// Checks that the optimum of one to four relays is that of a brute-force search.
+/// Checks that the optimum of one to four relays agrees with a brute-force search.
 ///
 /// In a third of the scenes the relays have different powers; half of the scenes have a minimum separation.
 #[test]

@@ -135,9 +135,9 @@ fn chains_of_different_relays_meet_the_agreed_target() {
     );
 }
 
-/// Checks the search for the target SIR if a higher target can be met and a lower one cannot.
+/// Checks the search for the target SIR if a higher target can be met and a lower target cannot.
 ///
-/// The chain can meet an SIR of 37 743 but not one of 31 292. The search must end, at the higher one.
+/// The chain can meet an SIR of 37 743 but not an SIR of 31 292. The search must end at the higher SIR.
 #[test]
 fn a_feasible_target_counts_above_an_infeasible_one() {
     let mut rng = ChaCha8Rng::seed_from_u64(124);

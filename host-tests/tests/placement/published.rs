@@ -15,8 +15,8 @@ fn close(ours: f64, theirs: f64, what: &str) {
     );
 }
 
-/// Checks the receiver's farthest x at which a hop meets a target SIR. The expected values are those of the paper's
-/// errata and of a public reference.
+/// Checks the receiver's farthest x at which a hop meets a target SIR. The expected values come from the paper's
+/// errata and from a public reference.
 #[test]
 fn reference_cases_of_one_hop_hold() {
     let mut checked = 0;

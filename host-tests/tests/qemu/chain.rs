@@ -40,7 +40,7 @@ pub(crate) fn simulated(flight: &Flight) -> Vec<[u32; 3]> {
         .collect()
 }
 
-/// Maximum number of flights until one has no damaged frame.
+/// Maximum number of flights until a flight has no damaged frame.
 ///
 /// The emulator is not real time, so on a busy host it loses a byte now and then. A fault of the port driver would
 /// show in every flight.

@@ -107,7 +107,7 @@ pub(crate) struct Fleet {
 }
 
 impl Fleet {
-    /// Starts one drone with `image` for each configuration block. `faults` and `seed` are those of the medium.
+    /// Starts one drone with `image` for each configuration block. `faults` and `seed` are for the simulated medium.
     pub(crate) fn start(which: Image, blocks: &[Vec<u8>], faults: Faults, seed: u64) -> Self {
         Self::begin(which, blocks, &[], None, faults, seed, Life::Fast)
     }

@@ -17,14 +17,14 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Returns the text after `label` in the line; `None` if it has no such label.
+    /// Returns the text after `label` in the line; `None` if the line has no such label.
     pub(crate) fn after(&self, label: &str) -> Option<&str> {
         self.text
             .split_once(label)
             .map(|(_, rest)| rest.trim_start())
     }
 
-    /// Returns the f32 bits that the line has in parentheses after `label`. `None` if it has no such label.
+    /// Returns the f32 bits that the line has in parentheses after `label`. `None` if the line has no such label.
     fn bits(&self, label: &str) -> Option<u32> {
         let (_, rest) = self.after(label)?.split_once("(0x")?;
         u32::from_str_radix(rest.split_once(')')?.0, 16).ok()

@@ -42,7 +42,7 @@ fn five_signing_drones_settle_like_the_simulation() {
     }
 }
 
-/// Checks that a drone with another key and one without a key take no part in the chain.
+/// Checks that a drone with another key, and a drone without a key, take no part in the chain.
 #[test]
 fn a_drone_without_the_key_takes_no_part() {
     let flight = paper(4);

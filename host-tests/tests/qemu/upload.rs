@@ -23,7 +23,7 @@ const LARGE: usize = 32 * 1024;
 
 const KEY: [u8; 32] = *b"three drones and one transmitter";
 
-/// Returns the flight to upload. Its interferer, altitude and power differ from those of the mission before flight.
+/// Returns the flight to upload. Its interferer, altitude and power differ from the mission before flight.
 fn moved(uavs: u16) -> Flight {
     let scenario = Scenario {
         interference: Interference::Sources(vec![Source {

@@ -23,7 +23,7 @@ const SYSTEM: u8 = 7;
 
 const FASTEST_M_S: f32 = 8.0;
 
-/// Time for which the pilot stays in a mode other than OFFBOARD and GUIDED, ms: that of six heartbeats.
+/// Time for which the pilot stays in a mode other than OFFBOARD and GUIDED, ms. It is six heartbeats.
 const ELSEWHERE: u64 = 1_500;
 
 /// Id of the MAVLink message HEARTBEAT.
@@ -64,7 +64,8 @@ pub(crate) struct Vehicle {
     pub(crate) landed: MavLandedState,
     /// True if the pilot chooses OFFBOARD or GUIDED; false if the pilot flies the drone manually.
     ///
-    /// If the companion asks for another mode, the pilot chooses one for a while, and then OFFBOARD or GUIDED again.
+    /// If the companion asks for another mode, the pilot chooses another mode for a while, and then OFFBOARD or
+    /// GUIDED again.
     pub(crate) granted: bool,
     /// Time until which the pilot chooses another mode than OFFBOARD or GUIDED, ms.
     elsewhere_until: u64,

@@ -82,7 +82,7 @@ fn reaches_agree_with_a_scan() {
     assert!(inside > 500 && hills > 100 && blocked > 100);
 }
 
-/// Checks that the optimum of one and two relays is that of brute force.
+/// Checks that the optimum of one and two relays agrees with brute force.
 ///
 /// The cases are with and without a minimum separation. At different altitudes, the optimum may not be the chain in
 /// which each relay goes as far along as possible, so that the reference follows all possible positions of each

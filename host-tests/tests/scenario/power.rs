@@ -105,7 +105,8 @@ fn an_eirp_outside_the_missions_range_is_refused() {
 /// End of a radio link: its position in m, and its antenna gain in dBi.
 type End = ([f64; 3], f64);
 
-/// Returns the received power in dBm for a transmitted power `dbm`. Free space, excess loss and both antennas count.
+/// Returns the received power in dBm for a transmitted power `dbm`. The loss in free space, the excess loss and both
+/// antenna gains are included.
 fn received_dbm(
     dbm: f64,
     (from, sends_dbi): End,

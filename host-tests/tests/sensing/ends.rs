@@ -17,10 +17,10 @@ const RELAYS: u16 = 5;
 /// Factor by which the true path loss on the ground exceeds that in the mission: Rx is behind a hill.
 const HILL: f64 = 8.0;
 
-/// Returns two results of each random scene: relay 1's error of the power at Rx, and the SIR. The error is relative.
+/// Returns two results of each random scene: relay 1's error of the power at Rx, and the SIR.
 ///
-/// The error is relative, and `None` without an estimate. The SIR is that of the chain's worst hop, linear, with the
-/// true interference.
+/// The error is relative, and `None` without an estimate. The SIR is the SIR of the chain's worst hop, linear, with
+/// the true interference.
 fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     let one = |seed| {
         let wild = RandomScene::new(seed, RELAYS, 1);
@@ -43,7 +43,7 @@ fn flown(change: impl Fn(&mut Setup) + Sync) -> Vec<(Option<f64>, f64)> {
     (0..count(20)).into_par_iter().map(one).collect()
 }
 
-/// Returns the first relay's estimate of the interference power at the receiver, W; `None` without one.
+/// Returns the first relay's estimate of the interference power at the receiver, W. `None` without an estimate.
 fn measured_at_rx(outcome: &Outcome) -> Option<f64> {
     match outcome.relays.first()?.believed.estimate {
         InterferenceEstimate::Source { receiver_w, .. } if receiver_w > 0.0 => {

@@ -11,8 +11,8 @@ use uav_relay_tools::listening::{RandomScene, quantile};
 
 use crate::count;
 
-/// Simulated faults of a sensor: factors on its readings, and constant readings. The constants are those of a 10 W
-/// interferer at 500 m, of a receiver's noise, and zero.
+/// Simulated faults of a sensor: factors on its readings, and constant readings. The constants are the power of a 10
+/// W interferer at 500 m, a receiver's noise, and zero.
 const KINDS: [(&str, BrokenReading); 7] = [
     ("0.1 times", BrokenReading::Times(0.1)),
     ("0.5 times", BrokenReading::Times(0.5)),
@@ -71,7 +71,7 @@ fn with_wrong(wild: &RandomScene, node: u16, says: BrokenReading) -> Outcome {
     run(wrong).unwrap()
 }
 
-/// Checks that no kind of faulty sensor costs much SIR, and that the faulty one is reported.
+/// Checks that no kind of faulty sensor costs much SIR, and that the faulty sensor is reported.
 ///
 /// `node` gives the node with the faulty sensor for each scene. `sound` has the fraction of the optimum SIR that each
 /// scene reaches without faults.

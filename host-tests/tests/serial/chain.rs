@@ -24,7 +24,7 @@ pub(crate) fn relay(relays: u16, index: u16, wiring: Wiring) -> Relay {
 /// Port driver of a relay: for two wires or a shared channel, over either kind of mock port.
 pub(crate) trait Driver {
     fn poll(&mut self, now: Instant, relay: &mut Relay) -> Option<Instant>;
-    /// Returns the counters of each port: those of the upstream or shared port come first.
+    /// Returns the counters of each port. The counters of the upstream or shared port come first.
     fn stats(&self) -> Vec<SerialStats>;
 }
 
@@ -121,8 +121,8 @@ pub(crate) fn chain(
     (nodes, far)
 }
 
-/// Polls the relays when they are due or have bytes to read, and checks the guarantees of `poll`. Returns the time at
-/// the end.
+/// Polls the relays when a timer expires or bytes can be read, and checks the guarantees of `poll`. Returns the time
+/// at the end.
 pub(crate) fn run(nodes: &mut [Node], from: Instant, until: Instant) -> Instant {
     let mut now = from;
     while now < until {

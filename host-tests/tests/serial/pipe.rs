@@ -60,7 +60,7 @@ impl End {
         self.medium.borrow().carried
     }
 
-    /// Adds bytes to those that this end has received.
+    /// Adds bytes to the received bytes of this end.
     pub(crate) fn add_received(&self, bytes: &[u8]) {
         self.medium.borrow_mut().inboxes[self.number].extend(bytes);
     }
@@ -88,7 +88,7 @@ impl End {
     }
 }
 
-/// Schedule of read errors: one every `every` bytes, each of which loses its byte.
+/// Schedule of read errors: one every `every` bytes, each error loses one byte.
 #[derive(Clone, Default)]
 pub(crate) struct ReadErrors {
     pub(crate) every: usize,

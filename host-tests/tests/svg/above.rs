@@ -55,8 +55,8 @@ fn gallery() -> Vec<Picture> {
     pictures
 }
 
-/// Returns the shapes of a class: those in the view from the side, and those in the view from above. `key` is the
-/// attribute with a shape's y.
+/// Returns the shapes of a class: in the view from the side, and in the view from above. `key` is the attribute with
+/// a shape's y.
 fn parts<'a>(
     document: &'a Document<'a>,
     tag: &'a str,

@@ -56,7 +56,7 @@ fn evenly(setup: &Setup) -> Vec<Point> {
     (1..=relays).map(place).collect()
 }
 
-/// Returns the setup with drones that hover 20 m off their positions and fly there.
+/// Returns the setup with drones that start 20 m beside their positions and fly to them.
 fn flown(mut setup: Setup) -> Setup {
     let common = setup.mission.config().common;
     setup.settings.guard = Some(GuardConfig::of(&setup.mission, common));

@@ -21,7 +21,7 @@ struct SceneResult {
     case: String,
     /// Fraction by which the solution's SIR is below the best SIR that brute force finds.
     short: f64,
-    /// Relative error of the SIR that the solution claims for its position.
+    /// Relative error of the SIR that the solution states for its position.
     told: f64,
 }
 
@@ -96,8 +96,8 @@ type Draw = fn(&mut ChaCha8Rng) -> LateralScene;
 
 /// Checks that the best position of a relay at a given altitude, with lateral offsets, is found.
 ///
-/// The position is compared with brute force in random scenes. Every case of the solution must occur, except those of
-/// `absent`.
+/// The position is compared with brute force in random scenes. Every case of the solution must occur, except the
+/// cases in `absent`.
 fn at_its_altitude(seed: u64, draw: Draw, absent: &[&str]) {
     let seen = no_worse_than_brute_force(
         seed,
@@ -181,8 +181,8 @@ fn one_relay_aside_has_the_recorded_optimum() {
     );
 }
 
-/// Checks that the solution without lateral offsets is that of Theorems 1 and 3. Permitted offsets never make it
-/// worse.
+/// Checks that the solution without lateral offsets agrees with Theorems 1 and 3. If lateral offsets are permitted,
+/// the solution never is worse.
 #[test]
 fn without_lateral_range_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));

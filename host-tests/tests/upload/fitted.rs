@@ -31,7 +31,8 @@ fn shares(wires: &Wires) -> Vec<bool> {
 
 /// Checks that relays refuse fitted slots that their settings or the interference do not allow.
 ///
-/// The refusal is counted and reported as that of a mission outside the geofence, and a newer mission is flown.
+/// The refusal is counted and reported like the refusal of a mission outside the geofence. A newer mission is then
+/// flown.
 #[test]
 fn fitted_slots_against_the_settings_are_refused() {
     let base = mission(3);

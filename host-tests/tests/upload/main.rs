@@ -60,9 +60,9 @@ fn upload(
 
 /// Checks the rules of uploads in a run. Returns the first violation as an error.
 ///
-/// All members of a membership view must use the same mission. If it is an uploaded one, it must be stored by at
-/// least as many relays as the view has. Setpoints must be within limits. A settled chain must use mission `version`,
-/// in the positions of a new chain with `config`.
+/// All members of a membership view must use the same mission. An uploaded mission must be stored by at least as many
+/// relays as the view has. Setpoints must be within limits. A settled chain must use mission `version`, in the
+/// positions of a new chain with `config`.
 fn judge(
     setup: &Setup,
     outcome: &Outcome,

@@ -47,7 +47,7 @@ fn sited(relays: u16, shared: bool) -> (Mission, Setup) {
 
 /// Checks a run like [`judge`], and that all relays use mission `version`'s positions of Tx and Rx.
 ///
-/// If that mission was not uploaded or has no such positions, those from before flight apply.
+/// If this mission was not uploaded or has no such positions, the positions from before flight apply.
 fn judge_between(setup: &Setup, outcome: &Outcome, version: u16) -> Result<(), String> {
     let spec = setup
         .uploads

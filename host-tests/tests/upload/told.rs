@@ -312,9 +312,9 @@ fn a_refusal_reaches_the_ground_despite_losses() {
     });
 }
 
-/// Checks that of two uploads by two ground stations, all relays use the newer one in the end.
+/// Checks that of two uploads by two ground stations, all relays use the newer upload in the end.
 ///
-/// The ground station with the older upload must learn of the newer one.
+/// The ground station with the older upload must receive information about the newer upload.
 #[test]
 fn the_newer_upload_of_two_stations_is_flown() {
     let settled: Vec<u64> = (0..count())

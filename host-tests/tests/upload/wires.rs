@@ -122,7 +122,7 @@ impl Wires {
         }
     }
 
-    /// Runs the chain until `over` is true, for at most `most_s` seconds. Returns true if it has become true.
+    /// Runs the chain until `over` is true, for at most `most_s` seconds. Returns true if `over` has become true.
     pub(crate) fn until(&mut self, most_s: u64, mut over: impl FnMut(&Self) -> bool) -> bool {
         let end = self.bench.now + Duration::from_millis(1_000 * most_s);
         while self.bench.now < end {

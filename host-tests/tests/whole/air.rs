@@ -47,7 +47,7 @@ pub(crate) enum ScheduledEvent {
     Clear(usize),
     /// The relay requests to leave the chain, with this remaining endurance, s.
     Leave(usize, Option<u16>),
-    /// The relay becomes a spare (waits outside of the chain), if it has not taken part in anything.
+    /// The relay becomes a spare (waits outside of the chain), if it has taken no part in the protocol yet.
     Spare(usize),
     /// The relay cancels its departure, or joins the chain again.
     Stay(usize),
@@ -153,7 +153,7 @@ pub(crate) struct Air {
     received_us: [Option<u64>; 2],
     /// Time since which a relay and its copy have both had setpoints, µs.
     ///
-    /// `None` while one of them has none, or while they do not receive each other.
+    /// `None` while one of the two has no setpoint, or while the two do not receive each other.
     both_us: Option<u64>,
     /// Longest time in which a relay and its copy had setpoints although they received each other, µs.
     pub(crate) longest_both_us: u64,
@@ -511,7 +511,7 @@ impl Air {
         self.flies = flies;
     }
 
-    /// Returns the size of the largest membership view whose members all have positions of one agreement.
+    /// Returns the size of the largest view whose members all have positions of one agreement.
     fn flying(&self) -> usize {
         let holds = |seen: &&ObservedState| {
             seen.is_on && seen.leased && seen.place.is_some() && seen.phase == Phase::Holding

@@ -111,8 +111,8 @@ fn a_left_out_relay_attracts_no_other() {
 
 /// Random seeds of links that stay up a little longer than the longest hold-down of 90 s.
 ///
-/// A relay does not use a link that fails often for the time of the hold-down. Here one end of the link uses it again
-/// before the other does, and soon after that the link is lost again.
+/// A relay does not use a link that fails often for the time of the hold-down. In these runs one end of the link uses
+/// the link again before the other end. Soon afterwards the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
 /// Checks that one flapping link costs at most a tenth of the time with agreed positions. The link fails and returns

@@ -144,7 +144,7 @@ fn ends_whole(schedule: fn(u64) -> Schedule) {
 
 /// Checks that of a relay and its copy, one loses its setpoint within 2 s.
 ///
-/// The copy is a second drone with the same index. The chain must be whole once one of them is removed. Two
+/// The copy is a second drone with the same index. The chain must be whole once one of the two is removed. Two
 /// agreements may be in use at the same time only if a cut separates relay and copy: both of them vote then, so that
 /// two parts may have a quorum.
 #[test]

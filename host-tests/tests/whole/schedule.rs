@@ -270,8 +270,8 @@ fn moved(schedule: &Schedule, rng: &mut ChaCha8Rng) -> Box<Upload> {
 
 /// Draws a schedule with a relay and its copy, one of which is removed after all other faults.
 ///
-/// A copy is a second drone with the same index. In half of the schedules, the one that is left is informed of the
-/// removal. In some schedules, the two do not receive each other, or the chain is cut.
+/// A copy is a second drone with the same index. In half of the schedules, the remaining drone is informed of the
+/// removal. In some schedules, the two drones do not receive each other, or the chain is cut.
 pub(crate) fn with_copy(seed: u64) -> Schedule {
     let mut schedule = without_steps(seed);
     let rng = &mut ChaCha8Rng::seed_from_u64(seed ^ 0xC0B1);

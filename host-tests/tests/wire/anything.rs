@@ -19,7 +19,7 @@ use super::message::{WireMessage, plain_of};
 use super::strategies::messages;
 use super::votes::mark;
 
-/// Sets the number and the mission digest of a message, in messages that have them.
+/// Sets the number and the mission digest of a message, in messages that have these fields.
 ///
 /// The number counts the rounds of messages along the chain.
 fn renamed(message: &WireMessage, number: u16, mission: u16) -> WireMessage {
@@ -162,8 +162,8 @@ struct Flight {
 impl Flight {
     /// Returns the messages of a step with the ports at which they arrive.
     ///
-    /// These are the step's message and, if it starts a round along the chain, perhaps the next neighbour's answer to
-    /// it.
+    /// These are the step's message, and perhaps the next neighbour's answer if the message starts a round along the
+    /// chain.
     fn messages(&mut self, step: &Step) -> Vec<(Port, WireMessage)> {
         let (from, to) = self.ports;
         let tag = step.message.tag();

@@ -17,7 +17,7 @@ const PORTS: [(Wiring, Port); 2] = [
     (Wiring::Shared, Port::Shared),
 ];
 
-/// Delivers a frame to relay 4 of 8. Returns the index claims and echoes of claims that it sends.
+/// Delivers a frame to relay 4 of 8. Returns the index claims, and echoes of claims, that the relay sends.
 fn receive(bench: &mut Bench, port: Port, bytes: &[u8]) -> Vec<(Port, WireMessage)> {
     let now = bench.now;
     bench.handle_bytes(now, port, bytes);
@@ -58,7 +58,7 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
 }
 
 /// Checks that a relay becomes passive if a larger claim names the relay's own claim number. A claim that does not
-/// name it may be from before the relay's start, and is only answered.
+/// name this number may be from before the relay's start, and is only answered.
 #[test]
 fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     for (wiring, port) in PORTS {
@@ -142,8 +142,8 @@ fn with_key(key: u8, seed: u32) -> (Relay, Vec<Vec<u8>>) {
 
 /// Checks that handshakes take the place of index claims if relays have a key.
 ///
-/// One of two duplicates (relays with the same index) becomes passive, the other one answers. A relay's own
-/// handshakes have no effect on it.
+/// One of two duplicates (relays with the same index) becomes passive, the other duplicate answers. A relay's own
+/// handshakes have no effect on this relay.
 #[test]
 fn with_a_key_handshakes_are_the_claims() {
     let mut passive = 0;

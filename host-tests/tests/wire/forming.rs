@@ -126,7 +126,8 @@ fn a_quorum_is_over_half_or_half_with_the_proposer() {
 
 /// Checks that a member of the earlier membership view adds its vote to a proposal.
 ///
-/// The member also lowers the proposal's remaining lease to its own if that is shorter.
+/// If the member's own remaining lease is shorter than the remaining lease in the proposal, the member lowers the
+/// value in the proposal.
 #[test]
 fn a_member_adds_its_vote() {
     let last = last_of_20(true);

@@ -12,7 +12,7 @@ use super::votes::FORMS;
 const UP: Port = Port::Upstream;
 const DOWN: Port = Port::Downstream;
 
-/// Checks that a result of a collection of profiles is stale if the relay does not await it.
+/// Checks that a result of a collection of profiles is stale if the relay does not wait for it.
 ///
 /// A profile is a relay's altitude and power. In a field of interference, messages that collect profiles and joint
 /// positions are stale, too.
@@ -49,8 +49,8 @@ fn fourth(differs: bool) -> Bench {
 
 /// Returns the message `name`: a collection of relays' profiles (altitude and power), or its result.
 ///
-/// The profiles are those of the relays `indices`. The collection has pass number `number`, and begins with the relay
-/// after relay `after`.
+/// The message has the profiles of the relays `indices`. The collection has pass number `number`, and begins with the
+/// relay after relay `after`.
 fn of(bench: &Bench, name: &str, number: u16, after: u16, indices: &[u16]) -> WireMessage {
     let seat = |index: &u16| json!({ "relay": index, "altitude_m": 30.0, "power_w": 0.5 });
     let seats: Vec<_> = indices.iter().map(seat).collect();
@@ -155,7 +155,7 @@ fn a_pass_of_unknown_profiles_is_stale_and_requests_a_view() {
 
 /// Checks that a collection of profiles is stale if it has the receiver's profile or a later relay's.
 ///
-/// A profile is a relay's altitude and power. The relays that the message has passed cannot have added these.
+/// A profile is a relay's altitude and power. The relays on the way of the message cannot have added these profiles.
 #[test]
 fn a_collection_with_its_receivers_profile_is_stale() {
     for index in [4, 5] {

@@ -51,8 +51,8 @@ pub(crate) fn source() -> MissionConfig {
 
 /// Returns one message of each tag, in the order of the tags.
 ///
-/// Messages that travel along the chain have the number `number`. All digests in the messages are `mission`, also
-/// those of the view and of the line.
+/// Messages that travel along the chain have the number `number`. All digests in the messages are `mission`, also the
+/// digests of the view and of the line.
 pub(crate) fn one_of_each(number: u16, mission: u16) -> Vec<WireMessage> {
     let pass = json!({ "number": number, "view_digest": mission });
     let of = |name: &str, more: serde_json::Value| {

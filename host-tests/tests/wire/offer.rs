@@ -27,8 +27,8 @@ const SITES_AT: usize = 99;
 
 /// Length of a mission offer's body, bytes.
 pub(crate) const BYTES: usize = 125;
-/// Length of the part of a mission offer's body that a relay stores, bytes. It is all but the number of the answered
-/// hello.
+/// Length of the part of a mission offer's body that a relay stores, bytes. This is the whole body without the number
+/// of the answered hello.
 pub(crate) const KEPT: usize = 123;
 
 /// Returns an offer of mission `version` that eight relays can fly. Their mission before flight has the digest
@@ -79,7 +79,7 @@ pub(crate) fn mission_id(offer: &WireMessage) -> (u16, u16) {
     (digest, offer.number("version") as u16)
 }
 
-/// Returns the mission digest `digest` combined with the offer's positions of Tx and Rx, if it has any.
+/// Returns the mission digest `digest` combined with the Tx and Rx positions of `offer`, if any.
 pub(crate) fn between(offer: &WireMessage, digest: u16) -> u16 {
     let sites = &offer.body()[SITES_AT..KEPT];
     if sites.iter().all(|byte| *byte == 0) {

@@ -55,7 +55,7 @@ fn an_offer_needs_space_for_its_relays() {
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
 }
 
-/// Returns a mission of eight relays with `channel`. All other parameters differ from those of the paper's mission.
+/// Returns a mission of eight relays with `channel`. All other parameters differ from the paper's mission.
 fn other(channel: Channel) -> MissionConfig {
     MissionConfig {
         relays: 8,

@@ -91,7 +91,7 @@ fn a_pass_waits_for_a_neighbour_busy_with_another() {
     assert_eq!(out[0].1.number("number"), f64::from(FIRST));
 }
 
-/// Checks that a relay ignores a one-way link. A link that worked in both directions before is not ignored.
+/// Checks that a relay ignores a one-way link. A link that has worked in both directions is not ignored.
 #[test]
 fn a_one_way_link_is_ignored_unless_it_was_established() {
     for (linked, hears, waits) in [

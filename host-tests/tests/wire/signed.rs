@@ -95,8 +95,8 @@ impl SignedBench {
         Self::new(mission, 4, settings, &peers)
     }
 
-    /// Delivers a message of peer `peer`. Returns what the relay then sends. A mission offer is changed to answer the
-    /// relay's current hello.
+    /// Delivers a message of peer `peer`. Returns the frames that the relay then sends. A mission offer is changed to
+    /// answer the relay's current hello.
     pub(crate) fn receive(
         &mut self,
         peer: usize,
@@ -113,7 +113,7 @@ impl SignedBench {
         self.receive_unchanged(peer, NOW, message)
     }
 
-    /// Delivers a message of peer `peer` unchanged. Returns what the relay then sends.
+    /// Delivers a message of peer `peer` unchanged. Returns the frames that the relay then sends.
     pub(crate) fn receive_unchanged(
         &mut self,
         peer: usize,

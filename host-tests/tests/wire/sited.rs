@@ -39,8 +39,8 @@ fn sites([a, b, c, d, e, f]: [i32; 6]) -> Sites {
     }
 }
 
-/// Returns an upload of version 2 with positions of Tx and Rx, and these positions. They are a kilometre apart, but
-/// Rx is moved east by `east` units of 1e-7 degrees.
+/// Returns an upload of version 2 with positions of Tx and Rx, and these positions. The positions are a kilometre
+/// apart, except that Rx is moved east by `east` units of 1e-7 degrees.
 fn farther(base: u16, east: i32) -> (WireMessage, [i32; 6]) {
     let mut sites = A_KILOMETRE;
     sites[4] += east;

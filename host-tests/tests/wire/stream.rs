@@ -54,8 +54,8 @@ pub(crate) fn unstuffed(stuffed: &[u8]) -> Outcome {
     }
 }
 
-/// Returns the parts of a stream between delimiters: its COBS frames. Empty ones and an incomplete last one are left
-/// out.
+/// Returns the parts of a stream between delimiters: its COBS frames. Empty parts and an incomplete last part are
+/// left out.
 pub(crate) fn chunks(stream: &[u8]) -> Vec<&[u8]> {
     let mut chunks: Vec<&[u8]> = stream.split(|&byte| byte == 0).collect();
     chunks.pop();

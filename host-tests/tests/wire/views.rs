@@ -131,7 +131,7 @@ fn heartbeats_have_the_digest_of_the_mission_in_every_view() {
 }
 
 /// Checks that a late proposal of an old membership view changes nothing. A leader that proposes an old view again is
-/// told of the newest view.
+/// informed about the newest view.
 #[test]
 fn a_late_proposal_of_an_old_view_changes_nothing() {
     let (mut bench, _) = in_view(id(5, 2));

@@ -30,8 +30,8 @@ pub struct Mean {
 
 /// Returns the mean results of `draws` (at least 2) chains of randomly placed relays.
 ///
-/// `seed` is that of the random positions. The cost for N relays: sorting N numbers and computing N + 1 SIRs for each
-/// of the chains.
+/// `seed` is the seed of the random positions. The cost for N relays: sorting N numbers and computing N + 1 SIRs for
+/// each of the chains.
 pub fn mean(scene: &Scene, draws: u32, seed: u64) -> Mean {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut places = vec![0.0; scene.relays.len()];
@@ -74,8 +74,8 @@ const HALVINGS: u32 = 200;
 
 /// Returns the relays' x, m from Tx, that maximise the weakest received signal. Interference is ignored.
 ///
-/// All relays get the altitude and power of the first relay. Empty without relays. The cost is that of computing the
-/// length of a chain 200 times.
+/// All relays get the altitude and power of the first relay. Empty without relays. The cost is the cost of computing
+/// the length of a chain 200 times.
 pub fn blind_places(scene: &Scene) -> Vec<f64> {
     let Some(relay) = scene.relays.first() else {
         return Vec::new();

@@ -73,7 +73,7 @@ pub const BOARDS: [Board; 4] = [
 ];
 
 impl Board {
-    /// Returns the board called `name`; `None` if there is none.
+    /// Returns the board called `name`; `None` if there is no such board.
     pub fn named(name: &str) -> Option<Self> {
         BOARDS.into_iter().find(|board| board.name == name)
     }
@@ -113,7 +113,7 @@ impl Board {
         (words.map(str::to_owned).into(), elf.join(image))
     }
 
-    /// Returns the file name of the board's image without extension; `radio` selects the one for a radio.
+    /// Returns the file name of the board's image without extension; `radio` selects the image for a radio.
     pub fn stem(&self, radio: bool) -> String {
         format!("{}-{}", self.name, if radio { "radio" } else { "wires" })
     }
@@ -127,7 +127,7 @@ pub const LARGEST: u32 = 16 * 1024 * 1024;
 /// Value of a byte of erased flash.
 pub const BLANK: u8 = 0xFF;
 
-/// Part of an image: contiguous bytes, and the flash address of the first one.
+/// Part of an image: contiguous bytes, and the flash address of the first byte.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Piece {
     /// Address in flash of the image's first byte.
@@ -139,7 +139,7 @@ pub struct Piece {
 /// Returns the pieces of an ELF file that are loaded into flash, by physical (load) address.
 ///
 /// # Errors
-/// A line that says why the file is not a loadable ELF.
+/// A line that states why the file is not a loadable ELF.
 pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
     let wrong = |error: object::Error| format!("not a 32-bit ELF file: {error}");
     let header = FileHeader32::<LittleEndian>::parse(elf).map_err(wrong)?;
@@ -166,7 +166,7 @@ pub fn pieces(elf: &[u8]) -> Result<Vec<Piece>, String> {
 /// Joins the pieces of an image into one, with erased bytes in the gaps.
 ///
 /// # Errors
-/// The pieces overlap, or one begins more than [`LARGEST`] bytes after the start of the first.
+/// The pieces overlap, or a piece begins more than [`LARGEST`] bytes after the start of the first piece.
 pub fn flat(pieces: &[Piece]) -> Result<Piece, String> {
     let first = pieces
         .first()
@@ -267,7 +267,7 @@ impl Family {
     pub const RP2350: Self = Self(0xE48B_FF59);
 }
 
-/// Returns the image as a UF2 file. Bytes of a page that no piece covers are those of erased flash.
+/// Returns the image as a UF2 file. Bytes of a page that no piece covers have the value of erased flash.
 ///
 /// # Errors
 /// The image has more pages than the format can count.

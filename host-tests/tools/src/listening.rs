@@ -27,7 +27,7 @@ pub struct RandomScene {
     pub scenario: Scenario,
     /// Number of relays in the chain.
     pub relays: u16,
-    /// Seed of the random numbers that draw the interferers, and of those in the simulation.
+    /// Seed of the random numbers for the interferers and for the simulation.
     pub seed: u64,
 }
 
@@ -88,7 +88,8 @@ impl RandomScene {
 
     /// Returns the best SIR that relays can have if they know the interferers, linear.
     ///
-    /// For one interferer it is the SIR of a simulated chain that knows it, for several the exact optimum.
+    /// For one interferer it is the SIR of a simulated chain that knows the interferer. For several interferers it is
+    /// the exact optimum.
     pub fn optimum(&self) -> Result<f64, FigureError> {
         let scene = self.scene()?;
         if scene.sources.len() > 1 {
@@ -157,7 +158,7 @@ pub fn by_agreement(scene: &Scene, stands: &[Snapshot]) -> Vec<f64> {
 /// Number of agreements based on measurements up to which the figure shows the SIR.
 pub const LAST: usize = 8;
 
-/// Ratios of the SIR to the best possible SIR: list k has those after k agreements with measurements.
+/// Ratios of the SIR to the best possible SIR. List k has the ratios after k agreements with measurements.
 ///
 /// Each list has one ratio for each random experiment.
 pub type Shares = [Vec<f64>; LAST + 1];
@@ -213,7 +214,7 @@ pub fn hypothetical(wild: &RandomScene) -> Result<Setup, FigureError> {
     Ok(setup)
 }
 
-/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1 (0.5 is the median). NaN if there are none.
+/// Returns the quantile of `numbers` at the fraction `part`, 0 to 1 (0.5 is the median). NaN if `numbers` is empty.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -300,7 +301,8 @@ fn one(seed: u64, relays: u16, speed_mps: f64) -> Result<(f64, f64), FigureError
     }
 }
 
-/// Returns the arithmetic mean of `shares`, SIRs as fractions of the best possible ones. NaN if there are none.
+/// Returns the arithmetic mean of `shares`, which are SIRs divided by the best possible SIRs. NaN if `shares` is
+/// empty.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 pub fn mean(shares: &[f64]) -> f64 {
     shares.iter().sum::<f64>() / shares.len() as f64

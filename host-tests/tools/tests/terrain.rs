@@ -675,7 +675,7 @@ fn long_lines_have_relays_on_narrow_hilltops() {
     );
 }
 
-/// Checks that the ground counts as higher by the error of the heights.
+/// Checks that the ground counts as higher by the assumed error of the terrain's heights.
 #[test]
 fn the_error_of_the_heights_is_a_margin() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,7 +15,7 @@ pub struct Function {
     pub frame: u64,
     /// Addresses of the functions that this function calls or jumps to.
     pub calls: BTreeSet<u64>,
-    /// True if this function calls another one through a pointer.
+    /// True if this function calls another function through a pointer.
     pub indirect: bool,
 }
 
@@ -43,7 +43,7 @@ impl std::fmt::Display for StackError {
 
 impl std::error::Error for StackError {}
 
-/// Call graph of an image: its functions by address, and those that may be called through a pointer.
+/// Call graph of an image: functions by address, and functions that may be called through a pointer.
 #[derive(Clone, Debug, Default)]
 pub struct Calls {
     functions: BTreeMap<u64, Function>,

@@ -96,10 +96,11 @@ pub struct Autopilot {
     located_at: Option<Instant>,
     /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Release (end of the relay's control of the drone) that has not been reported yet, and the time to report it.
+    /// Release that has not been reported yet, and the time to report it. A release is the end of the relay's control
+    /// of the drone.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and the time since which this reason exists.
-    /// `None` if the pilot can give control.
+    /// Reason why the pilot cannot give the relay control of the drone, and the begin of this reason. `None` if the
+    /// pilot can give control.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
     /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
@@ -814,7 +815,7 @@ impl Autopilot {
 }
 
 impl Autopilot {
-    /// Exchanges data with the relay of the same drone, in both directions, and handles the link's timeouts.
+    /// Exchanges data with the relay of the same drone, and handles the link's timeouts. Data go in both directions.
     ///
     /// In this documentation the *link* is this object, the link to the autopilot. A call takes five steps:
     ///

@@ -11,7 +11,7 @@ fn aside(x_m: f32, y_m: f32, altitude_m: f32) -> Placement {
 }
 
 impl One {
-    /// Test helper: reports the position `place` of the relay to its guard, long after the guard's last setpoint.
+    /// Reports the position `place` to the guard, for the tests. The time is long after the guard's last setpoint.
     fn is_at_place(&mut self, place: Placement) {
         self.now = self.now + Duration::from_millis(1000);
         self.guard.position(self.now, place);

@@ -194,7 +194,8 @@ fn a_lost_relay_is_kept_clear_of() {
     assert_eq!(lost.setpoint().to_bits(), 50.0_f32.to_bits());
 }
 
-/// Checks that a relay does not approach relays beyond a removed neighbour until it has received one of them.
+/// Checks that a relay waits before it approaches the relays beyond a removed neighbour. It first has to receive one
+/// of them.
 #[test]
 fn a_relay_keeps_clear_of_relays_beyond_a_cleared_one() {
     let mut one = One::new([Some(2), None], 300.0, 300.0);

@@ -183,8 +183,8 @@ impl Node {
         self.steering.setpoint(self.wanted_place())
     }
 
-    /// Returns the position of the next node at `side`: the agreed position of a relay, or the position of Tx or Rx.
-    /// `None` if the position is unknown.
+    /// Returns the position of the next node at `side`. It is the agreed position of a relay, or the position of Tx
+    /// or Rx. `None` if the position is unknown.
     pub(crate) fn place_toward(&self, side: Side) -> Option<Placement> {
         if !self.layers.neighbours.at(side).has_no_peer() {
             return self.steering.neighbour_place(side);

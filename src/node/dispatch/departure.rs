@@ -345,7 +345,8 @@ impl Node {
         }
     }
 
-    /// Returns true if `node` is between this relay and its neighbour at `side`, or beyond this end of the chain.
+    /// Returns true if `node` is between this relay and its neighbour at `side`. Also true if the chain ends here and
+    /// `node` is beyond this end.
     fn is_beside(&self, side: Side, node: u16) -> bool {
         let own = self.member.node;
         let neighbour = self.layers.neighbours.at(side).node();
@@ -372,7 +373,7 @@ impl Node {
         }
     }
 
-    /// Returns true if node `to` at `side`, outside of the chain, is called by the leader to join the chain.
+    /// Returns true if the leader calls node `to` at `side`, outside of the chain, to join the chain.
     pub(super) fn calls(&self, side: Side, to: u16) -> bool {
         self.layers.lease.orders().joiner == to && self.is_beside(side, to)
     }

@@ -11,8 +11,8 @@ use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 
-/// Mission fields of a hello: the newest mission that the relay has stored, and two flags: the mission is active, the
-/// mission was refused.
+/// Mission fields of a hello: the newest mission that the relay has stored, and two flags. The flags state if the
+/// mission is active, and if it was refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -87,7 +87,8 @@ impl Node {
         }
     }
 
-    /// Returns the mission fields of a hello, for the stored mission, or for a newer mission that was refused.
+    /// Returns the mission fields of a hello. They are for the stored mission, or for a newer mission that was
+    /// refused.
     fn mission_state(&self) -> MissionState {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         if let Some(refused) = self.layers.update.refused_mission(active) {
@@ -238,9 +239,9 @@ impl Node {
         }
     }
 
-    /// Selects node `from` as the neighbour on `side` if this side has no neighbour, or if the node is better than
-    /// the neighbour. A node is better if it is nearer, or if it leads to more relays. A node that does not receive
-    /// this relay is not selected.
+    /// Selects node `from` as the neighbour on `side` if the side has none, or if the node is better. A node is
+    /// better if it is nearer, or if it leads to more relays. A node that does not receive this relay is not
+    /// selected.
     fn consider_candidate(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let there = self.relays_on(side);

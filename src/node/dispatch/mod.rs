@@ -360,7 +360,7 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` is early, and would leave out relays that are about to be linked.
+    /// Returns true if a view proposal from `side` is early. It would leave out relays that are about to be linked.
     /// This is assumed for a short time after the sender became the neighbour, if the proposal has visited fewer
     /// relays than the previous proposal.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
@@ -388,8 +388,8 @@ pub(super) struct Telemetry {
     pub(super) no_quorum_reported: bool,
 }
 
-/// Time without a quorum after which relays drop the links to their neighbours for the first time, in units of
-/// `dead_after`.
+/// Time without a quorum after which relays first drop their links, in units of `dead_after`. These are the links to
+/// their neighbours.
 const FIRST_RETENTION: u32 = 3;
 
 /// Time without a quorum after which relays drop their links again, in units of `dead_after`.

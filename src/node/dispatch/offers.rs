@@ -193,8 +193,8 @@ impl Node {
         }
     }
 
-    /// Compares `holds`, the mission that node `from` at `side` has stored, with this relay's newest mission. If
-    /// `holds` is older, schedules an offer. If `holds` is newer, schedules a hello that requests an offer.
+    /// Compares `holds`, the stored mission of node `from` at `side`, with this relay's newest mission. If `holds` is
+    /// older, schedules an offer. If `holds` is newer, schedules a hello that requests an offer.
     pub(super) fn compare_missions(&mut self, side: Side, from: u16, holds: MissionId) {
         if !accepts_uploads(&self.member) {
             return;

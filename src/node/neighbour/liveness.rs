@@ -209,7 +209,7 @@ impl Liveness {
         self.request_times.get(usize::from(before)).copied()
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, because relays send nothing while they compute.
+    /// Restarts the measurement of the neighbour's silence at `now`. Reason: relays send nothing while they compute.
     /// Returns false, and does nothing, if the neighbour is lost.
     pub(crate) const fn excuse_silence(&mut self, now: Instant) -> bool {
         if !self.lost {

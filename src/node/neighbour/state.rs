@@ -175,7 +175,7 @@ impl Neighbour {
         self.node
     }
 
-    /// Returns true if this side has no neighbour, and the search for a neighbour has ended without success.
+    /// Returns true if this side has no neighbour, and the search for one has ended without success.
     pub(crate) fn has_no_peer(&self) -> bool {
         self.state == NeighbourState::NoPeer
     }
@@ -191,7 +191,7 @@ impl Neighbour {
         self.liveness.is_present()
     }
 
-    /// Returns true if the selected neighbour is lost, and nothing has been received from it since the loss.
+    /// Returns true if the selected neighbour is lost, and none of its frames was received since the loss.
     pub(crate) const fn is_silent(&self) -> bool {
         self.liveness.is_silent()
     }
@@ -238,7 +238,7 @@ impl Neighbour {
         self.reported_found != before
     }
 
-    /// Restarts the measurement of the neighbour's silence at `now`, because relays send nothing while they compute.
+    /// Restarts the measurement of the neighbour's silence at `now`. Reason: relays send nothing while they compute.
     /// Returns false, and does nothing, unless the neighbour is linked, a member of the view and not lost.
     pub(crate) fn excuse_silence(&mut self, now: Instant, settings: &Settings) -> bool {
         let excused = self.state == NeighbourState::Linked
@@ -520,7 +520,8 @@ impl Neighbour {
         changed && (self.has_no_peer() || self.is_mutual() && !self.has_grace(now))
     }
 
-    /// Returns true if the selected neighbour is also the neighbour in the agreed view (agreed members of the chain).
+    /// Returns true if the selected neighbour is also the neighbour in the agreed view. A view is the agreed list of
+    /// the chain's members.
     pub(crate) const fn is_agreed(&self) -> bool {
         self.node == self.agreed.node()
     }
@@ -707,7 +708,7 @@ impl Neighbour {
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Records a report of the node `distance` relays away: `received` is true if the node receives this relay.
+    /// Records a report of the node `distance` relays away. `received` is true if the node receives this relay.
     /// Returns true, once, when [`NOT_RECEIVED`] reports in a row state that the node does not receive this relay.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)

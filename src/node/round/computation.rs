@@ -76,7 +76,7 @@ pub(crate) struct Computation {
     pub(super) profile: Profile,
     /// Profiles (altitude and power) of the relays of this view, collected by a message along the chain.
     pub(super) seats: Seats,
-    /// Position that the joint method has computed for this relay in this view; `None` until the position is
+    /// Position that the joint method has computed for this relay in this view. `None` until the position is
     /// computed.
     pub(super) chosen: Option<JointPlace>,
     /// Lateral offset and altitude of the position that the chain has agreed on for this relay.
@@ -185,7 +185,7 @@ impl Computation {
         self.meter.restart();
     }
 
-    /// Returns the shares of this relay's slots at the agreed positions; `None` unless the slots were fitted (each
+    /// Returns the shares of this relay's slots at the agreed positions. `None` unless the slots were fitted (each
     /// slot as long as its hop needs).
     pub(crate) fn slot_shares(&self) -> Option<SlotShares> {
         self.fitted.first()?.agreed
@@ -729,8 +729,8 @@ impl Seats {
         own: [[0.0; 2]; MOST_SOLVED],
     };
 
-    /// Returns the profile of relay `index`: its own profile if it was collected, otherwise the mission's common
-    /// profile.
+    /// Returns the profile of relay `index`. It is its own profile if this was collected, otherwise the mission's
+    /// common profile.
     #[inline(never)] // the solver asks in many places
     pub(super) fn of(&self, mission: &Mission, index: u16) -> Seat {
         let at = usize::from(index).wrapping_sub(1);

@@ -136,7 +136,8 @@ impl Computation {
         context.joins() && self.chosen.is_none() && !partial
     }
 
-    /// Continues to solve the chain by the joint method while this relay waits for a pass (message along the chain).
+    /// Continues to solve the chain by the joint method while this relay waits for a pass. A pass is a message along
+    /// the chain.
     pub(super) fn solve_ahead(&mut self, context: &Context<'_>) -> Action {
         if self.is_solving(context) {
             _ = self.solve(context);

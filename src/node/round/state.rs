@@ -78,7 +78,7 @@ pub(crate) enum Arrival {
 }
 
 impl Arrival {
-    /// Returns the action for a pass message that is not new; `None` for a new message, which must be handled.
+    /// Returns the action for a pass message that is not new. `None` for a new message, which must be handled.
     pub(crate) const fn refused(self) -> Option<Action> {
         match self {
             Self::New => None,
@@ -214,7 +214,7 @@ impl RoundState {
         }
     }
 
-    /// Returns true if `number` is the number of the current pass, and the result of this pass has not arrived yet.
+    /// Returns true if `number` is the number of the current pass, and its result has not arrived yet.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }

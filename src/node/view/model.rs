@@ -168,7 +168,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug)]
 pub(super) struct RelayState {
     pub(super) change: ViewChange,
-    /// View that the relay accepted last, the relay's rank in this view, and the number of members of this view.
+    /// View that the relay accepted last, the relay's rank in this view, and its number of members.
     pub(super) flies: (ViewId, u16, u16),
 }
 
@@ -341,8 +341,7 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Broken rule, for a test: when a relay leaves the chain, its neighbours at once count this departure as agreed
-    /// on.
+    /// Broken rule, for a test: a departure counts as agreed on at once, at the neighbours of the relay.
     Inside,
     /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that one of
     /// these relays knows.

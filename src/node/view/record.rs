@@ -113,7 +113,7 @@ impl ViewRecord {
         }
     }
 
-    /// Returns the votes on views (acceptor state) in the record; `None` if the record belongs to another mission.
+    /// Returns the votes on views (acceptor state) in the record. `None` if the record belongs to another mission.
     /// The loaded mission has the digest `base`, `relays` relays and the leader `initial_leader`.
     pub(super) fn electorate(
         &self,

@@ -192,8 +192,8 @@ fn a_newer_proposal_replaces_an_outstanding_one() {
     assert_eq!(relay.handle(&old), LATE);
 }
 
-/// Checks that a second proposal of the same view, but for another mission, does not count as a duplicate. The leader
-/// has restarted in between, and has received another mission.
+/// Checks that a second proposal of the same view, but for another mission, is no duplicate. The leader has restarted
+/// in between, and has received another mission.
 #[test]
 fn a_proposal_of_the_same_view_with_another_mission_is_another() {
     let mut relay = Relay::second();
@@ -377,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores a decision on a view if it has stored a newer mission than the mission of the view.
+/// Checks that a relay ignores a decision on a view with an older mission than it has stored.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();

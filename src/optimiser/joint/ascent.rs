@@ -10,8 +10,8 @@ use super::outlook::Outlook;
 /// does not improve with a fraction, the next fraction is tried.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move of a relay in one iteration, divided by its distance from the interferer. The same
-/// number is the maximum of the change of ln(target SIR).
+/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. The same number
+/// is the maximum of the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
 /// Minimum trust at which an improvement's final target is predicted. Trust limits the relays' moves. With a smaller
@@ -66,7 +66,7 @@ pub(crate) enum AscentStep {
     /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
     /// first.
     Again,
-    /// End the improvement of this chain, or repeat it with a lower upper limit on the slack if this may help.
+    /// End the improvement of this chain, or repeat it with a lower limit on the slack if this may help.
     Over,
 }
 

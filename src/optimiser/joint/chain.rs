@@ -54,9 +54,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, at which the relays after this relay still have room for their
-    /// separation. `end_m` is the largest x of the relay before it, m. `step` is the minimum step in x between these
-    /// two relays, m.
+    /// Returns the largest x of a relay, m, that leaves the relays after it room for their separation. `end_m` is the
+    /// largest x of the relay before it, m. `step` is the minimum step in x between these two relays, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
@@ -255,10 +254,11 @@ pub(super) const SEGMENT_RELAYS: u16 = 10;
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack with respect to the x, y and h of the segment's last relay, m/m.
+    /// First derivatives of the chain's slack, m/m. They are with respect to the x, y and h of the segment's last
+    /// relay.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack with respect to the coordinates of the segment's last relay, 1/m. The
-    /// order is xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack, 1/m. They are with respect to the coordinates of the segment's last
+    /// relay. The order is xx, xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 

@@ -26,8 +26,8 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions of each relay that a pass of the solver combines: the current position, and two positions on
-/// either side.
+/// Number of positions of each relay that a pass of the solver combines. These are the current position, and two
+/// positions on either side.
 const STATES: usize = 5;
 /// Moves of a relay that a pass of the solver tries, in units of the current step width. Of equally good moves the
 /// first in this list is preferred.
@@ -172,7 +172,7 @@ enum Work {
     /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
     /// the next node to process: 1 for the first relay, N + 1 for Rx.
     Pass(u16),
-    /// Backward pass, from the last relay to the first: moves each relay as the best combination of moves requires.
+    /// Backward pass, from the last relay to the first. Moves each relay as the best combination of moves requires.
     /// The fields are the next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
     /// Summation of the hop times of the best chain, and search for its worst SIR. The field is the next node.

@@ -58,8 +58,8 @@ pub(super) struct Reach {
     /// coordinates of the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value
     /// for each coordinate of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end, with respect to the other two coordinates w_1
-    /// and w_2 of the end. The order is w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end. They are with respect to the other two
+    /// coordinates w_1 and w_2 of the end. The order is w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
     /// Derivative of the dependent coordinate of the hop's end with respect to the target ln(SIR), m. The other two
     /// coordinates of the end are constant.

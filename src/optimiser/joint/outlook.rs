@@ -72,9 +72,9 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (chain's slack) of a hop's receiver to the value function of the hop's sender.
-    /// Returns the receiver's policy: its move in two coordinates, within [`low`, `high`], m, relative to its present
-    /// position. The third coordinate, `axis`, then follows from the hop's maximum length.
+    /// Converts the value function (slack) of a hop's receiver to the value function of the hop's sender. Returns the
+    /// receiver's policy: its move in two coordinates, within [`low`, `high`], m, relative to its present position.
+    /// The third coordinate, `axis`, then follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,

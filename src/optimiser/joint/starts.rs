@@ -86,7 +86,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
 struct Way {
     to: Triple,
     angle: f32,
-    /// Logarithm of the distance from the interferer at the end of the spiral, minus the logarithm at the start.
+    /// Logarithm of the distance from the interferer at the spiral's end, minus the logarithm at its start.
     rise: f32,
     length: f32,
 }

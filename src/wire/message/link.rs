@@ -47,9 +47,9 @@ pub struct Hello {
     /// True if the mission `latest_mission` is refused. Either the sender refuses it, or a relay farther from the
     /// destination.
     pub refused: bool,
-    /// If `fresh` is true: the sender is outside of the chain, and no relay selects it. If `fresh` is false: the
-    /// destination is outside of the chain; a view without the destination is agreed on, and the relays of this view
-    /// are in place.
+    /// Flag for a node outside of the chain. If `fresh` is true: the sender is outside of the chain, and no relay
+    /// selects it. If `fresh` is false: the destination is outside of the chain; a view without the destination is
+    /// agreed on, and the relays of this view are in place.
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,

@@ -18,8 +18,8 @@ use crate::wire::message::parts::{
     take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and for each target the farthest x at which the sender meets
-/// it. "Farthest" means in the direction of the pass.
+/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target. The sender
+/// meets the target up to this x. "Farthest" means in the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -458,7 +458,7 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict the measurements of the other relays; 0 for none. The
+    /// Node number of a relay whose measurements contradict the measurements of the other relays. 0 for none. The
     /// measurements of that relay are left out of `sums`. Set in replies only.
     pub excluded: u16,
 }

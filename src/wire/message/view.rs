@@ -36,7 +36,7 @@ pub struct Poll {
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second; 65535 if unknown.
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown.
     /// Positions of the new view may be used only after that time.
     pub earlier_lease_left: u16,
     /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on. `None` without such
@@ -276,7 +276,7 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader to a relay that may leave and to a relay that joins; part of each lease renewal.
+/// Orders of the leader to a relay that may leave and to a relay that joins. Part of each lease renewal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {

@@ -10,7 +10,7 @@ use crate::wire::message::Message;
 extern crate std;
 use std::vec::Vec;
 
-/// Capacity of the session table ([`PEERS`]) in the type of node numbers, so that tests can count nodes with it.
+/// Capacity of the session table ([`PEERS`]), in the type of node numbers.
 const ROOM: u16 = 8;
 
 /// Silence after which a node is forgotten; the value of `Settings::dead_after`.

@@ -99,8 +99,8 @@ pub fn port<T: Instance, const IN: usize>(
     Ok((rx, tx))
 }
 
-/// Returns a seed computed from the chip's unique number. The STM32F446 has no random number generator, and that of
-/// the STM32F405 has no clock here, because PLLQ is not set up.
+/// Returns a seed computed from the chip's unique number. The STM32F446 has no random number generator, and the
+/// random number generator of the STM32F405 has no clock, because PLLQ is not set up.
 pub fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);

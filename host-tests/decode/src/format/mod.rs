@@ -73,7 +73,7 @@ pub struct Field {
     pub range: String,
 }
 
-/// Layout of a message's body, after the byte that tells the kind of message.
+/// Layout of a message's body, after the first byte, which states the kind of message.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Layout {
     /// Name of the message.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use uav_relay_capture::{Direction, FrameSplitter, Piece};
 
-/// First bytes of every pcapng capture. They tell a capture from a stream of frames.
+/// First bytes of every pcapng capture. They distinguish a capture from a stream of frames.
 ///
 /// No frame begins with them, because the second byte of a frame's header is 10 to 1f (hexadecimal), not 0d.
 const CAPTURE: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];

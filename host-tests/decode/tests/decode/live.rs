@@ -5,7 +5,8 @@ use std::process::Stdio;
 
 use super::{HEARTBEAT, decode, lines};
 
-/// Checks that each frame is printed at once. If the program buffered one, this would block until the test times out.
+/// Checks that each frame is printed at once. If the program buffered a frame, this test would block until it times
+/// out.
 #[test]
 fn each_frame_is_printed_at_once() {
     let mut child = decode().arg("--json").spawn().unwrap();

@@ -26,7 +26,7 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
 
 /// Returns a frame with this body and a random header, whose flags are `flags`.
 ///
-/// If `flags` is 0, the frame has no authentication tag, otherwise a random one.
+/// If `flags` is 0, the frame has no authentication tag; otherwise it has a random tag.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let header = Header {
         network: rng.random(),

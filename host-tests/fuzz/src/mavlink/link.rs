@@ -21,8 +21,8 @@ const MAX_OPERATIONS: usize = 256;
 
 /// Limit on the frames that the link sends in one turn. A link that exceeds it counts as never finished.
 ///
-/// It is twice 13 frames: a heartbeat, three message requests, a command answer, a flight target, three status texts
-/// and four named values. A clock request (TIMESYNC) can come in addition.
+/// The limit is twice 13 frames: a heartbeat, three message requests, a command answer, a flight target, three status
+/// texts and four named values. A clock request (TIMESYNC) can come in addition.
 const MAX_FRAMES: usize = 26;
 
 /// Maximum distance of a flight target from the line Tx-Rx, m.

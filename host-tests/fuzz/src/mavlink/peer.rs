@@ -76,7 +76,7 @@ impl Peer {
     }
 
     /// Signs a frame of the autopilot, mostly correctly. Otherwise leaves it unsigned, uses another key or an old
-    /// stamp, damages it, or replays one.
+    /// stamp, damages the frame, or replays an earlier frame.
     pub(super) fn sign_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {

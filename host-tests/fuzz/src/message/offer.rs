@@ -83,7 +83,8 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends a number of relays to the offer: mostly that of the mission before flight, or any.
+    /// Appends a number of relays to the offer. Mostly it is the number of the mission before flight, sometimes any
+    /// number.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,

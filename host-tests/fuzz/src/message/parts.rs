@@ -60,7 +60,7 @@ impl Body<'_, '_> {
 
     /// Appends the number of a pass (message round) to the message, and the digest of mission and view.
     ///
-    /// The digest is rarely that of another view.
+    /// Rarely the digest belongs to another view.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.state.view);
@@ -74,7 +74,8 @@ impl Body<'_, '_> {
 
     /// Appends the name of a view (membership of the chain) to the message.
     ///
-    /// The view is the tested relay's, one of the next from a possible proposer, an earlier one, or any.
+    /// The view is the view of the tested relay, one of the next views of a possible proposer, an earlier view, or
+    /// any view.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {
@@ -204,7 +205,8 @@ impl Body<'_, '_> {
 
     /// Appends the number of a lease renewal, mostly a small one, and a digest to the message.
     ///
-    /// The digest is that of the mission and the view (membership of the chain), rarely a wrong one.
+    /// The digest is usually the digest of the mission and the view (list of the chain's members), rarely a wrong
+    /// digest.
     pub(super) fn pulse_number(&mut self) {
         self.request_number();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -212,8 +214,8 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission. The mission is the newest one stored by the tested relay, the one loaded into that relay
-    /// before flight, or another one with a newer, older or arbitrary version.
+    /// Returns version and digest of a mission. The mission is the newest mission stored by the tested relay, the
+    /// mission loaded into this relay before flight, or another mission with a newer, older or arbitrary version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {
@@ -239,7 +241,7 @@ impl Body<'_, '_> {
 
     /// Appends the session number of a fence, a message of the collision guard, to the message.
     ///
-    /// The number is that of the tested relay, a small number, or any.
+    /// The number is the session number of the tested relay, a small number, or any number.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),

@@ -7,8 +7,8 @@ use super::super::watch::NETWORK;
 
 /// Returns header and port of a frame from a neighbour of relay `index`.
 ///
-/// `side` is 0 for the neighbour upstream, 1 for the one downstream. With the `wiring` of a shared channel, both use
-/// the same port.
+/// `side` is 0 for the neighbour upstream, 1 for the neighbour downstream. With the `wiring` of a shared channel,
+/// both use the same port.
 pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Port) {
     let (sender, port) = if side == 1 {
         (index + 1, Port::Downstream)

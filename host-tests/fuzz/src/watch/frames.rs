@@ -13,7 +13,8 @@ const NEAR: u16 = 4;
 /// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
-/// Checker of the frames that a relay sends. It keeps the numbers in the last frames, such as that of the pass.
+/// Checker of the frames that a relay sends. The checker stores the numbers in the last frames, such as the number of
+/// the pass.
 ///
 /// A pass is a round of messages along the chain.
 #[derive(Clone, Debug)]

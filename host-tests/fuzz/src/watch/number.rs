@@ -4,7 +4,7 @@ use uav_relay::wire::message::Message;
 
 /// Returns the number of a message's pass, which is a round of messages along the chain.
 ///
-/// `None` for a message without such a number, as those of leases.
+/// `None` for a message without such a number, such as a lease message.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,

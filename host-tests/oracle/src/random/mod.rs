@@ -105,8 +105,8 @@ pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     }
 }
 
-/// Returns and prints the seed of a random test. It is the environment variable `SEED`, or `default` if that is no
-/// number.
+/// Returns and prints the seed of a random test. It is the environment variable `SEED`, or `default` if this variable
+/// is not a number.
 pub fn seed(default: u64) -> u64 {
     let seed = std::env::var("SEED")
         .ok()
@@ -116,8 +116,8 @@ pub fn seed(default: u64) -> u64 {
     seed
 }
 
-/// Returns the number of random problems in a test. It is the environment variable `COUNT`, or `usual` if that is no
-/// number.
+/// Returns the number of random problems in a test. It is the environment variable `COUNT`, or `usual` if this
+/// variable is not a number.
 pub fn count(usual: usize) -> usize {
     let count = std::env::var("COUNT").ok();
     count.and_then(|text| text.parse().ok()).unwrap_or(usual)

@@ -5,7 +5,7 @@ use super::link::{Link, meets, received_w};
 /// Number of bisection steps: enough to halve any f64 interval in metres down to adjacent numbers.
 const HALVINGS: usize = 200;
 
-/// Hop to a relay from Tx or from the relay before it. `x` in its methods is the receiving relay's position, m.
+/// Hop to a relay from Tx or from the previous relay. `x` in its methods is the receiving relay's position, m.
 pub(super) struct Hop<'a> {
     link: &'a Link,
     sender_w: f64,

@@ -88,7 +88,7 @@ pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }
 
-/// Returns true if `sir` meets `target`: it may be a few units in the last place below it.
+/// Returns true if `sir` meets `target`: `sir` may be a few units in the last place below `target`.
 ///
 /// Otherwise rounding would decide for a constant SIR (interferer at Tx) that equals the target.
 pub(super) fn meets(sir: f64, target: f64) -> bool {

@@ -57,9 +57,9 @@ impl Link {
 
     /// Returns the first target SIR (linear) that the paper's fixed-step search tries.
     ///
-    /// It is the lesser of two SIRs: that of the first hop with relay 1 straight above Tx, and that of the last hop
-    /// with relay N straight above Rx. If the interferer is behind Tx (its x is below 0), the largest SIR of the
-    /// first hop over x from 0 to D replaces the one above Tx.
+    /// It is the smaller of two SIRs: the SIR of the first hop with relay 1 straight above Tx, and the SIR of the
+    /// last hop with relay N straight above Rx. If the interferer is behind Tx (its x is below 0), the largest SIR of
+    /// the first hop over x from 0 to D replaces the one above Tx.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -72,10 +72,10 @@ impl Link {
 
     /// Runs the paper's fixed-step search: lowers the target SIR by `epsilon` until a chain meets it.
     ///
-    /// Returns the number of targets tried and the last one (linear). `None` if no target can be met. The first
-    /// target is the smaller of two SIRs: that of the first hop with relay 1 straight above Tx, and that of the last
-    /// hop with relay N straight above Rx. For an interferer behind Tx (X < 0), the first hop's best SIR replaces the
-    /// one above Tx. Each target costs one chain. `epsilon` is linear, > 0.
+    /// Returns the number of targets tried and the last target (linear). `None` if no target can be met. The first
+    /// target is the smaller of two SIRs: the SIR of the first hop with relay 1 straight above Tx, and the SIR of the
+    /// last hop with relay N straight above Rx. For an interferer behind Tx (X < 0), the first hop's best SIR
+    /// replaces the one above Tx. Each target costs one chain. `epsilon` is linear, > 0.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

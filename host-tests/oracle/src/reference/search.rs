@@ -20,7 +20,7 @@ impl Link {
 
     /// Returns the best SIR of the worst of hops `k` to N+1, over all positions of the relays from `k` on.
     ///
-    /// The SIR of several hops is that of the worst one. Relay k-1 is at `from_x`; `points` is the number of grid
+    /// The SIR of several hops is the SIR of the worst hop. Relay k-1 is at `from_x`; `points` is the number of grid
     /// points per relay.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
         let worst_hop = |x: f64| {
@@ -38,8 +38,8 @@ impl Link {
 
     /// Returns the positions from `from_x` to Rx, m, at which the search evaluates a relay.
     ///
-    /// They are about `points` evenly spaced positions, and further ones that get denser toward `from_x`, Rx and the
-    /// interferer.
+    /// These are about `points` evenly spaced positions, and further positions that get denser toward `from_x`, Rx
+    /// and the interferer.
     fn grid(&self, from_x: f64, points: u32) -> Vec<f64> {
         let span = self.distance_m - from_x;
         let steps = f64::from(points);

@@ -14,7 +14,7 @@ use wasm_bindgen_cli_support::Bindgen;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// Scripts of the page in loading order: each script comes after those that it uses.
+/// Scripts of the page in loading order: each script comes after the scripts that it uses.
 const SCRIPTS: [&str; 7] = [
     "drawing.js",
     "wish.js",

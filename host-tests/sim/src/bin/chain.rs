@@ -170,7 +170,7 @@ fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     }
 }
 
-/// Duration of a run before its progress line is shown. Short runs show none.
+/// Duration of a run before its progress line is shown. Short runs show no progress line.
 const SILENT: Duration = Duration::from_secs(1);
 
 /// Least time between two updates of the progress line.

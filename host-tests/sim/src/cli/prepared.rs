@@ -32,7 +32,7 @@ pub struct Prepared<'a> {
     /// Setup of the simulated run: relays, links, faults and events.
     pub setup: Setup,
     told: Mission,
-    /// Data traffic that the options request; `None` if they request none.
+    /// Data traffic that the options request; `None` if they request no traffic.
     data: Option<TrafficSpec>,
 }
 
@@ -41,7 +41,7 @@ pub struct Prepared<'a> {
 pub enum Refused {
     /// Invalid options or scenario.
     Failed(Failure),
-    /// The distance from Tx to Rx is too short for the relays, as the report says.
+    /// The distance from Tx to Rx is too short for the relays, as the report states.
     ///
     /// The second value is `Some` for the default scenario: the user cannot change that scenario, so the option
     /// `--uavs` is reported as wrong.
@@ -183,7 +183,7 @@ impl<'a> Prepared<'a> {
 
     /// Returns the report of a run. Its SIRs are for the true interference at the end of the run.
     ///
-    /// The mission in `self.setup` is replaced by one with the true interference.
+    /// The mission in `self.setup` is replaced by a mission with the true interference.
     pub fn report(&mut self, outcome: &Outcome) -> ChainReport {
         let (options, scenario) = (self.options, &self.scenario);
         let listened = SensingReport::of(&self.setup, outcome);

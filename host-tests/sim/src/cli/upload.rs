@@ -130,7 +130,7 @@ impl Uploads {
     }
 
     /// Returns the end of the chain whose ground station requests reports, and the start of the requests. `None` if
-    /// none does.
+    /// no ground station requests reports.
     pub fn watches(&self) -> Option<(Side, Instant)> {
         self.watch
             .map(|end| (end.side(), Instant::from_millis(1_000)))

@@ -58,8 +58,8 @@ pub struct ChainReport {
     pub best_sir: Option<f64>,
     /// Linear SIR of the worst hop from Tx to Rx; absent unless every relay of the chain has a position.
     ///
-    /// If the mission also requires SIRs from Rx to Tx, those are divided by `reverse`, and the worst hop of both
-    /// directions counts.
+    /// If the mission also requires SIRs from Rx to Tx, these SIRs are divided by `reverse`, and the worst hop of
+    /// both directions counts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sir: Option<f64>,
     /// SIR of the worst hop, dB: `sir` as decibels.
@@ -422,7 +422,8 @@ pub(super) fn lost(outcome: &Outcome, left: &[(u16, &RelayEnd)]) -> Vec<LostRepo
         .collect()
 }
 
-/// Returns the mission that the chain flies at the end of a run: of `setup`, or an uploaded one.
+/// Returns the mission that the chain flies at the end of a run. It is the mission of `setup`, or an uploaded
+/// mission.
 pub fn flown(setup: &Setup, outcome: &Outcome) -> Mission {
     let version = version(outcome);
     let mut uploads = setup.uploads.iter().map(|spec| spec.upload);
@@ -441,7 +442,7 @@ pub(super) fn version(outcome: &Outcome) -> u16 {
 }
 
 /// Returns the error line of a failed run; `None` after success. If an uploaded mission was not adopted, the line
-/// says so.
+/// states this.
 pub(super) fn error(method: &str, outcome: &Outcome) -> Option<String> {
     let error = ended(method, outcome)?;
     // A mission counts as adopted even if its relays are lost.

@@ -46,7 +46,8 @@ pub struct HopSlots {
 }
 
 impl HopSlots {
-    /// Returns the slots of all hops from the times that these need for their data: to Rx, and to Tx.
+    /// Returns the slots of all hops from the times that the hops need for their data. `there` is for the direction
+    /// to Rx, `back` for the direction to Tx.
     ///
     /// `back` is empty for one direction. The result is empty if a hop carries nothing, so that its time is infinite.
     pub fn of(there: &[f64], back: &[f64]) -> Vec<Self> {
@@ -127,8 +128,8 @@ pub struct LostReport {
     pub version: Option<u16>,
     /// Reason why the relay is not in the chain.
     ///
-    /// `silent`: it is off. `apart`: it is on, but cannot reach the others. `no quorum`: it is on, but no chain is
-    /// left.
+    /// `silent`: the relay is off. `apart`: the relay is on, but cannot reach the other relays. `no quorum`: the
+    /// relay is on, but no chain is left.
     pub why: &'static str,
 }
 

@@ -12,7 +12,7 @@ use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSp
 pub struct RotationReport {
     /// Number of drones that are meant to fly.
     pub flying: u16,
-    /// Tired drones announce that they leave, and fresh ones join first.
+    /// Figures of runs in which tired drones announce that they leave. Replacements then join first.
     pub announced: RotationFigures,
     /// Losses instead of departures.
     ///
@@ -93,7 +93,7 @@ impl RotationFigures {
 }
 
 impl RotationReport {
-    /// Creates the report of a run with announced departures, and of one without. Each has its number of chains.
+    /// Creates the report of runs with announced departures, and of runs without. Each has its number of chains.
     pub fn new(
         spec: &RotationSpec,
         announced: (&Rotated, usize),

@@ -351,7 +351,7 @@ fn count(relays: usize) -> String {
 /// Number of lines that a shortened log keeps at its start, and again at its end.
 const ENDS: usize = 20;
 
-/// Formats the log with a line for each event. If the log has more than 40 lines, the middle ones are left out.
+/// Formats the log with a line for each event. If the log has more than 40 lines, the middle lines are left out.
 pub(super) fn text(timeline: &[MomentReport]) -> String {
     let groups = groups(timeline);
     let mut text = String::new();
@@ -388,11 +388,11 @@ pub struct RecoveryReport {
     pub view: u32,
     /// Number of relays in the view (membership of the chain).
     pub relays: u16,
-    /// Relays of the previous view (membership of the chain) that are not in this one, by number from 1.
+    /// Relays of the previous view (membership of the chain) that are not in this view, by number from 1.
     pub lost: Vec<u16>,
-    /// Relays in this view (membership of the chain) that were not in the previous one, by number from 1.
+    /// Relays in this view (membership of the chain) that were not in the previous view, by number from 1.
     pub back: Vec<u16>,
-    /// Version of an uploaded mission that the chain first flies in this view; absent if there is none.
+    /// Version of an uploaded mission that the chain first flies in this view. Absent without such a mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub version: Option<u16>,
     /// Time when the upload of the mission `version` began, s; absent without an upload.
@@ -400,7 +400,7 @@ pub struct RecoveryReport {
     pub offered_s: Option<f64>,
     /// Time of the event that caused the new view, s: a failure, reboot, partition or end of a partition.
     ///
-    /// If there are several such events, it is the first one that concerns a lost or a returned relay.
+    /// If there are several such events, it is the first event that concerns a lost or a returned relay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub happened_s: Option<f64>,
     /// Time when a neighbour first detected that a relay was lost or had returned, s.
@@ -544,7 +544,7 @@ fn detection<'a>(earlier: &'a [Moment], lost: &[u16], back: &[u16]) -> Option<&'
 
 /// Returns the last entry of `later`, a part of the log, in which one of `members` accepts a position.
 ///
-/// `None` unless every member accepts one.
+/// `None` unless every member accepts a position.
 fn convergence<'a>(later: &'a [Moment], members: &BTreeSet<u16>) -> Option<&'a Moment> {
     let placed = |moment: &&Moment| {
         moment.what == TimelineEvent::Converged && members.contains(&moment.relay)

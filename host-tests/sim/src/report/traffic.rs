@@ -13,8 +13,8 @@ const ENDS: usize = 10;
 /// Largest number of queues that the text lists completely. If there are more, it lists the 8 longest.
 const SHOWN: usize = 16;
 
-/// Data traffic of a run. Each array has one value for the direction to Rx and, if data goes both ways, a second one
-/// for the direction to Tx.
+/// Data traffic of a run. Each array has one value for the direction to Rx and, if data goes both ways, a second
+/// value for the direction to Tx.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TrafficReport {
     /// Promised data rates, bit/s, for each direction: by the planner's formula at the first agreement.
@@ -45,9 +45,9 @@ pub struct TrafficDetails {
     /// Traffic in each direction: to Rx and, if data goes both ways, back to Tx.
     pub flows: Vec<FlowReport>,
     /// Periods in which the chain's view, its state and the promised data rates did not change. The promised rates
-    /// are those of the planner's formula.
+    /// come from the planner's formula.
     pub periods: Vec<PeriodReport>,
-    /// Text that says how the hops share frequencies and time.
+    /// Text about how the hops share frequencies and time.
     #[serde(skip)]
     sharing: String,
     /// True if the lengths of the time slots are fitted to the hops' data rates in both directions.

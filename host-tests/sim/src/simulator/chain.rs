@@ -341,8 +341,8 @@ struct Member {
     /// Last setpoint that [`Chain::check`] found within the limits. It is stored so that the same setpoint is not
     /// checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of the setpoints since the relay last had none. With a guard, a setpoint may
-    /// be outside the geofence only within this range.
+    /// Smallest and largest coordinates of the setpoints since the relay last had no setpoint. With a guard, a
+    /// setpoint may be outside the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -382,7 +382,7 @@ pub struct Chain {
     /// Simulated shared channel; `None` for separate lines or an ideal channel.
     medium: Option<Medium>,
     bursts: Option<Bursts>,
-    /// Setpoints of all relays at the last agreement; `None` before the first one.
+    /// Setpoints of all relays at the last agreement; `None` until the chain has agreed.
     agreed: Option<Vec<Placement>>,
     agreements: u32,
     /// True once the relays have made the last measurement of the interference.
@@ -448,8 +448,8 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults. The statistics compare the positions of the created chain with those
-    /// from `run`.
+    /// `run` simulates a chain without faults. The statistics compare the positions of the created chain with the
+    /// positions from `run`.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -636,7 +636,7 @@ pub enum QueuedEvent {
     StationTimeout,
     /// A ground station begins an upload. The event's relay index is the upload's index in the setup.
     Upload,
-    /// A ground station begins to watch. The event's relay index is that of the setup's `watches`.
+    /// A ground station begins to request reports. The event's relay index is the index in the setup's `watches`.
     Watch,
     /// The drones fly for one time step of the flight simulation.
     Fly,
@@ -710,7 +710,7 @@ impl Queue {
         Some((entry.at, entry.relay, entry.event))
     }
 
-    /// Removes the earliest event, if it is not after `until`, as [`take`](Self::take) does.
+    /// Removes the earliest event, if its time is not after `until`. The result is as in [`take`](Self::take).
     pub fn take_by(&mut self, until: Instant) -> Option<(Instant, usize, QueuedEvent)> {
         let Reverse(next) = self.entries.peek()?;
         (next.at <= until).then(|| self.take())?

@@ -249,7 +249,7 @@ impl Flight {
         }
     }
 
-    /// Moves all drones for one time step. Returns true if they report their positions after it.
+    /// Moves all drones for one time step. Returns true if the drones report their positions after this step.
     pub(super) fn go_on(&mut self) -> bool {
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
         let step_s = self.step.as_micros() as f64 / 1e6;

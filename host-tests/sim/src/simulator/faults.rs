@@ -105,7 +105,7 @@ impl Faults {
 
 /// Model of bursts of losses (Gilbert-Elliott): each direction of a link is in a good or a bad state.
 ///
-/// In the bad state it loses all frames, in the good state none.
+/// In the bad state the link loses all frames, in the good state no frames.
 #[derive(Debug)]
 pub struct Bursts {
     /// Mean fraction of frames that the link loses, 0 to 1. It equals the fraction of frames that find the link in its bad state.
@@ -116,7 +116,7 @@ pub struct Bursts {
     ///
     /// It is the inverse of the mean length of a burst, frames.
     heals: f64,
-    /// State of each link by its sending and receiving node: true if it is bad.
+    /// State of each link by its sending and receiving node: true if the link is in the bad state.
     bad: HashMap<(usize, usize), bool>,
 }
 

@@ -60,9 +60,9 @@ impl FleetSpec {
     }
 }
 
-/// Returns a geographic line of `distance_m` metres at an arbitrary place, for a scenario without one.
+/// Returns a geographic line of `distance_m` metres at an arbitrary place. It is for a scenario without such a line.
 ///
-/// It leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
+/// The line leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
     const TX: [f64; 2] = [47.4, 8.54];
     let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;
@@ -136,7 +136,7 @@ pub(super) struct Vehicle {
     armed: bool,
     landed: u8,
     mode: Mode,
-    /// Position, m, to which the autopilot flies the drone. There the drone hovers.
+    /// Position, m, to which the autopilot flies the drone. The drone hovers at this position.
     goal: Point,
     /// Height at which the pilot first hands the drone to its relay, m.
     climbs_to_m: f64,
@@ -506,7 +506,7 @@ const LOOKS_S: u64 = 2;
 /// Delay from a failsafe, or a restart of autopilot or relay, to the pilot's next hand-over, s.
 const RECOVERS_S: u64 = 10;
 
-/// Flight mode of a drone: who controls it.
+/// Flight mode of a drone: control by the pilot, the autopilot or the relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Mode {
     /// The pilot controls the drone.
@@ -520,7 +520,7 @@ enum Mode {
 #[derive(Clone, Debug)]
 struct Pilot {
     arms_at: Instant,
-    /// Time when the pilot next hands the drone over to the relay; `None` if none is planned.
+    /// Time when the pilot next hands the drone over to the relay; `None` if no handover is planned.
     hands_over_at: Option<Instant>,
     takeovers: Vec<Takeover>,
 }

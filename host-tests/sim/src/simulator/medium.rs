@@ -37,7 +37,8 @@ pub struct Sent {
     pub heard_by: Vec<usize>,
     /// Number of nodes in range that did not receive the frame.
     ///
-    /// Another frame overlapped with it there, or the node's own radio was sending or turning to sending.
+    /// Either another frame overlapped with this frame at the node, or the node's own radio was sending or turning to
+    /// sending.
     pub missed: usize,
 }
 
@@ -48,7 +49,7 @@ enum Reception {
     Collided,
     /// The node does not receive the frame, because its own radio sends or turns to sending.
     ///
-    /// Frames whose sender is switched off meanwhile count here, too.
+    /// Frames whose sender is switched off during the transmission count here, too.
     Unheard,
 }
 
@@ -120,7 +121,7 @@ impl Medium {
         true
     }
 
-    /// Processes an event that is due. If it is the end of a frame, returns that frame.
+    /// Processes an event whose time has come. If it is the end of a frame, returns this frame.
     ///
     /// `hearers` returns the nodes in range of a sending node. Events that follow are appended to `agenda`.
     pub fn happen(
@@ -202,7 +203,7 @@ impl Medium {
 
     /// Starts the turnaround of the radio of `node` from receiving to sending.
     ///
-    /// Frames that this radio was receiving are lost there. Appends the end of the turnaround to `agenda`.
+    /// This radio loses the frames that it was receiving. Appends the end of the turnaround to `agenda`.
     fn turn(&mut self, now: Instant, node: usize, agenda: &mut Agenda) {
         let until = now + self.link.line_time(TURNAROUND);
         if let Some(radio) = self.radios.get_mut(node) {

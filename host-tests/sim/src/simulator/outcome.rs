@@ -72,7 +72,7 @@ pub enum TimelineEvent {
     Adopted(u16),
     /// The relay's setpoint controls its drone from now on: the pilot has handed the drone over.
     Engaged,
-    /// The relay's setpoint no longer controls its drone: the pilot, or the autopilot alone, flies it.
+    /// The relay's setpoint no longer controls the drone: the pilot or the autopilot alone flies it.
     Released,
     /// The autopilot no longer reports the position of the relay's drone.
     Blind,
@@ -82,7 +82,7 @@ pub enum TimelineEvent {
     NewEstimate,
     /// The relay found that the measurements do not fit a single interferer.
     InterfererUnclear,
-    /// The relay found that one other node's measurements do not agree with those of the rest of the chain.
+    /// The relay found that the measurements of one node do not agree with the other nodes.
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
@@ -180,8 +180,8 @@ pub struct Watched {
     pub longest_wrong: Option<Duration>,
     /// Largest number of groups of relays that flew by separate agreements at the same time.
     pub most_flying: usize,
-    /// Minimum distance of two relays during the run, m. It is that of their drones if simulated, else of their
-    /// setpoints.
+    /// Minimum distance of two relays during the run, m. The distance is between their drones if drones are
+    /// simulated, otherwise between their setpoints.
     pub least_separation_m: Option<f64>,
 }
 
@@ -242,7 +242,7 @@ pub struct Outcome {
     pub fleet: Vec<(Point, bool)>,
     /// Number of setpoints outside of the mission's limits. Nonzero is a bug.
     pub unsafe_setpoints: u64,
-    /// Counters of the shared radio channel; all 0 without one.
+    /// Counters of the shared radio channel; all 0 without such a channel.
     pub air: AirCounts,
     /// Availability of the chain; `None` unless the run has a fixed end or a shared channel.
     pub watched: Option<Watched>,
@@ -289,7 +289,8 @@ pub struct Shot {
     pub relay: u16,
     /// True while the relay is switched on.
     pub is_on: bool,
-    /// Setpoint of the relay; `None` before its first one. A relay that is switched off keeps its last one.
+    /// Setpoint of the relay; `None` if it has never had a setpoint. A relay that is switched off keeps its last
+    /// setpoint.
     pub place: Option<Placement>,
     /// Number of frames sent on all links until this time.
     pub messages: u64,
@@ -320,7 +321,7 @@ pub struct Film {
 pub enum Link {
     /// Radio channel that all nodes share.
     Shared,
-    /// Link between the node with this number and the next one toward Rx. Tx is node 0.
+    /// Link between the node with this number and the next node toward Rx. Tx is node 0.
     After(u16),
 }
 

@@ -15,8 +15,8 @@ use super::setup::Setup;
 pub struct Watch {
     pub(super) states: Vec<ObservedState>,
     pub(super) optima: Optima,
-    /// Last setpoint of each relay, from relay 1; `None` before its first one. A relay that is off keeps its last
-    /// one.
+    /// Last setpoint of each relay, from relay 1; `None` if it never had one. A relay that is off keeps its last
+    /// setpoint.
     last_setpoints: Vec<Option<Point>>,
     until: Instant,
     first: Option<Instant>,

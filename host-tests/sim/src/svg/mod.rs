@@ -273,7 +273,7 @@ const LINE: f64 = 48.0;
 /// Distance of the first and the last event from the picture's left and right edge, in picture units.
 const MARGIN: f64 = 52.0;
 
-/// Largest number of events in a picture. If there are more, the middle ones are merged.
+/// Largest number of events in a picture. If there are more, the middle events are merged.
 const MOST: usize = 8;
 
 /// Largest number of characters in the text of an event. Longer texts are cut.
@@ -312,7 +312,7 @@ fn draw_events(canvas: &mut Canvas, picture: &Picture) {
     }
 }
 
-/// Returns the times and texts of the events as shown. If there are too many, the middle ones are merged.
+/// Returns the times and texts of the events as shown. If there are too many, the middle events are merged.
 fn shown(events: &[(f64, String)]) -> Vec<(String, String)> {
     let mut shown: Vec<(String, String)> = events
         .iter()

@@ -100,7 +100,7 @@ pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, pic
 
 /// Classes of hops by SIR: limit in dB above the worst hop, colour, line width, text in the legend.
 ///
-/// The colours are those of Okabe and Ito. The worst class is wider, for prints without colour.
+/// The colours are from the palette of Okabe and Ito. The worst class is wider, for prints without colour.
 pub(super) const CLASSES: [(f64, &str, f64, &str); 4] = [
     (0.1, "#d55e00", 3.2, "< 0.1 dB"),
     (1.0, "#e69f00", 2.4, "< 1 dB"),
@@ -118,7 +118,7 @@ const SIR_SIZE: f64 = 10.0;
 const GAP: f64 = 4.6;
 
 /// Points of a hop beside which the text with its SIR may be drawn. Each is a fraction of the hop's length, and the
-/// first one where the text has enough space is used.
+/// first point where the text has enough space is used.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
 /// Distances, in picture units, by which the text with a hop's SIR may be moved away from the hop.
 ///

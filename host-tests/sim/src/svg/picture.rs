@@ -38,7 +38,8 @@ pub struct Picture {
     pub lateral_view: Option<LateralView>,
     /// Linear SIR of every hop from Tx to Rx. A hop is grey if its value is not finite and positive.
     pub hop_sir: Vec<f64>,
-    /// Linear SIR of every hop in the direction to Tx, the hop next to Tx first. Empty if only the way to Rx counts.
+    /// Linear SIR of every hop in the direction to Tx, the hop next to Tx first. Empty if only the direction to Rx
+    /// counts.
     pub hop_sir_back: Vec<f64>,
     /// SIR that hops need toward Tx, as a fraction (0 to 1) of the SIR that they need toward Rx.
     pub reverse: f64,
@@ -162,7 +163,7 @@ pub(super) fn counted(picture: &Picture, number: usize) -> Option<f64> {
     }
 }
 
-/// Returns the lowest linear SIR of all hops, each in its worse direction; `None` if none is known.
+/// Returns the lowest linear SIR of all hops, each in its worse direction; `None` if no SIR is known.
 pub(super) fn worst(picture: &Picture) -> Option<f64> {
     let sirs = (1..=picture.hop_sir.len())
         .filter_map(|number| counted(picture, number))

@@ -329,7 +329,7 @@ fn an_option_that_would_be_ignored_is_refused() {
     insta::assert_snapshot!(refusals(IGNORED));
 }
 
-/// Checks that an option is accepted where it has an effect, and refused where it has none.
+/// Checks that an option is accepted where it has an effect, and refused where it has no effect.
 #[test]
 fn a_useful_option_is_accepted() {
     for arguments in [

@@ -345,7 +345,8 @@ fn companion(options: &Options) -> Result<Companion, Failure> {
     Ok(sections.companion)
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan is refused there. Draws the terrain for `--profile`.
+/// Returns the terrain below `plan`, and the reason why the plan is refused above this terrain. Draws the terrain for
+/// `--profile`.
 fn terrain(
     options: &Options,
     scenario: &Scenario,
@@ -374,7 +375,7 @@ fn terrain(
     Ok((Some(report), problem.or(missed)))
 }
 
-/// Returns the terrain below `plan`, and the reason why it cannot be flown there.
+/// Returns the terrain below `plan`, and the reason why it cannot be flown above this terrain.
 fn over(
     options: &Options,
     elevation: &Elevation,
@@ -455,7 +456,7 @@ fn picture(plan: &Plan, scenario: &Scenario) -> Picture {
 /// Prints the report as a table or as JSON.
 ///
 /// # Errors
-/// The error message in the report, if it has one.
+/// The error message in the report, if the report has one.
 fn show(options: &Options, report: &PlanReport) -> Result<(), Failure> {
     command::print(&if options.json {
         command::json(report)?

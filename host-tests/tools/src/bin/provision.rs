@@ -713,7 +713,8 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
     }
 }
 
-/// Returns the method to provision: that of the command line or plan, else of the section, or `align`.
+/// Returns the method to provision. It comes from the command line or plan, else from the section; else it is
+/// `align`.
 ///
 /// `of_file` is the method in section `network`. A plan made with another method is rejected; an option that
 /// overrides the section is reported.

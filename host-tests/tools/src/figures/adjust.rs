@@ -137,7 +137,7 @@ fn taken() -> Vec<String> {
 
 /// Formats the horizontal distances of neighbouring relays near Tx, in the middle, and near Rx.
 ///
-/// The relays' positions are those after `round` rounds of Algorithm 2.
+/// The positions are the relays' positions after `round` rounds of Algorithm 2.
 fn steps(rows: &[ShapeRow], round: u16) -> String {
     let x = |relay: u16| {
         let mut of = rows.iter().filter(|row| row.round == round);

@@ -82,8 +82,8 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. Tries altitudes 5 m apart, then searches around the best one to 0.1 m. The
-/// second result counts only if its SIR is higher by more than twice the tolerance with which a chain's SIR is
+/// The interferer is at (500, `y_m`) m. Tries altitudes 5 m apart, then searches around the best altitude to 0.1 m.
+/// The second result counts only if its SIR is higher by more than twice the tolerance with which a chain's SIR is
 /// computed.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {

@@ -16,7 +16,7 @@ pub struct Chart {
 /// Panel of a chart: a pair of axes and the curves drawn in it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Panel {
-    /// Heading that tells this panel from the chart's others; empty for a single panel.
+    /// Heading that distinguishes this panel from the chart's other panels; empty for a single panel.
     pub heading: String,
     /// Horizontal axis of the panel.
     pub x: Axis,

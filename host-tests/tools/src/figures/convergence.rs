@@ -50,7 +50,7 @@ fn sweeps(relays: u16) -> Result<Vec<Row>, FigureError> {
     Ok(sweeps.into_iter().filter_map(row).collect())
 }
 
-/// Selects the passes (messages along the chain) that the figure draws, the last ones more densely.
+/// Selects the passes (messages along the chain) that the figure draws, the last passes more densely.
 fn thinned(rows: &[Row]) -> Vec<Row> {
     let end = rows.last().map_or(0, |row| row.sweep);
     rows.iter()

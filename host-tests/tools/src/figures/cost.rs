@@ -22,8 +22,8 @@ struct Row {
     step_messages: u64,
     step_bytes: u64,
     step_sir_linear: f64,
-    /// Number of passes of messages along the chain, if the leader narrows an interval around the best target SIR by
-    /// messages. The leader does not predict the target.
+    /// Number of passes of messages along the chain, with the bracketed schedule. With this schedule the leader
+    /// narrows an interval around the best target SIR. The leader does not predict the target.
     bracketed_sweeps: u32,
     bracketed_messages: u64,
     bracketed_bytes: u64,

@@ -18,7 +18,7 @@ const LETTER: u32 = 17;
 const SAMPLE: u32 = 104;
 
 const FONT: &str = "Helvetica, Arial, 'DejaVu Sans', sans-serif";
-/// Font size of all text. The drawing library divides sizes by 1.24, so the factor compensates for that.
+/// Font size of all text. The drawing library divides sizes by 1.24, so the factor 1.24 compensates for this.
 const LETTERS: f64 = 28.0 * 1.24;
 const INK: RGBColor = RGBColor(34, 34, 34);
 const GRID: RGBColor = RGBColor(205, 205, 205);

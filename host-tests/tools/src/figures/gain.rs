@@ -34,7 +34,7 @@ struct Row {
     gain_over_equal_percent: f64,
 }
 
-/// Returns a table row for each number of relays. The mean over random positions is that of `draws` chains.
+/// Returns a table row for each number of relays. The mean over random positions is the mean of `draws` chains.
 fn data(relays: &[u16], draws: u32) -> Result<Vec<Row>, FigureError> {
     relays
         .par_iter()

@@ -29,9 +29,9 @@ struct Row {
     interferer_x_m: f64,
     interferer_y_m: f64,
     x_m: f32,
-    /// Lower altitude at which both hops have the same SIR, m; `None` if there is none.
+    /// Lower altitude at which both hops have the same SIR, m; `None` if there is no such altitude.
     lower_altitude_m: Option<f32>,
-    /// Upper altitude at which both hops have the same SIR, m; `None` if there is none.
+    /// Upper altitude at which both hops have the same SIR, m; `None` if there is no such altitude.
     upper_altitude_m: Option<f32>,
 }
 

@@ -48,7 +48,7 @@ pub struct Figure {
     pub make: fn() -> Result<Sheet, FigureError>,
 }
 
-/// Figures that `cargo figures` can make: those of the paper in its order, then this project's own.
+/// Figures that `cargo figures` can make. First the paper's figures in its order, then this project's own figures.
 pub const ALL: [Figure; 17] = [
     figure("locus", locus::sheet),
     figure("single", single::sheet),

@@ -19,9 +19,9 @@ pub struct Sheet {
     pub name: &'static str,
     /// Title of the figure, shown above it.
     pub title: &'static str,
-    /// Paragraphs of the figure's caption, which say what the figure shows.
+    /// Paragraphs of the figure's caption, which describe the content of the figure.
     pub says: Vec<String>,
-    /// Notes below the figure: the parameters with which it is computed, and those that the paper omits.
+    /// Notes below the figure: the parameters of the computation, and parameters that the paper omits.
     pub taken: Vec<String>,
     /// Chart of the figure, written as an SVG file.
     pub chart: Chart,

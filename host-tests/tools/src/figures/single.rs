@@ -66,7 +66,7 @@ pub fn scenario(tx_w: f64, relay_w: f64, altitude_m: u32) -> Scenario {
 
 /// Returns a table row for each pair of powers (Tx, relay) and altitude.
 ///
-/// The mean over random positions is that of `draws` positions.
+/// The mean over random positions is the mean of `draws` positions.
 fn data(powers_w: &[(f64, f64)], altitudes_m: &[u32], draws: u32) -> Result<Vec<Row>, FigureError> {
     let choices: Vec<(f64, f64, u32)> = powers_w
         .iter()
@@ -167,7 +167,7 @@ impl Reading {
 
 /// Table row: gains of the best position over other positions, for one pair of powers.
 ///
-/// They are averaged over the altitudes in the way that `reading` states.
+/// The gains are averaged over the altitudes in the way that `reading` states.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 struct GainRow {
     tx_w: f64,
@@ -213,7 +213,8 @@ fn gains(
 
 /// Returns a mean value (`reading`: SIR, dB or rate) for four positions of the relay at one altitude.
 ///
-/// The positions are the best one, a random one, the best one without interference, and the middle of the line.
+/// The positions are the best position, a random position, the best position without interference, and the middle of
+/// the line.
 fn four(row: &Row, reading: Reading) -> [f64; 4] {
     let linear = [
         f64::from(row.sir_linear),
@@ -274,7 +275,7 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference of a row's two average gains from the printed ones, percentage points.
+/// Returns the larger difference of a row's two average gains from the printed gains.
 ///
 /// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, else over the
 /// blind method.
@@ -290,7 +291,7 @@ fn off(row: &GainRow, middle: bool) -> f64 {
     from(row.over_random_percent, PRINTED_PERCENT.0).max(from(other, PRINTED_PERCENT.1))
 }
 
-/// Describes in two paragraphs how many computed averages agree with those that the paper prints.
+/// Describes in two paragraphs how many computed averages agree with the paper's averages.
 fn findings(gains: &[GainRow]) -> Vec<String> {
     let least = |reading: Reading| {
         let of = gains.iter().filter(|row| row.reading == reading);
@@ -323,7 +324,7 @@ fn findings(gains: &[GainRow]) -> Vec<String> {
     ]
 }
 
-/// Returns the cells of the caption's table, which compares the paper's averages with computed averages.
+/// Returns the cells of the caption's table. It compares the paper's averages with computed averages.
 ///
 /// The first row has the printed averages. Then there is a row for each kind of average, with the pair of powers
 /// whose averages are nearest to the printed averages. The last rows are for the pairs of powers that the figure

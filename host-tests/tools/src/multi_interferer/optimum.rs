@@ -347,7 +347,7 @@ impl<'a> Stages<'a> {
 /// Returns the feasible hops from a relay to the next one, whose x is in one of the intervals `spans`.
 ///
 /// Each hop meets the target SIR with the sender's power, for which `reach` is computed, and is at least `apart`
-/// metres long. The search calls this for each relay, from the last one but one back to the first.
+/// metres long. The search calls this for each relay, from the last relay but one back to the first relay.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -540,7 +540,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Returns those of the crossings `turns` at which the function falls through its level, as positions.
+/// Returns the positions of the crossings in `turns` at which the function falls through its level.
 fn falling(turns: &[Crossing]) -> Vec<f64> {
     let falling = turns.iter().filter(|turn| !turn.rising);
     falling.map(|turn| turn.at).collect()
@@ -621,8 +621,8 @@ pub(super) struct Crossing {
 
 /// Returns the points, in rising order, at which the function `exact` crosses `level`.
 ///
-/// `values` are those of the function at the rising `nodes`. Two crossings between neighbouring nodes are missed. The
-/// cost is about 60 evaluations for each crossing.
+/// `values` are the values of the function at the rising `nodes`. Two crossings between neighbouring nodes are
+/// missed. The cost is about 60 evaluations for each crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],
@@ -645,7 +645,7 @@ pub(super) fn crossings(
 
 /// Returns the last point from `inside` towards `outside` at which `holds` is still true.
 ///
-/// `outside` may be the lower or the higher one. `holds` must be true at `inside` and false at `outside`; if it
+/// `outside` may be lower or higher than `inside`. `holds` must be true at `inside` and false at `outside`; if it
 /// changes more than once, one of the changes is found.
 pub(super) fn boundary(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {

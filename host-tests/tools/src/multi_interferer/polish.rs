@@ -90,7 +90,7 @@ pub fn polish(
 
 /// Moves relay `at` (from 0) if that raises the SIR of the worse of its two hops.
 ///
-/// The relay's altitude and lateral position are searched on both sides of the present ones, up to the fraction
+/// The relay's altitude and lateral position are searched on both sides of the present values, up to the fraction
 /// `window` of the permitted ranges `room`.
 fn step(scene: &Scene, places: &mut [Place], at: usize, room: Corridor, window: f64) {
     let relays = &scene.relays;
@@ -129,8 +129,8 @@ impl Turn<'_> {
 
     /// Returns the best position found for the relay, and the SIR of its worse hop.
     ///
-    /// It first tries other altitudes and then other lateral positions than those of `own`. The SIR is 0 if no
-    /// position is allowed.
+    /// The search first tries other altitudes, and then other lateral positions, than the position `own` has. The SIR
+    /// is 0 if no position is allowed.
     fn best(&self, own: Place, room: Corridor, window: f64) -> (Place, f64) {
         let start = if self.relay.holds {
             own.h

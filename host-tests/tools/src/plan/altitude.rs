@@ -20,7 +20,7 @@ type Chain = Solver<MOST, { MOST / 10 }>;
 
 /// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
 ///
-/// With fitted slots the positions are those of the largest data rate. If the method finds none, the relays keep the
+/// With fitted slots the positions have the largest data rate. If the method finds no positions, the relays keep the
 /// altitudes that the scenario gives them.
 ///
 /// # Errors
@@ -44,7 +44,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     }
 }
 
-/// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
+/// Returns the relays' positions and altitudes by the joint method. `None` if the method finds no positions.
 fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     let mission = &briefed.mission;
     solved(mission, |index| {
@@ -53,7 +53,7 @@ fn joint(briefed: &ProfiledMission) -> Option<Vec<Placement>> {
     })
 }
 
-/// Returns the relays' positions and altitudes by the joint method; `None` if it finds none.
+/// Returns the relays' positions and altitudes by the joint method. `None` if it finds no positions.
 ///
 /// Computes without messages what the relays compute on board: the solution of the whole chain, then the pass of
 /// messages along the chain that fixes each position. `seat_of` returns the power of a relay and the altitudes and
@@ -131,8 +131,8 @@ pub(super) fn fewest(scenario: &Scenario, target: f64, tolerance: f64) -> Result
 /// Returns the plan with the fewest relays that give every hop the SIR `target`, by bisection.
 ///
 /// The upper limit of the search is the fewest relays at one common altitude, which `at_level` plans for several
-/// altitudes. `free` plans a given number of relays with free altitudes. The search assumes that more relays do no
-/// worse.
+/// altitudes. `free` plans a given number of relays with free altitudes. The search assumes that more relays never
+/// have a lower SIR.
 pub(super) fn fewest_of(
     scenario: &Scenario,
     target: f64,

@@ -29,7 +29,7 @@ use crate::multi_interferer::{best_common_altitude, optimum};
 /// Largest number of relays for which positions are searched on a grid.
 const MOST_SEARCHED: u16 = 50;
 
-/// Quantile that is reported if no other one is asked for.
+/// Quantile that is reported if no other quantile is requested.
 pub const QUANTILE: f64 = 0.95;
 
 /// Numbers of draws of the interferers with which a quantile is optimised, and reported.
@@ -38,7 +38,7 @@ const DRAWS: [usize; 2] = [400, 4000];
 /// Seed of the draws, so that equal scenarios have equal plans.
 const SEED: u64 = 36;
 
-/// Largest number of rounds in which the draws that count are chosen again.
+/// Largest number of rounds in which the decisive draws of the interferers are chosen again.
 const ROUNDS: u32 = 8;
 
 /// Factor on the SIR of a hop whose way crosses a no-fly area: other chains come first.
@@ -50,7 +50,8 @@ const ROUNDING_M: f64 = 0.01;
 /// Number of x, y and altitudes of the first grid, where they are free.
 const GRID: [u32; 3] = [40, 7, 5];
 
-/// Largest number of windows around the relays, and factor on their width where one gains little.
+/// Largest number of search windows around the relays, and factor on the width of a window. The factor applies to a
+/// window that gains little.
 const WINDOWS: (u32, f64) = (120, 0.6);
 
 /// Largest number of times that the windows begin again with their full width.
@@ -72,8 +73,8 @@ pub struct Criterion {
 
 /// Plans the positions that `ask` requests, for interferers in areas and outside no-fly areas.
 ///
-/// With a quantile the positions maximise this quantile over the areas, else the worst case. The SIRs of the plan are those of the
-/// worst case.
+/// With a quantile the positions maximise this quantile of the SIR over the areas, otherwise the SIR of the worst
+/// case. The SIRs in the plan are always for the worst case.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Result<Plan, NoPlan> {
     let wrong = |line: &str| Err(NoPlan::Wrong(line.to_owned()));
     if scenario.areas.is_empty() {
@@ -355,7 +356,7 @@ struct Search<'a> {
     no_fly: &'a [NoFly],
     is_free: bool,
     allow_crossing: bool,
-    /// Draws of the interferers that count; empty for the worst case.
+    /// Draws of the interferers that decide the quantile; empty for the worst case.
     draws: Vec<Vec<Source>>,
 }
 
@@ -735,7 +736,7 @@ impl Draws {
     }
 }
 
-/// Largest number of points drawn until one is in the area.
+/// Largest number of points that are drawn until a point is in the area.
 const TRIES: u32 = 100_000;
 
 fn drawn(rng: &mut ChaCha8Rng, source: &Source, own: &SourceArea) -> Source {
@@ -864,7 +865,7 @@ pub struct Cell {
     pub side_m: f64,
     /// SIR of the worst hop, dB, with the interferer in the middle of the cell at its greatest power.
     pub sir_db: f64,
-    /// Standard deviation of the location of an interferer there by relays with `[listen]`, m.
+    /// Standard deviation, m, of the position that relays with `[listen]` estimate for an interferer here.
     ///
     /// Infinite if they cannot locate it. `None` if it is not computed.
     pub error_m: Option<f64>,

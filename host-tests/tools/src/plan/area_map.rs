@@ -33,7 +33,7 @@ const STEPS: u32 = 5;
 pub enum Shown {
     /// SIR of the worst hop.
     Sir,
-    /// Error of the location of the interferer by relays that measure it.
+    /// Error of the interferer's position as estimated by relays that measure the interference.
     Error,
 }
 

@@ -41,7 +41,7 @@ const ROUNDING: f64 = 1e-9;
 pub struct Targets {
     /// Target SIR of each hop in the direction to Rx, linear, above 0.
     pub there: f64,
-    /// Target SIR of each hop in the direction to Tx, linear; 0 if that direction does not count.
+    /// Target SIR of each hop in the direction to Tx, linear; 0 if the direction to Tx does not count.
     pub back: f64,
 }
 

@@ -27,8 +27,8 @@ use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
 /// Largest excess of time per bit, relative, for which a number of relays gets a precise search.
 ///
-/// The time per bit is that of the best positions on a coarse grid; the excess is over the number of relays for which
-/// it is least. A precise search for positions cannot make up for a larger excess.
+/// The time per bit is for the best positions on a coarse grid. The excess is the difference to the number of relays
+/// with the least time per bit. A precise search for positions cannot make up for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -46,11 +46,11 @@ pub struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    /// Creates the planner for up to `most` relays; `None` if the positions of the best SIR serve.
+    /// Creates the planner for up to `most` relays; `None` if the positions with the best SIR suffice.
     ///
-    /// They serve if they also maximise the data rate: with equal time slots or a frequency for each hop, for data in
-    /// one direction or at equal rates in both. They also serve where no better positions are searched for: with free
-    /// altitudes, a given x, several interferers, or interference known only along the line.
+    /// They suffice if they also maximise the data rate: with equal time slots or a frequency for each hop, for data
+    /// in one direction or at equal rates in both. They also suffice where no better positions are searched: with
+    /// free altitudes, a given x, several interferers, or interference known only along the line.
     pub fn new(
         scenario: &'a Scenario,
         ask: &PlanRequest,

@@ -19,16 +19,16 @@ pub struct Flown {
     pub plan: Plan,
     /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
-    /// Data rate of the relays' positions and the best one found, over the bandwidth, bit/s/Hz. Only if the relays fit
-    /// their slots: the rate then counts instead of the SIR.
+    /// Data rate at the relays' positions, and the best rate found. Both divided by the bandwidth, bit/s/Hz. Only for
+    /// fitted slots (as long as each hop needs): the rate then counts instead of the SIR.
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
 }
 
 impl Flown {
-    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots it is that of the
-    /// best data rate.
+    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots it is a fraction
+    /// of the best data rate.
     pub fn loss(&self) -> f64 {
         let [own, best] = self.rates.unwrap_or([self.plan.sir(), self.best_sir]);
         (1.0 - own / best).max(0.0)
@@ -39,7 +39,7 @@ impl Flown {
         self.loss() > LOSS
     }
 
-    /// Returns a line for the user: the loss by the relays' positions, its cause, and what to do.
+    /// Returns a line for the user: the loss by the relays' positions, its cause, and the remedy.
     pub fn describe(&self) -> String {
         let [reach, best] = [self.plan.sir(), self.best_sir].map(|sir| 10.0 * sir.log10());
         let (why, remedy) = if self.stand_in {
@@ -71,7 +71,7 @@ impl Flown {
 
 /// Returns the positions on which `relays` relays in `scenario` would agree by `method`.
 ///
-/// The cost is that of two calls of [`super::plan`].
+/// The cost is the cost of two calls of [`super::plan`].
 pub fn flown(
     scenario: &Scenario,
     relays: u16,

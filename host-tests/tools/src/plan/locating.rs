@@ -38,7 +38,7 @@ const SEARCH_S: f64 = 180.0;
 pub struct Search {
     /// Position [x, y] of the interferer, m.
     pub at: [f64; 2],
-    /// Time from the start of the drones beside Tx to the first estimate, s; absent if there is none.
+    /// Time from the start of the drones beside Tx to the first estimate, s; absent without an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate_s: Option<f64>,
     /// Time to positions with an SIR at most 1 dB below that with a known interferer, s.
@@ -149,7 +149,7 @@ fn is_located(scenario: &Scenario, cell: &Cell) -> bool {
     cell.error_m.is_some_and(|error| error <= LOCATED * apart_m)
 }
 
-/// Returns the positions at which the relays measure: those before an estimate, and those of the plan.
+/// Returns the positions at which the relays measure: before an estimate, and in the plan.
 fn measured_places(scenario: &Scenario, plan: &Plan) -> Vec<Place> {
     let relays = plan.places.len() as f64;
     // Hops of equal length; for one or two relays, then the first hop or the last hop half as long.

@@ -75,7 +75,7 @@ impl Map {
     /// Creates the map of the chain in `plan`.
     ///
     /// # Errors
-    /// A line that says what the scenario lacks.
+    /// A line that names the missing part of the scenario.
     pub fn new(scenario: &Scenario, plan: &Plan) -> Result<Self, String> {
         let line = scenario.line.as_ref().ok_or(
             "site: is missing; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }, which say where on earth the line is",
@@ -156,7 +156,7 @@ impl Map {
 
     /// Adds the state of each hop above the terrain, and the ground below it.
     ///
-    /// The ground is there twice: with the heights of the elevation files, and clamped to the ground of the globe.
+    /// The map has the ground twice: with the heights of the elevation files, and clamped to the ground of the globe.
     #[must_use]
     pub fn above(mut self, line: &Line, terrain: &TerrainReport) -> Self {
         let hops = self.features.iter_mut().filter(|one| one.kind == "hop");

@@ -49,7 +49,7 @@ pub use altitude::solved;
 /// It takes some milliseconds; with free altitudes up to some seconds for fifty relays or more.
 ///
 /// # Errors
-/// [`NoPlan`]: an invalid request, or one that cannot be met, with the best SIR found.
+/// [`NoPlan`]: the request is invalid, or cannot be met. In the second case the error has the best SIR found.
 pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
     check(scenario, ask)?;
     if !scenario.areas.is_empty() || !scenario.no_fly.is_empty() {
@@ -242,7 +242,7 @@ impl From<Refusal> for NoPlan {
 
 impl Plan {
     /// Returns the SIR of the worst hop, linear. In a plan for both directions an SIR toward Tx is first divided by
-    /// `reverse`, the fraction that suffices there.
+    /// `reverse`, the fraction of the SIR toward Rx that suffices toward Tx.
     pub fn sir(&self) -> f64 {
         let there = self.sirs.iter().copied().reduce(f64::min).unwrap_or(0.0);
         self.back.map_or(there, |back| back.worst_both)
@@ -382,7 +382,7 @@ impl ProfiledMission {
             .all(|(_, own)| !((own.altitude_m - common.altitude_m).abs() > 0.0))
     }
 
-    /// Returns the plan with the relays at `places`. Its SIRs are those that the library computes for the mission.
+    /// Returns the plan with the relays at `places`. The library computes the SIRs of the plan for the mission.
     fn plan(self, places: &[Placement], how: &'static str, proven: bool) -> Plan {
         let held: Vec<(Placement, Profile)> = (1..)
             .zip(places)
@@ -409,7 +409,7 @@ impl ProfiledMission {
     }
 }
 
-/// Returns true if the minimum separation of the relays does not cost any SIR, or if there is none.
+/// Returns true if the minimum separation of the relays does not cost any SIR, or if they have none.
 ///
 /// `is_as_good` gets the scenario without a minimum separation. It returns `Some(true)` if the best SIR without the
 /// separation is not higher than with it, and `None` if it finds no chain.

@@ -20,10 +20,10 @@ use uav_relay_scenario::number::narrow;
 use uav_relay_scenario::scene::{Place, Scene};
 use uav_relay_scenario::{Interference, Scenario, Source};
 
-/// Number of start chains that are improved by local search: those with the best SIR.
+/// Number of start chains that are improved by local search. These have the best SIRs.
 const POLISHED: usize = 2;
 
-/// Largest number of interferers that are each taken as the only one, to compute a start chain.
+/// Largest number of interferers for which a start chain is computed. Each is then taken as the only interferer.
 const ALONE: usize = 4;
 
 pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
@@ -368,8 +368,8 @@ const GAIN: f64 = 1e-4;
 /// Rounding error allowed in a distance of two relays, as a fraction of the line.
 const ROUNDING: f64 = 2e-7;
 
-/// Returns the chain `start` after moves that raise its data rate. A move takes one relay, all before it or all after
-/// it, along one coordinate.
+/// Returns the chain `start` after moves that raise its data rate. A move shifts one relay, all relays before it or
+/// all relays after it, along one coordinate.
 fn faster(radio: &Radio, scene: &Scene, start: Vec<Place>) -> Vec<Place> {
     let (d, band) = (scene.distance_m, scene.band);
     let moved = |at: Place, holds: bool, axis: usize, by: f64| match axis {

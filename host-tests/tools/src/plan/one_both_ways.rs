@@ -37,7 +37,7 @@ pub struct Best {
     pub words: String,
 }
 
-/// Names for the user of the four hop SIRs: those of both hops to Rx, then those back to Tx.
+/// Names of the four hop SIRs, for the user: first the two hops to Rx, then the two hops back to Tx.
 const NAMES: [&str; 4] = [
     "the first hop",
     "the second hop",

@@ -49,16 +49,16 @@ const BLOCKED: f64 = 1e-30;
 /// Grid points on each side of a relay in a finer grid.
 const AROUND: i32 = 2;
 
-/// Comparison of the positions over terrain with those that ignore it.
+/// Comparison of the positions for the terrain with the positions that ignore the terrain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OverTerrain {
-    /// SIR of the worst hop with terrain, dB, at positions that ignore it; absent if there are none.
+    /// SIR of the worst hop with terrain, dB, at the positions that ignore it. Absent without such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
     /// Gain of the plan compared with the positions that ignore the terrain, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_gain_db: Option<f64>,
-    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist; absent if they can be
+    /// Reason why the positions that ignore the terrain cannot be flown, or do not exist. Absent if they can be
     /// flown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_problem: Option<String>,
@@ -114,7 +114,7 @@ impl<'a> Search<'a> {
     /// On a longer line each point has the height of the highest ground near it.
     ///
     /// # Errors
-    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    /// A line that names the position: the elevation files do not cover it, or have no height there.
     pub fn new(
         scenario: &Scenario,
         scene: &'a Scene,
@@ -197,7 +197,7 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// Returns the lowest and highest altitude of a relay at `x_m`; `None` if there is none.
+    /// Returns the lowest and highest altitude of a relay at `x_m`; `None` if no altitude is permitted.
     fn band_m(&self, x_m: f64) -> Result<Option<[f64; 2]>, String> {
         let datum = self.datum_m(x_m)?;
         let node = Node {
@@ -343,7 +343,7 @@ impl<'a> Search<'a> {
         Ok(crests.collect::<Result<Vec<_>, String>>()?.concat())
     }
 
-    /// Returns the candidate positions around each relay of `chain`, in steps of `step_m` along x and `climb_m` in
+    /// Returns the candidate positions around each relay of `chain`. The steps are `step_m` along x and `climb_m` in
     /// altitude.
     fn around(
         &self,
@@ -487,7 +487,7 @@ impl<'a> Search<'a> {
 
     /// Returns the best chain of the candidates, and the SIR of its worst hop, linear.
     ///
-    /// `None` if there is none with at least the SIR `floor`. A high floor saves time: hops below it are left out.
+    /// `None` if no chain has at least the SIR `floor`. A high floor saves time: hops below it are left out.
     pub fn best(
         &mut self,
         candidates: &[Vec<Candidate>],
@@ -657,7 +657,8 @@ pub fn best(
 }
 
 impl Candidate {
-    /// Returns the position as relays have it. The altitude is rounded up, so that it stays above the ground.
+    /// Returns the position with the numbers that relays use. The altitude is rounded up, so that it stays above the
+    /// ground.
     #[expect(clippy::cast_possible_truncation, reason = "as relays are told")]
     pub fn placement(&self) -> Placement {
         let altitude_m = self.h_m as f32;

@@ -337,7 +337,7 @@ impl<'a> Layers<'a> {
     }
 
     /// Adds the next relay, which may be at `points`. `known` has the times of the hops from every point of the
-    /// relay before to every one of `points`, if they are computed already.
+    /// previous relay to every point in `points`, if they are computed already.
     fn add(&mut self, points: Vec<Point>, known: Option<&[f64]>) {
         let node = self.layers.len() + 1;
         let times = self.times;
@@ -454,7 +454,7 @@ impl Table {
         u16::try_from(last).unwrap_or(u16::MAX)
     }
 
-    /// Returns the x of `relays` relays, m, in their best chain on the grid; `None` if there is none.
+    /// Returns the x of `relays` relays, m, in their best chain on the grid; `None` without a chain.
     pub fn start(&self, relays: u16) -> Option<&[f64]> {
         let at = usize::from(relays).checked_sub(1)?;
         self.starts.get(at).map(|(_, x)| x.as_slice())

@@ -25,7 +25,8 @@ const MOST_SLOW: u16 = 20;
 /// Largest number of relays for which rates are computed, if the positions are optimised for the rate.
 const MOST_SEARCHED: u16 = 60;
 
-/// Number of relays up to which rates are always computed if each time slot is as long as its hop needs.
+/// Number of relays up to which rates are always computed with fitted time slots. A fitted slot is as long as its hop
+/// needs.
 ///
 /// The list is shorter only if so many relays do not fit on the line, or if it is proven that more relays do not
 /// increase the rate.
@@ -62,8 +63,8 @@ impl Rate {
         }
     }
 
-    /// Returns the linear SIRs of all hops. First those in the direction to Rx, then those in the direction to Tx; `None` for a plan of one
-    /// direction.
+    /// Returns the linear SIRs of all hops. The first list is for the direction to Rx, the second for the direction
+    /// to Tx. `None` for a plan of one direction.
     fn both_sirs(plan: &Plan, scenario: &Scenario) -> Option<[Vec<f64>; 2]> {
         plan.back?;
         let relays = u16::try_from(plan.places.len()).ok()?;
@@ -129,7 +130,7 @@ pub struct Rates {
     pub best: BestRate,
     /// Data rate of each number of relays tried, from 1.
     pub all: Vec<RateOf>,
-    /// Plan with the fewest relays that carry the target rate; `None` without a target, or if none does.
+    /// Plan with the fewest relays that carry the target rate. `None` without a target, or if no plan carries it.
     pub meeting: Option<Plan>,
 }
 
@@ -137,8 +138,8 @@ impl Rates {
     /// Plans 1, 2, 3 and more relays, and computes their data rates over `radio`.
     ///
     /// Ends when provably no larger number carries more, or at a limit of some seconds. `target_bps` is the wanted
-    /// rate to Rx. For both directions, the rate to Tx must then be at least the scenario's fraction `reverse` of
-    /// that.
+    /// rate to Rx. For both directions, the rate to Tx must then be at least `target_bps` times the scenario's
+    /// fraction `reverse`.
     pub fn new(
         scenario: &Scenario,
         ask: &PlanRequest,
@@ -248,7 +249,7 @@ fn most_tried(scenario: &Scenario, ask: &PlanRequest) -> u16 {
 
 /// Relative gain in rate above which a larger number of relays counts as better.
 ///
-/// Smaller gains are ignored, so that the best number is not a larger one that gains next to nothing.
+/// Smaller gains are ignored, so that a larger number with almost no gain does not count as the best number.
 const RISE: f64 = 1e-4;
 
 /// Largest number of relays for which [`carry_no_more`] looks for a proof.

@@ -71,7 +71,7 @@ pub struct RateReport {
     pub access: &'static str,
     /// Bandwidth of one frequency, Hz.
     pub bandwidth_hz: f64,
-    /// Requested data rate of the chain, bit/s; absent if none is requested.
+    /// Requested data rate of the chain, bit/s; absent without a request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_rate_bps: Option<f64>,
     /// Number of relays with the largest data rate, and that rate.
@@ -92,7 +92,7 @@ pub struct RateReport {
 }
 
 impl RateReport {
-    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are those to list.
+    /// Creates the report of the rates of `plan`. `best` is the largest rate, `rates` are the rates to list.
     ///
     /// Without a plan the report has only `best` and `rates`.
     pub fn new(
@@ -277,7 +277,7 @@ impl WayBack {
     }
 }
 
-/// Text at the end of each plan: what the model leaves out.
+/// Text at the end of each plan: the parts of reality that the model leaves out.
 const NOT_MODELLED: &str = "not modelled: terrain and obstacles";
 
 /// The same for a plan with terrain.
@@ -333,8 +333,8 @@ pub struct PlanReport {
     /// Name of the algorithm that found the relays' positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub how: Option<&'static str>,
-    /// True if it is proven that no positions are better, or for a requested SIR that no fewer relays suffice. False
-    /// if this is unknown; absent if there is no plan.
+    /// True if it is proven that no positions are better. For a requested SIR: that no fewer relays suffice. False if
+    /// this is unknown; absent if there is no plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven: Option<bool>,
     /// Number of the paper's theorem, 1 to 3, that placed the only relay. 4 means one relay beside the line, and 5
@@ -387,7 +387,7 @@ pub struct PlanReport {
     /// True if relays may leave the line sideways: the table then has a column for y.
     #[serde(skip)]
     pub room: bool,
-    /// Unit in which the table shows SIRs: that of the user's request.
+    /// Unit in which the table shows SIRs: the unit of the user's request.
     #[serde(skip)]
     pub unit: Unit,
 }
@@ -515,7 +515,8 @@ impl PlanReport {
         }
     }
 
-    /// Adds the terrain below the chain, if it is known. `error` says why the plan cannot be flown above it.
+    /// Adds the terrain below the chain, if it is known. `error` states why the plan cannot be flown above this
+    /// terrain.
     #[must_use]
     pub fn above(self, terrain: Option<TerrainReport>, error: Option<String>) -> Self {
         Self {
@@ -655,7 +656,8 @@ pub struct NoiseReport {
     pub figure_db: f64,
     /// Reference temperature T0 of the noise, K.
     pub temperature_k: f64,
-    /// Noise power divided by the receive antenna gain, W, as the SIRs use it. The lower gain counts.
+    /// Noise power divided by the receive antenna gain, W, as the SIRs use it. If the antenna gains differ, the lower
+    /// gain is used.
     pub effective_w: f64,
 }
 

@@ -221,8 +221,8 @@ pub(super) fn fewest(
     Ok(briefed.plan(&places, how, proven))
 }
 
-/// Returns the mission of the fewest relays that give every hop the SIR `target`. They stay at their own altitudes.
-/// The `bool` is true if it is proven that fewer do not suffice.
+/// Returns the mission of the fewest relays that give every hop the SIR `target`. The relays stay at their own
+/// altitudes. The `bool` is true if it is proven that fewer relays do not suffice.
 pub(super) fn enough(
     scenario: &Scenario,
     target: f64,

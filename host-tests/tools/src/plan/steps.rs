@@ -181,7 +181,7 @@ impl Search<'_> {
     }
 
     /// Returns the cells of the line for relay `node`: the start and the least disturbance of each. The disturbance
-    /// is interference plus noise, W: the smaller one of those at the two edges of the cell.
+    /// is interference plus noise, W: the smaller of its values at the two edges of the cell.
     fn quietest(&self, node: usize) -> Vec<Point> {
         let points: Vec<Point> = self
             .grid
@@ -196,8 +196,8 @@ impl Search<'_> {
         cells.collect()
     }
 
-    /// Returns lower bounds on the time for one bit of all hops after a relay. They are in s Hz (s for a bandwidth of
-    /// 1 Hz). There is a row for each relay, with a value for each cell that it may be in.
+    /// Returns lower bounds on the time for one bit of all hops after a relay. The times are in s Hz (s for a
+    /// bandwidth of 1 Hz). There is a row for each relay, with a value for each cell in which the relay may be.
     fn bounds(&self, kinds: &[Rc<Reaches>]) -> Vec<Vec<f64>> {
         let relays = kinds.len();
         let (last, rx) = (self.times.hop(Some(relays), None), self.times.rx());
@@ -320,8 +320,8 @@ impl Search<'_> {
     }
 
     /// Returns those of `labels` (first hops of chains) that may lead to the best chain. A label is left out if
-    /// another one ends farther from Tx, takes no more time, and can receive from a next node at as large an x in the
-    /// return direction.
+    /// another label ends farther from Tx, takes no more time, and can receive from a next node at as large an x in
+    /// the return direction.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -356,7 +356,7 @@ struct Backward {
     /// rate of the radio, and the least SINR that it requires. The table has a row for each rate step, with a value
     /// for each grid point.
     ///
-    /// The x is at most that of Rx.
+    /// The x is at most the x of Rx.
     farthest: Vec<Vec<f64>>,
     /// x of the grid points, m, at which a relay may be better than at some grid point farther from Tx. The reason is
     /// the return direction: there, the relay can receive from a next node at a larger x.

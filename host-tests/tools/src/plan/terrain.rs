@@ -14,13 +14,14 @@ use uav_relay_terrain::report::{FreeSpace, InterfererHeight, TerrainReport};
 use super::Plan;
 use crate::figures::chart::{Axis, Chart, Line, Look, Stroke};
 
-/// Position error of a relay, m, unless `companion.position_error_m` says another one. It is the companion's default.
+/// Position error of a relay, m, unless `companion.position_error_m` gives another value. It is the companion's
+/// default.
 pub const POSITION_ERROR_M: f64 = 1.0;
 
 /// Elevation model of a scenario.
 #[expect(missing_debug_implementations, reason = "millions of heights")]
 pub struct Elevation {
-    /// Terrain of the scenario; its files are those of `--dem`, if there are any.
+    /// Terrain of the scenario; its files are the files of `--dem`, if given.
     pub spec: TerrainSpec,
     terrain: Terrain,
     /// Position error within which obstacles below a relay count, m.
@@ -28,7 +29,7 @@ pub struct Elevation {
 }
 
 impl Elevation {
-    /// Reads the elevation files of the scenario, or those in `dem` if there are any. `None` if there are no files.
+    /// Reads the elevation files of the scenario, or the files in `dem`, if given. `None` if there are no files.
     ///
     /// # Errors
     /// A line that names the file and the problem.
@@ -137,9 +138,9 @@ impl Elevation {
         })
     }
 
-    /// Returns a line that says why the chain of `report` cannot be flown; `None` if it can.
+    /// Returns a line that states why the chain of `report` cannot be flown; `None` if it can.
     ///
-    /// Blocked hops are no reason if `allow_blocked`.
+    /// If `allow_blocked` is true, blocked hops are no reason.
     pub fn problem(&self, report: &TerrainReport, allow_blocked: bool) -> Option<String> {
         let most_m = self.spec.above_ground_max_m;
         let blocked = report.blocked().filter(|_| !allow_blocked);

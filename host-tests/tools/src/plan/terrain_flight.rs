@@ -24,7 +24,7 @@ use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
 use super::{NoPlan, Plan, ProfiledMission, source};
 
-/// Number of altitudes of a relay that are tried between the lowest and the highest one.
+/// Number of altitudes of a relay that are tried between the lowest and the highest altitude.
 const LEVELS: u32 = 40;
 
 /// Largest number of searches, each at the x of the search before.
@@ -169,7 +169,7 @@ pub struct FlownRelay {
     pub x_m: f32,
     /// Altitude of its position above the line between the sites, m.
     pub altitude_m: f32,
-    /// Interval of x, m, in which no hop gets worse while its neighbours are in theirs.
+    /// Interval of x, m, in which no hop gets worse while its neighbours are in their intervals.
     ///
     /// Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -207,7 +207,7 @@ pub struct Flight {
     position_error_m: f64,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
-    /// Reason why the relays cannot fly there: a blocked hop, a relay too low or too high.
+    /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high.
     #[serde(skip)]
     pub problem: Option<String>,
 }
@@ -301,7 +301,7 @@ impl Flight {
         }))
     }
 
-    /// Returns the text about the room of relay `index`; empty if it is unknown.
+    /// Returns the text about the interval of x of relay `index`; empty if the interval is unknown.
     pub fn room(&self, index: u16) -> String {
         let relay = self.relays.iter().find(|relay| relay.index == index);
         match relay.map(|relay| relay.room_m) {

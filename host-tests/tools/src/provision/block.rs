@@ -27,7 +27,7 @@ pub enum BlockError {
     Config(ConfigError),
     /// Error: the drone would reject the surveyed positions of Tx and Rx, for this reason.
     Course(CourseError),
-    /// Error: the drone would read from the block another configuration than the intended one.
+    /// Error: the drone would read from the block another configuration than the intended configuration.
     Changed,
 }
 
@@ -151,7 +151,7 @@ impl Flight {
         Self { method, ..self }
     }
 
-    /// Sets the slots of the relays as `scenario` describes them, if their method is the joint one.
+    /// Sets the slots of the relays as `scenario` describes them, if their method is the joint method.
     ///
     /// # Errors
     /// [`BlockError::Refused`] if the relays cannot fit their slots.
@@ -212,7 +212,7 @@ impl Flight {
 
     /// Returns the relays' own profiles (power, altitude) with their indices, from 1.
     ///
-    /// Only relays whose profile differs from the common one are listed.
+    /// Only relays whose profile differs from the common profile are listed.
     pub fn profiles(&self) -> &[(u16, Profile)] {
         &self.own
     }
@@ -270,7 +270,7 @@ impl Flight {
 
 /// Converts a scenario's channel, with losses in dB, to the numbers of a block, with factors.
 ///
-/// The result is that of [`uav_relay::Channel::from_db`] to the bit.
+/// The result equals [`uav_relay::Channel::from_db`] to the bit.
 fn channel_numbers(spec: &ChannelSpec) -> ChannelNumbers {
     let factor = |db: f64| libm::pow(10.0, db / 10.0);
     ChannelNumbers {
@@ -298,8 +298,8 @@ pub fn silence(probe_after_ms: u32) -> [Duration; 2] {
 
 /// Returns the silence, ms, after which a relay with this block probes a neighbour.
 ///
-/// It is `given_ms` from the command line, otherwise the value of the scenario's section `network`; 0 selects the
-/// firmware's default. `name` is that of the scenario, for errors.
+/// The silence is `given_ms` from the command line, otherwise the value of the scenario's section `network`; 0
+/// selects the firmware's default. `name` is the name of the scenario, for errors.
 ///
 /// # Errors
 /// A line that names a key whose value no block can express, the value and the allowed one.

@@ -24,7 +24,7 @@ const RELAY_UNIT: &str = include_str!("../../../../examples/linux_companion/uav-
 /// Folders in which the units may write.
 const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
 
-/// Largest MAVLink system number of a drone; ground stations have the next ones.
+/// Largest MAVLink system number of a drone; ground stations have the next numbers.
 const MAX_SYSTEM: u16 = 250;
 
 /// Largest radius and altitude of ArduCopter's fences, m.
@@ -288,7 +288,7 @@ impl Bundle<'_> {
         Ok(file)
     }
 
-    /// Returns the geofence of relay `index`, as its guard has it.
+    /// Returns the geofence that the guard of relay `index` uses.
     fn fence(&self, index: u16) -> uav_relay::Geofence {
         let own = self.profiles.iter().find(|(of, _)| *of == index);
         let profile = own.map_or(self.mission.config().common, |(_, profile)| *profile);
@@ -300,7 +300,7 @@ impl Bundle<'_> {
     /// Drones return at different altitudes, because a returning drone crosses the line of the others.
     ///
     /// # Errors
-    /// The highest one is above the range of a fence.
+    /// The highest altitude is above the range of a fence.
     fn parameters(&self, index: u16) -> Result<Vec<Parameter>, String> {
         let config = self.mission.config();
         let fence = self.fence(index);
@@ -453,7 +453,7 @@ impl Bundle<'_> {
     }
 }
 
-/// Returns the section `name` of a file, which is added if it is missing.
+/// Returns the section `name` of a file. A missing section is added.
 fn section<'a>(file: &'a mut DocumentMut, name: &str) -> Result<&'a mut dyn TableLike, String> {
     let new = || Item::Table(Table::new());
     let item = file.entry(name).or_insert_with(new);
@@ -517,7 +517,7 @@ fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
     section.insert(key, value(path.display().to_string()));
 }
 
-/// Returns the udev rules for the ports `ports`; those with another name need none.
+/// Returns the udev rules for the ports `ports`; ports with another name need no rules.
 ///
 /// # Errors
 /// A name of a port has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.

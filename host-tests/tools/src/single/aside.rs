@@ -90,7 +90,7 @@ pub enum AsideCase {
     /// Optimum at the lowest altitude, where the first hop's SIR is at its maximum. The second hop's SIR is higher
     /// there.
     Hilltop,
-    /// Optimum above Rx, at the lowest altitude: the first hop's SIR is higher than the second hop's SIR there.
+    /// Optimum above Rx, at the lowest altitude. The first hop's SIR is higher than the second hop's SIR there.
     AboveRx,
     /// Optimum on an edge of the box of allowed positions, along this coordinate. Without the limits of the box the
     /// optimum would be elsewhere.
@@ -243,9 +243,9 @@ fn without_limits(
     (place, case)
 }
 
-/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs at a point of the plane. The
-/// numbers are D (distance Tx-Rx), the interferer's position (X, Y), h^2, the ratio G = K / A of the hops' gains, and
-/// the noise nu, in m and m^2.
+/// Horizontal plane at one altitude h, with the numbers that determine both hops' SIRs at a point. The numbers are D
+/// (distance Tx-Rx), the interferer's position (X, Y), h^2, the ratio G = K / A of the hops' gains, and the noise nu,
+/// in m and m^2.
 struct Plane {
     d: f64,
     x: f64,

@@ -189,8 +189,8 @@ fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
 
 const NOISY_HALVINGS: u8 = 60;
 
-/// Returns the two values of the coordinate t, m, at which the first hop's SIR has an extremum on an edge, without
-/// noise. t is the coordinate that varies along the edge.
+/// Returns the two t, m, at which the first hop's SIR has an extremum on an edge, without noise. t is the coordinate
+/// that varies along the edge.
 fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
     let half = 0.5 * (squared(p) + a - b);
     // The larger root first, the other one from their product: neither cancels.
@@ -199,8 +199,8 @@ fn noise_free_turns(p: f64, a: f64, b: f64) -> [f64; 2] {
     [sum / p, -p * b / sum]
 }
 
-/// Returns the three values of the coordinate t, m, at which the first hop's SIR has an extremum on an edge, with
-/// noise. An extremum that does not exist is NaN.
+/// Returns the three t, m, at which the first hop's SIR has an extremum on an edge, with noise. An extremum that does
+/// not exist is NaN.
 ///
 /// The SIR is proportional to s / ((t^2 + `b`) (1 + nu s)) with s = (t - `p`)^2 + `a`, where the coordinate t varies
 /// along the edge. `noise` is nu.
@@ -309,8 +309,8 @@ pub(super) fn best_in_corridor(
     best
 }
 
-/// Inserts the line of constant y `new` into the list of the best lines, if it is better than a line in the list.
-/// Each entry has the best SIR on the line, and the y of the two adjacent lines.
+/// Inserts the line of constant y `new` into the list of the best lines, if it is good enough. Each entry has the
+/// best SIR on the line, and the y of the two adjacent lines.
 fn keep(followed: &mut [(f32, f32, f32); FOLLOWED], new: (f32, f32, f32)) {
     let mut new = new;
     for slot in followed {

@@ -23,7 +23,7 @@ pub mod without_interferer;
 use uav_relay::sir::{self, Sender};
 use uav_relay::{Mission, Placement, Profile};
 
-/// Number of bisection steps for the x at which both hops have the same SIR; the result is exact to a step of an f32.
+/// Number of bisection steps for the x at which both hops have the same SIR. The result is exact to a step of an f32.
 const HALVINGS: u8 = 40;
 
 /// Position of a single relay, and the SIR of the worse of its two hops, linear. In an interference field the SIR is

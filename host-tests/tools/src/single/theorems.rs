@@ -102,8 +102,8 @@ pub enum PlaceCase {
     /// Optimum above Rx: the first hop's SIR has a minimum before Rx. At that minimum it is still higher than the
     /// second hop's.
     OverValley = 5,
-    /// Optimum at the maximum of the first hop's SIR, where the first hop's SIR is still lower than the second hop's
-    /// SIR. The interferer is behind Tx.
+    /// Optimum at the maximum of the first hop's SIR. There it is still lower than the second hop's SIR. The
+    /// interferer is behind Tx.
     Hilltop = 6,
     /// Optimum where both hops have the same SIR, beyond the maximum of the first hop's SIR. The interferer is behind
     /// Tx.
@@ -205,7 +205,8 @@ pub enum AltitudeCase {
     /// Optimum at the lowest altitude: both hops' SIRs fall as the altitude rises. This is so if X <= 0, or if x <=
     /// (X^2 + Y^2) / 2X (the paper's Psi^h), with the interferer at (X, Y).
     BothFall = 1,
-    /// Optimum at the altitude where the first hop's SIR, rising with altitude, equals the second hop's SIR.
+    /// Optimum at the altitude where the first hop's SIR equals the second hop's SIR. The first hop's SIR rises with
+    /// altitude.
     Crossing = 2,
     /// Optimum at the lowest altitude, or at the highest altitude up to which the first hop's SIR rises. The two
     /// hops' SIRs are equal at no altitude in between.
@@ -330,12 +331,12 @@ pub fn best_free(mission: &Mission, power_w: f32) -> Option<(Found, FreeCase)> {
 /// powers of Tx and relay. The cases are those of the paper's Corollary 1.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Guide {
-    /// Ratio C_1: if p_t / p_u is below C_1, the first hop is worse than the second hop even right above Tx. C_1 is 0
-    /// if the interferer is at Rx.
+    /// Ratio C_1: if p_t / p_u is below C_1, the first hop is worse than the second even right above Tx. C_1 is 0 if
+    /// the interferer is at Rx.
     pub c1: f32,
-    /// Ratio C_2: if p_t / p_u is above C_2, the first hop is better than the second hop even right above Rx.
+    /// Ratio C_2: if p_t / p_u is above C_2, the first hop is better than the second even right above Rx.
     pub c2: f32,
-    /// Ratio C_3: if p_t / p_u is above C_3, the first hop is better than the second hop even at the minimum of its
+    /// Ratio C_3. If p_t / p_u is above C_3, the first hop is better than the second hop even at the minimum of its
     /// SIR.
     ///
     /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, as for an interferer at X <= 0.

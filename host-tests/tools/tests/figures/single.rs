@@ -23,7 +23,7 @@ fn link(tx_w: f64, relay_w: f64, altitude_m: u32) -> Link {
     }
 }
 
-/// Returns a reference link with one relay at `altitude_m`. Tx power and interferer are those of the table row `row`.
+/// Returns a reference link with one relay at `altitude_m`. Tx power and interferer come from the table row `row`.
 fn locus_link(row: &super::Row<'_>, altitude_m: f64) -> Link {
     Link {
         distance_m: 35.0,

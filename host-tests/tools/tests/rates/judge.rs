@@ -112,8 +112,8 @@ impl Chain {
 
     /// Returns the time for one bit of a chain with relays at `x`, m, in units of 1 / bandwidth.
     ///
-    /// If each time slot is as long as its hop needs, the time is the sum over all hops; otherwise it is that of the
-    /// slowest hop.
+    /// If each time slot is as long as its hop needs, the time is the sum over all hops; otherwise it is the time of
+    /// the slowest hop.
     fn total(&self, x: &[f64]) -> f64 {
         let last = x.len() + 1;
         let mut from = 0.0;
@@ -338,7 +338,7 @@ impl Chain {
     }
 
     /// Returns the largest data rates that two independent searches find with all relays, bit/s/Hz. The first starts
-    /// from its own grid, the second one also from the x `others`, m.
+    /// from its own grid, the second search also starts from the x `others`, m.
     pub(crate) fn best(&self, others: &[f64]) -> [f64; 2] {
         let grid = self.searched();
         let starts = [grid.last().unwrap().as_slice(), others];

@@ -32,7 +32,7 @@ const WRONG: [&str; 8] = [
 /// Doc comments exempt from the check, each as path, colon and first sentence. The list stays empty.
 const EXEMPT: [&str; 0] = [];
 
-/// Old names of items that were renamed, one a line. The check rejects any file that still uses one.
+/// Old names of items that were renamed, one a line. The check rejects any file that still uses an old name.
 ///
 /// Only words that nothing else uses are in the list.
 const OLD_NAMES: &str = include_str!("../../data/old_names.txt");

@@ -80,8 +80,8 @@ const fn granted(id: ViewId, relays: u16) -> View {
     View { id, relays }
 }
 
-/// Checks that a subset of a chain's relays decides only if it is a quorum: all subsets of up to seven relays. A
-/// quorum is more than half of the relays, or half with the initial leader.
+/// Checks that a subset of a chain's relays decides only if it is a quorum. All subsets of chains of up to seven
+/// relays are tested. A quorum is more than half of the relays, or half with the initial leader.
 #[test]
 fn more_than_half_or_half_with_the_initial_leader_decide() {
     for relays in 1..=7_u16 {

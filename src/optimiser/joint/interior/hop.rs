@@ -30,7 +30,7 @@ const SHORTEST: f32 = 1e-8;
 /// order: forward, backward. The *slack* of a level is the level minus the target.
 pub(super) type Levels = [f32; 2];
 
-/// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h: its elements xx, xy, xh, yy, yh, hh.
+/// Symmetric 3 x 3 matrix with rows and columns x, y and altitude h. The elements are xx, xy, xh, yy, yh, hh.
 pub(super) type Symmetric = [f32; 6];
 
 #[inline(never)]
@@ -128,9 +128,9 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s levels (ln SIR) with respect to the positions of its ends `from` and
-    /// `to`. The second derivatives are added up, with the `weights` of both levels. If `convex` is true, terms that
-    /// would make this sum indefinite are left out.
+    /// Returns the derivatives of hop `k`'s levels (ln SIR). They are with respect to the positions of its ends
+    /// `from` and `to`. The second derivatives are added up, with the `weights` of both levels. If `convex` is true,
+    /// terms that would make this sum indefinite are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,
@@ -169,7 +169,7 @@ impl LogGains {
         hop
     }
 
-    /// Adds the derivatives of ln q with respect to the position `at`; q is the inverse of interference plus noise.
+    /// Adds the derivatives of ln q with respect to the position `at`. Q is the inverse of interference plus noise.
     /// The first derivatives are added to `slope`, and the second derivatives, multiplied by -`weight`, to `bend`. If
     /// `convex` is true, terms that would make `bend` indefinite are left out.
     fn add_quiet(

@@ -45,7 +45,7 @@ const CLOSE_MU: f32 = 3e-3;
 /// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight falls once the positions have settled, so that a step gains little.
+/// Factor by which the barrier weight falls once the positions have settled. A step then gains little.
 const LESS: f32 = 0.3;
 
 /// Gain below which the positions count as settled after more than half of a Newton step. The gain is the increase of
@@ -176,8 +176,9 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Two parts of the line Tx-Rx where one relay must not be: a part next to Rx for relay 1, and a part next to Tx
-    /// for the last relay. The values are the lengths of the parts, divided by the distance from Tx to Rx.
+    /// Two parts of the line Tx-Rx where one relay must not be. Relay 1 must not be in the part next to Rx, the last
+    /// relay not in the part next to Tx. The values are the lengths of the parts, divided by the distance from Tx to
+    /// Rx.
     pub(super) closed: [f32; 2],
     nodes: [Node; RELAYS],
     last: Hop,
@@ -444,7 +445,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Computes the target T for the stored levels c, in ln(SIR): the sum of mu / (c - T) over all levels is 1.
+    /// Computes the target T for the stored levels c, in ln(SIR). The sum of mu / (c - T) over all levels is 1.
     ///
     /// The inverse of this sum is concave in T, and Newton's method starts above the solution. So T falls to the
     /// solution.

@@ -337,7 +337,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         STARTS.get(at).copied()
     }
 
-    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best one so far; returns the next work. If
+    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best one so far. Returns the next work. If
     /// Algorithm 1 has found positions worth an improvement, the next work leads to another run of the interior-point
     /// method. Otherwise the next work begins the next initial chain.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {

@@ -126,7 +126,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, and if
     /// it was stopped early.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was stopped early, because it would not become the best chain.
+    /// True unless the current chain's improvement was stopped early. It is stopped if the chain would not become the
+    /// best chain.
     is_whole: bool,
     /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
     again: bool,

@@ -108,8 +108,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Runs the forward pass through one more segment, or first computes the moves of this segment's relays. The pass
-    /// tries the fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
+    /// Runs the forward pass through one more segment, or first computes the moves of its relays. The pass tries the
+    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -277,8 +277,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the hop to relay `index` of the current chain, computed as the relay computes it from its messages.
-    /// The x of the hop's end is at most `end_m`, m.
+    /// Returns the hop to relay `index` of the current chain. It is computed as the relay computes it from its
+    /// messages. The x of the hop's end is at most `end_m`, m.
     pub(super) fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16, end_m: f32) -> Hop {
         let at = |index| (self.cells.get(index)).place(chain.room(index));
         let before = if index > 1 {

@@ -41,8 +41,8 @@ fn neighbours_accept_the_epoch_of_every_start() {
 
 /// Checks that a relay is rejected if it restarts with an older epoch, or with the same epoch and seed.
 ///
-/// The reason is that its frames could be replays of earlier ones. (The library's tests cover the same epoch with
-/// another seed, a duplicate index.)
+/// Reason: its frames could be replays of earlier frames. (The library's tests cover the same epoch with another
+/// seed, a duplicate index.)
 #[test]
 fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {

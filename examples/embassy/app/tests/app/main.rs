@@ -14,8 +14,8 @@ mod vehicle;
 mod votes;
 mod watchdog;
 
-/// Logger that discards all lines. With it the firmware builds each line, so that the tests would find a panic in
-/// one.
+/// Logger that discards all lines. With this logger the firmware builds each line, so that the tests would find a
+/// panic in a log line.
 #[defmt::global_logger]
 struct Logger;
 

@@ -87,9 +87,9 @@ impl StochasticLink {
 
     /// Returns the best [`StochasticLink::backward_sir`] that a search over the target SIR finds.
     ///
-    /// It tries `points` targets down to 1e-8 of the ceiling, evenly spaced in their logarithm, and four times as
-    /// many again around the best one. It is for interference with which that SIR has several maxima; a maximum
-    /// narrower than the spacing may be missed.
+    /// It tries `points` targets down to 1e-8 of the ceiling, evenly spaced in their logarithm, and then four times
+    /// as many targets around the best target. This search is for interference with which the SIR has several maxima.
+    /// A maximum narrower than the spacing may be missed.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);
@@ -109,8 +109,8 @@ impl StochasticLink {
 
     /// Solves the paper's problem 1: the fewest relays that meet the target SIR `gamma` if built backward.
     ///
-    /// All relays are like the first one; there are at most `most`. The result's `iterations` is the number of
-    /// relays. `None` if more relays are needed, or if the target cannot be met.
+    /// All relays are like the first relay; there are at most `most` relays. The result's `iterations` is the number
+    /// of relays. `None` if more relays are needed, or if the target cannot be met.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {
         let like: Relay = *self.relays.first()?;
         (1..=most).find_map(|n| {

@@ -18,7 +18,7 @@ pub struct StochasticLink {
     /// Table of the random interference along the line: strictly rising x, m, each with Upsilon, 1/W.
     ///
     /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant beyond the
-    /// first and the last one.
+    /// first and the last position.
     pub upsilon: Vec<(f64, f64)>,
     /// Relays 1 to N from Tx to Rx.
     pub relays: Vec<Relay>,

@@ -32,8 +32,8 @@ impl StochasticLink {
         })
     }
 
-    /// Lowers the target SIR by `step` until `end` returns a result, and returns that. The arguments of `end` are the
-    /// relay's position for this target, the best position so far, and the target.
+    /// Lowers the target SIR by `step` until `end` returns a result, and returns this result. The arguments of `end`
+    /// are the relay's position for this target, the best position so far, and the target.
     fn descend(
         &self,
         step: f64,

@@ -210,7 +210,7 @@ impl Chain {
             .unwrap_or_default()
     }
 
-    /// Returns the time when the last bit of a frame was sent: its time of arrival less the latency.
+    /// Returns the time when the last bit of a frame was sent: its time of arrival minus the latency.
     pub(super) fn sent_at(&self, arrives: Instant) -> Instant {
         let latency = self.setup.link.latency.as_micros();
         Instant::from_micros(arrives.as_micros().saturating_sub(latency))
@@ -307,7 +307,7 @@ impl Chain {
 
     /// Returns true if the relays `one` and `other` (from 0) can be neighbours at present.
     ///
-    /// They must be near each other in the chain and receive each other.
+    /// The two relays must be near each other in the chain and receive each other.
     pub(super) fn are_linked(&self, one: usize, other: usize) -> bool {
         let most = self.reach().min(NEIGHBOUR);
         one.abs_diff(other) <= most && self.hears(one, other) && self.hears(other, one)

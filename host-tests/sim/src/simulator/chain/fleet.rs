@@ -226,7 +226,7 @@ impl Chain {
 
     /// Returns true if every drone that a living relay should control hovers at its agreed position.
     ///
-    /// Drones in their pilots' hands do not count.
+    /// Drones that their pilots control do not count.
     pub(super) fn all_hover(&self) -> bool {
         let controlled = self.members.iter().zip(&self.fleet);
         controlled

@@ -36,8 +36,7 @@ impl ChangedRelays {
 impl Chain {
     /// Starts the statistics of the run.
     ///
-    /// `run` simulates a chain without faults. The positions that it reaches are the ones that this chain should
-    /// have.
+    /// `run` simulates a chain without faults. This chain should have the positions that `run` reaches.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));

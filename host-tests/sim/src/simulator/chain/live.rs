@@ -9,7 +9,7 @@ use crate::simulator::outcome::Moment;
 /// State of a relay during a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LiveRelay {
-    /// Present state, as the relay reports it. The position is that of the drone, without drones the setpoint.
+    /// Present state, as the relay reports it. The position is the drone's position, or without drones the setpoint.
     pub report: Report,
     /// True while the relay is switched on.
     pub is_on: bool,
@@ -17,7 +17,7 @@ pub struct LiveRelay {
     pub is_passive: bool,
     /// Altitude and power of the relay.
     pub profile: Profile,
-    /// True if the relay has an interference estimate of its own, instead of that of the mission.
+    /// True if the relay has an interference estimate of its own, instead of the mission's interference.
     pub estimates: bool,
 }
 

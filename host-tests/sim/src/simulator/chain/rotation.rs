@@ -36,7 +36,8 @@ const EARLY_S: f64 = 25.0;
 /// Time before a drone has to leave from which on it asks to leave even without a spare, s.
 const DEADLINE_S: f64 = 80.0;
 
-/// Time for which a spare hovers before a departure is requested: it then counts as a spare.
+/// Time for which a drone must hover at its waiting place before it counts as a spare. Only then is a departure
+/// requested.
 const HOVERS: Duration = Duration::from_millis(13_000);
 
 /// Converts an endurance to whole seconds within 0 to 60 000.
@@ -564,7 +565,7 @@ impl Chain {
         self.report_gone(rotation, flight);
     }
 
-    /// Sends spares: one for each drone whose turn to leave comes before a spare could be there.
+    /// Sends spares to the line. There is one for each drone that has to leave before a later spare could arrive.
     fn send_spares(
         &mut self,
         rotation: &mut Rotation,
@@ -690,7 +691,7 @@ impl Chain {
         }
     }
 
-    /// Simulates operators who report that a drone that was lost has left the line.
+    /// Simulates operators who report to the relays that a lost drone has left the line.
     fn report_gone(&mut self, rotation: &Rotation, flight: &Flight) {
         let now = self.now;
         let is_on_line = |index: usize| {

@@ -80,7 +80,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs the numbered steps of `lane`, one after the other, beside the main lane. Returns the failures.
+/// Runs the numbered steps of `lane` in sequence, beside the main lane. A lane is a sequence of steps. Returns the
+/// failures.
 ///
 /// The output of a step is printed in one piece at its end, so that it does not mix with other steps' output. `all`
 /// is the number of all steps, for the headings.

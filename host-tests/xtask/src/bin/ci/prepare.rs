@@ -80,7 +80,7 @@ const FOR_THE_REST: [Needed; 5] = [
 /// Version of cargo-fuzz that is installed if it is missing.
 const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
-/// Installs the missing tools: those of the quick steps if `quick`, otherwise all.
+/// Installs the missing tools: the tools of the quick steps if `quick` is true, otherwise all tools.
 ///
 /// # Errors
 /// The command to type, for a tool that cannot be installed.
@@ -145,7 +145,7 @@ fn add(needed: &[Needed]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs the Debian package of `program` if it is missing. That needs root.
+/// Installs the Debian package of `program` if it is missing. The installation needs root rights.
 ///
 /// # Errors
 /// The command to type, for a user without root rights.

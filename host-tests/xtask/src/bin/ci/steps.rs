@@ -53,10 +53,10 @@ pub(crate) struct Step {
     pub(crate) lane: Lane,
 }
 
-/// Order of a step among the other steps: in which lane it runs.
+/// Lane in which a step runs. A lane is a sequence of steps; the lanes run beside each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Lane {
-    /// The step runs after the previous step of this lane.
+    /// The step runs after the previous step of the main lane.
     Main,
     /// The step starts after the previous step of the main lane.
     ///

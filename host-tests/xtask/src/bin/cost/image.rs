@@ -39,7 +39,7 @@ pub(crate) fn of_the_relay_image() -> Result<Vec<Row>, String> {
 
 /// Measured image: description, example, cargo options, and budgets in bytes.
 ///
-/// The budgets are those of flash, static RAM and stack.
+/// The budgets are for flash, static RAM and stack.
 type Image = (
     &'static str,
     &'static str,
@@ -276,7 +276,7 @@ pub(crate) fn no_panic() -> Result<(), String> {
 
 /// Checks that the asynchronous image has no panics except those for polling a completed future.
 ///
-/// The compiler adds such a panic to each `async fn`, so that image cannot be linked without a panic handler. An
+/// The compiler adds such a panic to each `async fn`, so this image cannot be linked without a panic handler. An
 /// `await` never reaches the panic.
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";

@@ -185,7 +185,7 @@ fn own_command(line: &str) -> Option<String> {
 
 /// Adds `--dry-run` to a command that would ask the operator to confirm an upload.
 ///
-/// There is no terminal to ask at.
+/// Reason: there is no terminal for the question.
 fn confirmed(command: String) -> String {
     let asks = command.starts_with("cargo ground ") && command.contains(" --version ");
     if asks && !command.contains(" --yes") {

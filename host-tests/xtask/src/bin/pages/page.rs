@@ -76,7 +76,7 @@ fn status(line: &str) -> Option<(&str, u8)> {
 /// Returns the code blocks of a Markdown page.
 ///
 /// # Errors
-/// The line of a fence with an unknown word, or of one that is not closed.
+/// The line of a fence with an unknown word, or of a fence that is not closed.
 pub(crate) fn blocks(text: &str) -> Result<Vec<Block>, String> {
     let mut all: Vec<Block> = Vec::new();
     let (mut open, mut heading) = (None::<Block>, 0);
