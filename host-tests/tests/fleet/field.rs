@@ -214,7 +214,14 @@ fn different_relays_in_a_field_are_not_called_proven() {
     };
     let found = Fewest::of(&mission, 1000.0, profile_of).unwrap();
     assert!(!found.proven && found.relays > 2);
+    // No hop to relay 1 meets the target, although Tx reaches the relays behind it.
+    let too_high = |index: u16| Profile {
+        altitude_m: if index == 1 { 1e5 } else { common.altitude_m },
+        ..common
+    };
+    assert_eq!(Fewest::of(&mission, 1000.0, too_high), None);
     let mission = mission.with_relays(found.relays).unwrap();
+    assert_eq!(fewest::places(&mission, 1000.0, too_high), None);
     let places = fewest::places(&mission, 1000.0, profile_of).unwrap();
     assert!(
         places
