@@ -102,10 +102,11 @@ impl Channel {
     /// The function computes a power of ten, so it cannot be used in a constant.
     ///
     /// ```
-    /// use uav_relay::Channel; use uav_relay::channel::AirGround;
+    /// use uav_relay::Channel;
+    /// use uav_relay::channel::AirGround;
     ///
-    /// let channel = Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?; assert!((channel.mu_nlos() / channel.mu_los()
-    /// - 123.0).abs() < 0.1, "20.9 dB more");
+    /// let channel = Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)?;
+    /// assert!((channel.mu_nlos() / channel.mu_los() - 123.0).abs() < 0.1, "20.9 dB more");
     /// # Ok::<(), uav_relay::channel::ChannelError>(())
     /// ```
     ///

@@ -100,7 +100,8 @@ impl Sender {
     /// y0, h0):
     ///
     /// ```text
-    /// SIR = A ((X - x)^2 + (Y - y)^2 + h^2) / L^2 L^2 = (x - x0)^2 + (y - y0)^2 + (h - h0)^2
+    /// SIR = A ((X - x)^2 + (Y - y)^2 + h^2) / L^2
+    /// L^2 = (x - x0)^2 + (y - y0)^2 + (h - h0)^2
     /// ```
     ///
     /// With y = y0 = 0 this is the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u`

@@ -35,12 +35,13 @@ impl Course {
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
     /// # use paper::*;
-    /// use uav_relay::flight::course::{Course, CourseError}; use uav_relay::{Geodetic, Sites};
+    /// use uav_relay::flight::course::{Course, CourseError};
+    /// use uav_relay::{Geodetic, Sites};
     ///
-    /// let site = |lat, lon, amsl| Geodetic::from_degrees(lat, lon, amsl).expect("a place on earth"); let sites =
-    /// Sites { tx: site(47.40, 8.54, 420.0), rx: site(47.41, 8.55, 431.0) }; // The sites are 1 344 m apart, but the
-    /// mission's distance is 1 000 m. assert!(matches!(Course::try_new(sites, 5.0, &MISSION),
-    /// Err(CourseError::Distance(_))));
+    /// let site = |lat, lon, amsl| Geodetic::from_degrees(lat, lon, amsl).expect("a place on earth");
+    /// let sites = Sites { tx: site(47.40, 8.54, 420.0), rx: site(47.41, 8.55, 431.0) };
+    /// // The sites are 1 344 m apart, but the mission's distance is 1 000 m.
+    /// assert!(matches!(Course::try_new(sites, 5.0, &MISSION), Err(CourseError::Distance(_))));
     /// ```
     ///
     /// # Errors

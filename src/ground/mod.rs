@@ -51,17 +51,24 @@ const QUERIES_PER_RELAY: u8 = 3;
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
-/// use uav_relay::MAX_FRAME; use uav_relay::{Auth, Ground, Instant, Interference, Interferer, Key, Mission,
-/// MissionConfig, Progress, Side, Upload, Wiring};
+/// use uav_relay::MAX_FRAME;
+/// use uav_relay::{Auth, Ground, Instant, Interference, Interferer, Key, Mission, MissionConfig, Progress, Side, Upload, Wiring};
 ///
 /// # fn example(loaded: &Mission, mut send: impl FnMut(&[u8]), received: &[u8]) -> Result<Progress, Box<dyn core::error::Error>> {
-/// // The jammer has moved. let jammer = Interferer { power_w: 80.0, x_m: 700.0, y_m: -300.0 }; let config =
-/// MissionConfig { interference: Interference::Source(jammer), ..*loaded.config() }; let upload = Upload::new(loaded,
-/// 1, config)?; let auth = Auth { key: Key::new([7; 32]), epoch: 1 }; let mut ground = Ground::new(loaded,
-/// Side::Upstream, 7, Wiring::Pair, auth); let now = Instant::ZERO; ground.upload(now, upload)?;
+/// // The jammer has moved.
+/// let jammer = Interferer { power_w: 80.0, x_m: 700.0, y_m: -300.0 };
+/// let config = MissionConfig { interference: Interference::Source(jammer), ..*loaded.config() };
+/// let upload = Upload::new(loaded, 1, config)?;
+/// let auth = Auth { key: Key::new([7; 32]), epoch: 1 };
+/// let mut ground = Ground::new(loaded, Side::Upstream, 7, Wiring::Pair, auth);
+/// let now = Instant::ZERO;
+/// ground.upload(now, upload)?;
 ///
-/// // One turn of the main loop. ground.handle_bytes(received); ground.handle_timeout(now); let mut frame = [0;
-/// MAX_FRAME]; while let Some(len) = ground.poll_transmit(&mut frame) {
+/// // One turn of the main loop.
+/// ground.handle_bytes(received);
+/// ground.handle_timeout(now);
+/// let mut frame = [0; MAX_FRAME];
+/// while let Some(len) = ground.poll_transmit(&mut frame) {
 ///     send(&frame[..len]);
 /// }
 /// # Ok(ground.progress())

@@ -76,7 +76,8 @@ impl GuardConfig {
     /// # use paper::*;
     /// use uav_relay::GuardConfig;
     ///
-    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common); assert!(guard.is_valid());
+    /// let guard = GuardConfig::of(&MISSION, MISSION.config().common);
+    /// assert!(guard.is_valid());
     /// assert_eq!(guard.separation_m, MISSION.config().min_separation_m);
     /// ```
     pub fn of(mission: &Mission, profile: Profile) -> Self {

@@ -457,14 +457,15 @@ impl Mission {
     /// [`Channel::new`](crate::Channel::new), which takes the losses as factors, 10^(dB / 10), can:
     ///
     /// ```
-    /// use uav_relay::channel::AirGround; use uav_relay::{Band, Channel, Interference, Interferer, Mission,
-    /// MissionConfig, Profile};
+    /// use uav_relay::channel::AirGround;
+    /// use uav_relay::{Band, Channel, Interference, Interferer, Mission, MissionConfig, Profile};
     ///
-    /// // 0.1 dB and 21 dB. const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los)
-    /// {
+    /// // 0.1 dB and 21 dB.
+    /// const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_541, AirGround::Los) {
     ///     Ok(channel) => channel,
     ///     Err(_) => panic!("the channel is out of range"),
-    /// }; const MISSION: Mission = Mission::new(MissionConfig {
+    /// };
+    /// const MISSION: Mission = Mission::new(MissionConfig {
     ///     relays: 5,
     ///     distance_m: 1_000.0,
     ///     min_separation_m: 4.0,
@@ -479,7 +480,8 @@ impl Mission {
     ///     rx_power_w: 80.0,
     ///     fitted_gap: 0.0,
     ///     tolerance: 1e-4,
-    /// }); assert_eq!(MISSION.relays(), 5);
+    /// });
+    /// assert_eq!(MISSION.relays(), 5);
     /// ```
     ///
     /// A value out of range fails the build:

@@ -554,7 +554,7 @@ struct AreaOptions {
     area_geojson: Option<PathBuf>,
     /// Draw the error of the location of the interferer for each of its positions (SVG)
     ///
-    /// Relays locate it by measurements. Needs [listen] and a single interferer, with an area
+    /// Relays locate it by measurements. Needs the table `listen` and a single interferer, with an area
     #[arg(long, value_name = "FILE")]
     listen_svg: Option<PathBuf>,
     /// Accept a plan in which the way between two neighbours crosses a no-fly area
