@@ -124,8 +124,8 @@ pub enum Event {
     MayLeave,
     /// The drone's endurance is unknown; raised only with a reserve (`Relay::set_reserve`).
     ///
-    /// A value was invalid, none came for 10 s, or there was none while the relay controls the drone. The last valid value counts
-    /// down. Without any the relay does not leave by itself. Raised at most once a minute, and again while that lasts.
+    /// A value was invalid, none came for 10 s, or there was none while the relay controls the drone. The last one that agreed with
+    /// another counts down, or a single one. Without any the relay does not leave by itself. Raised at most once a minute, and again while that lasts.
     EnduranceUnknown,
     /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
     AtReserve,

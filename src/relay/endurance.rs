@@ -41,8 +41,8 @@ pub(super) struct Endurance {
     end: Option<(Instant, Duration)>,
     /// Time of the last valid value.
     sampled_at: Instant,
-    /// True if the last two valid values agree: the countdown from the last one counts.
-    is_steady: bool,
+    /// Last end that agreed with the value before it; 0 for none since a pause of [`STALE`].
+    confirmed: Instant,
     /// True from the loss of the endurance to the next valid value.
     is_lost: bool,
     losses: u32,
@@ -56,6 +56,8 @@ pub(super) struct Endurance {
     is_own: bool,
     /// True from a margin at or below the floor until it is [`STEP`] above the floor.
     is_spent: bool,
+    /// True from a landing with a request, or at the reserve, until the margin is [`STEP`] above the floor, or the request ends.
+    keeps_out: bool,
     /// Time of the floor, as the leader was told.
     floor_at: Instant,
     reviewed_at: Instant,
@@ -77,12 +79,18 @@ impl Endurance {
     /// Returns the remaining time of flight, s; `None` while it is unknown.
     fn known(&self, now: Instant) -> Option<u16> {
         let (end, _) = self.end?;
-        (!self.is_lost && now.since(self.sampled_at) < STALE).then(|| seconds(end.since(now)))
+        (!self.is_lost && !self.is_old(now)).then(|| seconds(end.since(now)))
+    }
+
+    fn is_old(&self, now: Instant) -> bool {
+        now.since(self.sampled_at) >= STALE
     }
 
     /// Returns the margin as a time from zero, to which durations are added.
     fn margin(&self, now: Instant) -> Option<Instant> {
         let (end, home) = self.end?;
+        let is_confirmed = self.is_old(now) && self.confirmed > Instant::ZERO;
+        let end = if is_confirmed { self.confirmed } else { end };
         Some(Instant::ZERO + end.since(now + home))
     }
 
@@ -107,18 +115,22 @@ impl Endurance {
     }
 
     /// Updates the time `which` since which a condition holds. Returns true once it decides.
-    fn holds(&mut self, now: Instant, which: usize, is_true: bool) -> bool {
+    ///
+    /// A single value decides only if it `is_low`, and after [`STALE`].
+    fn holds(&mut self, now: Instant, which: usize, is_true: bool, is_low: bool) -> bool {
+        let is_sure =
+            self.end.is_some_and(|(end, _)| end == self.confirmed) || is_low && self.is_old(now);
         let Some(since) = self.since.get_mut(which) else {
             return false;
         };
         let at = Some(*since).filter(|at| *at > Instant::ZERO).unwrap_or(now);
         *since = if is_true { at } else { Instant::ZERO };
-        is_true && now.since(at) >= HOLD && (self.is_steady || at < self.sampled_at)
+        is_true && now.since(at) >= HOLD && (is_sure || at < self.sampled_at)
     }
 
     /// Compares the margin with the limit and the floor, and requests to leave or withdraws that.
     fn review(&mut self, now: Instant, node: &mut Node) {
-        if self.end.is_some() && now.since(self.sampled_at) >= STALE {
+        if self.end.is_some() && self.is_old(now) {
             self.lose(now, node);
         }
         let settings = node.member().settings;
@@ -142,9 +154,10 @@ impl Endurance {
             Duration::from_micros(each / 2).min(APART)
         };
         let floor = Instant::ZERO + reserve + each.times(all.saturating_sub(number).into());
-        let is_restored = self.holds(now, 3, margin >= floor + STEP);
-        self.is_spent = self.holds(now, 1, margin <= floor) || self.is_spent && !is_restored;
-        node.set_spent(self.is_spent);
+        let is_restored = self.holds(now, 3, margin >= floor + STEP, false);
+        self.is_spent = self.holds(now, 1, margin <= floor, true) || self.is_spent && !is_restored;
+        self.keeps_out &= leaves && !is_restored;
+        node.set_spent(self.is_spent || self.keeps_out);
         if self.is_spent {
             self.raise(now, node, 1, Event::AtReserve);
         }
@@ -152,8 +165,11 @@ impl Endurance {
         let left = margin.since(Instant::ZERO + reserve);
         let floor_at = now + left;
         let moved = apart(floor_at, self.floor_at);
-        let is_due = self.holds(now, 0, changes);
-        let is_moved = self.holds(now, 2, leaves && self.is_own && moved >= STEP);
+        let is_due = self.holds(now, 0, changes, !leaves);
+        let is_moved = self.holds(now, 2, leaves && self.is_own && moved >= STEP, true);
+        if is_due {
+            self.holds(now, 0, false, true);
+        }
         if is_due && leaves {
             self.is_own = !node.withdraw(now);
         } else if is_due || is_moved {
@@ -213,7 +229,11 @@ impl Relay {
         if let Some((left, home)) = duration(remaining_s).zip(duration(home_s)) {
             let end = now + left;
             let last = endurance.end.replace((end, home));
-            endurance.is_steady = last.is_some_and(|(last, _)| apart(last, end) < STEP);
+            if last.is_some_and(|(last, _)| apart(last, end) < STEP) {
+                endurance.confirmed = end;
+            } else if endurance.is_old(now) {
+                endurance.confirmed = Instant::ZERO;
+            }
             endurance.sampled_at = now;
             endurance.is_lost = false;
         } else {
@@ -270,14 +290,16 @@ impl Relay {
 
     /// Forgets the endurance of a drone on the ground. A departure goes on.
     pub(crate) fn reset_endurance(&mut self) {
+        let keeps_out = self.leaves_by_endurance() || self.is_at_reserve();
         self.endurance = self.endurance.map(|it| Endurance {
             reserve: it.reserve,
             losses: it.losses,
             raised_at: it.raised_at,
             is_own: it.is_own,
+            keeps_out: it.keeps_out || keeps_out,
             ..Endurance::default()
         });
-        if self.leaves_by_endurance() {
+        if keeps_out {
             self.node.set_spent(true);
         }
     }
@@ -288,7 +310,9 @@ impl Relay {
             let limit = endurance.limit(&self.node.member().settings);
             let margin = endurance.margin(now).or(limit).filter(|_| stays);
             endurance.limit = margin.map(|margin| Instant::from_micros(margin.as_micros() / 2));
-            (endurance.since, endurance.is_own) = ([Instant::ZERO; 4], false);
+            let [_, floor, _, restored] = endurance.since;
+            endurance.since = [Instant::ZERO, floor, Instant::ZERO, restored];
+            endurance.is_own = false;
         }
     }
 

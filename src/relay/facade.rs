@@ -782,8 +782,8 @@ impl Relay {
 
     /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
     ///
-    /// The relay then requests to leave only by [`leave`](Self::leave), or once half of the remaining time of flight beyond the way home
-    /// has passed (`handle_endurance`).
+    /// The relay then requests to leave only by [`leave`](Self::leave), or below the lower of the usual limit and half of the present
+    /// time of flight beyond the way home (`handle_endurance`).
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.override_endurance(now, true);

@@ -115,6 +115,12 @@ impl Pair {
                 self.vehicle.answer();
             }
             self.relay.handle_timeout(self.vehicle.now);
+            let mut frame = [0; uav_relay::wire::frame::MAX_FRAME];
+            while self
+                .relay
+                .poll_transmit(self.vehicle.now, &mut frame)
+                .is_some()
+            {}
             while let Some(event) = self.relay.poll_event() {
                 self.vehicle.link.handle_event(event);
                 self.events.push(event);
@@ -373,14 +379,6 @@ fn the_last_endurance_counts_down() {
         silent.handle_timeout(at(s));
     }
     assert_ne!(silent.departure(at(40)), Departure::Member);
-    // Not a value that no other one agrees with: 900 s, and once 365 s.
-    let mut single = shared(1, 1);
-    assert_eq!(fly(&mut single, 1, 20, 900.0), Departure::Member);
-    single.handle_endurance(at(20), 365.0, 0.0);
-    for s in 21..400 {
-        single.handle_timeout(at(s));
-        assert_eq!(single.departure(at(s)), Departure::Member, "{s}");
-    }
     for value in [f32::NAN, -1.0, f32::INFINITY] {
         for which in 0..2 {
             let mut relay = shared(1, 1);
@@ -393,6 +391,65 @@ fn the_last_endurance_counts_down() {
                 (None, 1)
             );
         }
+    }
+}
+
+/// Checks a silence: the last value that agreed with the one before counts down, and a single value if there is no other.
+#[test]
+fn the_last_confirmed_endurance_counts_down() {
+    // Seconds at which the relay requests to leave, and reaches its reserve.
+    let silence = |mut relay: Relay, from: u64| {
+        let mut first = [None; 2];
+        for s in from..1_200 {
+            relay.handle_timeout(at(s));
+            let leaves = relay.departure(at(s)) != Departure::Member;
+            for (first, is_true) in first.iter_mut().zip([leaves, relay.is_at_reserve()]) {
+                *first = first.or(is_true.then_some(s));
+            }
+        }
+        first
+    };
+    // 900 s at second 19, then once much less or more: 360 s are left at 559 s, 180 s at 739 s.
+    for wrong_s in [100.0, 365.0, 1_500.0] {
+        let mut relay = shared(1, 1);
+        assert_eq!(fly(&mut relay, 1, 20, 900.0), Departure::Member);
+        relay.handle_endurance(at(20), wrong_s, 0.0);
+        assert_eq!(silence(relay, 21), [Some(575), Some(754)], "{wrong_s}");
+    }
+    // Only one value: 1200 s at second 1, 60 s of them for the way home.
+    let mut relay = shared(1, 1);
+    relay.handle_endurance(at(1), 1_200.0, 60.0);
+    assert_eq!(silence(relay, 2), [Some(797), Some(976)]);
+    // After a pause the older values do not count.
+    let mut relay = shared(1, 1);
+    assert_eq!(fly(&mut relay, 1, 20, 500.0), Departure::Member);
+    relay.handle_endurance(at(60), 1_200.0, 0.0);
+    assert_eq!(silence(relay, 61), [Some(916), Some(1_095)]);
+}
+
+/// Checks that a decision needs 15 s after the last one, and that repeated orders do not delay the reserve.
+#[test]
+fn each_decision_takes_its_time() {
+    let mut relay = shared(1, 1);
+    for s in 1..=16 {
+        relay.handle_endurance(at(s), 300.0, 0.0);
+    }
+    assert_ne!(relay.departure(at(16)), Departure::Member);
+    relay.handle_endurance(at(17), 1_200.0, 0.0);
+    assert_ne!(relay.departure(at(17)), Departure::Member, "one high value");
+    for stays in [true, false] {
+        let mut relay = shared(1, 1);
+        for s in 1..=17 {
+            assert!(!relay.is_at_reserve() || s > 16);
+            if stays {
+                relay.stay(at(s));
+            } else {
+                relay.leave(at(s), None);
+            }
+            relay.handle_endurance(at(s), 100.0, 0.0);
+        }
+        assert!(relay.is_at_reserve(), "stay {stays}");
+        assert_eq!(relay.must_leave(), !stays);
     }
 }
 
@@ -461,12 +518,13 @@ fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
             assert_eq!(fly(&mut relay, 34, 49, 900.0), Departure::Outside);
         }
         assert_eq!(fly(&mut relay, 49, 51, 900.0), before, "recovered");
-        // One value before a silence decides nothing either.
+        // One value before a silence is all that is known.
         let (mut relay, before) = start();
         relay.handle_endurance(at(2), 100.0, 0.0);
         for s in 3..60 {
             relay.handle_timeout(at(s));
-            assert_eq!(relay.departure(at(s)), before, "{s}");
+            let stays = relay.departure(at(s)) == before;
+            assert_eq!(stays, s < 17, "{s}");
         }
         // Without a later view a relay returns after 15 s, but not a spare, and none at its reserve.
         let (mut relay, _) = start();
@@ -500,6 +558,81 @@ fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     // It is still needed: there is no later view.
     assert_eq!(fly(&mut relay, 215, 217, 300.0), Departure::Requested);
     assert!(!relay.is_at_reserve());
+}
+
+/// Checks a spent relay that lands outside of the chain, and flies again: it returns only after 15 s of high values.
+#[test]
+fn a_landing_does_not_return_a_spent_relay() {
+    for kind in [Kind::Px4, Kind::ArduCopter] {
+        let mut pair = Pair::new(Vehicle::flying(kind), 3, 2);
+        pair.home();
+        let low = |vehicle: &mut Vehicle, _| vehicle.battery(0, 5, 150);
+        let is_inside = |pair: &Pair| pair.relay.departure(pair.vehicle.now) != Departure::Outside;
+        // Its restart: 15 s before it takes part in anything.
+        fly(&mut pair.relay, 1, 18, 100.0);
+        pair.run(40, low, |_| false);
+        assert!(!is_inside(&pair) && pair.relay.is_at_reserve());
+        for _ in 0..2 {
+            pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_ON_GROUND;
+            pair.run(4, low, is_inside);
+            assert!(!pair.relay.must_leave());
+            pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+            assert_eq!(pair.run(14, low, is_inside), None);
+        }
+        assert_eq!(pair.run(60, low, is_inside), None);
+        pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_ON_GROUND;
+        pair.run(4, low, is_inside);
+        pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+        let high = |vehicle: &mut Vehicle, _| vehicle.battery(0, 80, 1_500);
+        let returned = pair.run(60, high, is_inside);
+        assert!(
+            returned.is_some_and(|s| (14..=17).contains(&s)),
+            "{returned:?}"
+        );
+    }
+}
+
+/// Checks that a restart of the autopilot forgets the place to return to.
+#[test]
+fn a_restarted_autopilot_has_no_home() {
+    let mut pair = Pair::flying(Kind::Px4);
+    let time = |vehicle: &mut Vehicle, _: i32| vehicle.battery(0, 50, 1_000);
+    pair.run(3, time, |_| false);
+    assert!(pair.relay.endurance_s(pair.vehicle.now).is_some());
+    pair.vehicle.reboot();
+    pair.run(3, time, |_| false);
+    pair.vehicle.armed = true;
+    pair.vehicle.landed = MavLandedState::MAV_LANDED_STATE_IN_AIR;
+    pair.run(5, time, |_| false);
+    assert_eq!(pair.told(), [None; 2], "the home of the flight before");
+    pair.home();
+    pair.run(2, time, |_| false);
+    assert!(pair.relay.endurance_s(pair.vehicle.now).is_some());
+}
+
+/// Checks that messages that arrive are not requested again, and that they are once they stop.
+#[test]
+fn messages_of_the_battery_are_requested_while_they_are_missing() {
+    let mut pair = Pair::flying(Kind::ArduCopter);
+    pair.vehicle.link.set_endurance(1_200.0, 5.0, 1.5);
+    let asked = |pair: &Pair| {
+        [147, 242].map(|id| {
+            let all = pair.vehicle.received.iter();
+            all.filter(|(_, heard)| *heard == LinkMessage::Interval { id })
+                .count()
+        })
+    };
+    let sends = |vehicle: &mut Vehicle, _| {
+        vehicle.battery(0, 80, 0);
+        vehicle.home(axis().point(Placement::on_line(300.0, 10.0)).unwrap());
+    };
+    pair.run(8, sends, |_| false);
+    let first = asked(&pair);
+    pair.run(60, sends, |_| false);
+    assert_eq!(asked(&pair), first, "they arrive");
+    pair.run(20, |_, _| {}, |_| false);
+    let then = asked(&pair);
+    assert!(then[0] > first[0] && then[1] > first[1], "{then:?}");
 }
 
 /// Checks an order to stay at the reserve: the pilot is told once a minute, in any mode.

@@ -139,7 +139,7 @@ impl Vehicle {
         }
         // The battery's messages come at their own rate: they do not show that the link works.
         if self.read_battery(now, message) {
-            return VehicleUpdate::Nothing;
+            return VehicleUpdate::StateChanged;
         }
         // A gap counts even if no timeout was handled meanwhile.
         self.review_choice(now);
@@ -316,6 +316,7 @@ impl Vehicle {
         self.in_air = false;
         self.grounded_at = None;
         self.position = None;
+        self.home = None;
     }
 
     /// Converts the stored position to another line from Tx to Rx by `moved`. Drops the position if that returns
