@@ -96,7 +96,7 @@ const IMAGES: &[Image] = &[
             "--features",
             "guard,mavlink-signing",
         ],
-        [116 * 1024 + 768, 9_472, 4_608],
+        [117 * 1024 + 256, 9_472, 4_608],
     ),
     (
         "flash of the relay image, everything",
