@@ -2,7 +2,7 @@
 //!
 //! | departure | text to the pilot |
 //! | --- | --- |
-//! | requested, or outside of the chain, or a member again | once |
+//! | requested, outside of the chain, free, or a member again | once |
 //! | refused | every minute in flight |
 //! | free, or at the reserve | "battery: leave now" every 5 s until he takes over, by the library |
 //!
@@ -37,17 +37,22 @@ pub(crate) struct Battery {
     waits: bool,
     /// Time of the first low endurance during the wait.
     low_at: Option<Instant>,
+    has_reserve: bool,
+    /// Last time at which the endurance was known or told to be unknown, or the drone was not in the air.
+    known_at: Instant,
 }
 
 impl Battery {
-    /// Creates the state at the start; `waits` for a relay with a reserve and a source of endurances.
-    pub(crate) const fn new(waits: bool) -> Self {
+    /// Creates the state at the start. A relay that `has_reserve` waits for its endurance.
+    pub(crate) const fn new(has_reserve: bool) -> Self {
         Self {
             departure: Departure::Member,
             logged_at: Instant::ZERO,
             told_at: Instant::ZERO,
-            waits,
+            waits: has_reserve,
             low_at: None,
+            has_reserve,
+            known_at: Instant::ZERO,
         }
     }
 
@@ -66,6 +71,23 @@ impl Battery {
         };
         self.waits &= is_open && !link.is_some_and(|link| link.is_landed(now));
         self.waits
+    }
+
+    /// Makes an endurance unknown that has never come, in flight or without an autopilot's link. The relay reports that.
+    pub(crate) fn tell_unknown(
+        &mut self,
+        now: Instant,
+        relay: &mut Relay,
+        link: Option<&Companion>,
+    ) {
+        let is_grounded =
+            link.is_some_and(|link| matches!(link.control(), State::Silent | State::Grounded));
+        if is_grounded || relay.endurance_s(now).is_some() {
+            self.known_at = now;
+        } else if self.has_reserve && now.since(self.known_at) >= FIRST {
+            self.known_at = now;
+            relay.handle_endurance(now, f32::NAN, f32::NAN);
+        }
     }
 
     pub(crate) const fn is_waiting(&self) -> bool {
@@ -100,6 +122,7 @@ impl Battery {
             let text = match departure {
                 Departure::Requested => Some("asks the chain to close up"),
                 Departure::Outside => Some("waits for the others to close up"),
+                Departure::Free => Some("may fly away now"),
                 Departure::Member => Some("is in the chain, or joins it"),
                 _ => refusal,
             };
@@ -132,7 +155,7 @@ impl Battery {
                 if relay.is_at_reserve() {
                     "this relay stays in the chain, as the operator commands; only the way home and the reserve are left: fly the drone home"
                 } else if relay.endurance_limit_s().is_some() {
-                    "this relay stays in the chain, as the operator commands, until half of its time of flight beyond the way home has passed"
+                    "this relay stays in the chain, as the operator commands, until half of its time of flight beyond the way home has passed, or longer, until its usual limit"
                 } else {
                     "this relay stays in the chain, as the operator commands"
                 }

@@ -222,8 +222,13 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that a full battery lasts until the relay asks to leave.
-    fn check(&self, dead_after_ms: u64) -> Result<(), String> {
+    /// Checks that the time of flight can be known, and that a full battery lasts until the relay asks to leave.
+    fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
+        if let Some(reserve) = self.reserve.filter(|_| !has_source) {
+            return Err(format!(
+                "--reserve {reserve}: needs --positions or --autopilot, which tell the time of flight"
+            ));
+        }
         let (Some(reserve), Some(full)) = (self.reserve, self.flight_time) else {
             return Ok(());
         };
@@ -317,7 +322,8 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
             options.probe_after_ms + 1
         ));
     }
-    options.battery.check(options.dead_after_ms)?;
+    let has_source = options.positions.is_some() || options.autopilot.is_some();
+    options.battery.check(options.dead_after_ms, has_source)?;
     let wiring = wiring(&options)?;
     let load = match wiring {
         Wiring::Pair => ChannelLoad::of_radios(1),
@@ -336,7 +342,7 @@ fn plan(options: Options, file_only: FileOnlySettings) -> Result<Plan, String> {
         ..GuardConfig::of(&mission, profile)
     };
     let settings = Settings {
-        guard: (options.positions.is_some() || options.autopilot.is_some()).then_some(guard),
+        guard: has_source.then_some(guard),
         method: options.method.into(),
         listen: options.listen.listen(options.of),
         wiring,

@@ -100,8 +100,6 @@ impl Flight {
             .map_err(|error| error.to_string())?;
         let reserve = options.battery.reserve();
         relay.set_reserve(reserve);
-        let has_source = plan.autopilot.is_some() || options.positions.is_some();
-        let waits = reserve.is_some() && has_source;
         if options.battery.spare {
             relay.wait_as_spare(now);
         }
@@ -151,7 +149,7 @@ impl Flight {
             rejections: RejectionReasons::default(),
             hold_reasons: HoldReasonLog::default(),
             lost: Lost::new(plan.identity.index, plan.mission.relays()),
-            battery: Battery::new(waits),
+            battery: Battery::new(reserve.is_some()),
             signs: auth.is_some(),
         })
     }
@@ -185,7 +183,9 @@ impl Flight {
             let file = views.as_mut();
             file.is_none_or(|file| file.store(&record.to_bytes()))
         };
-        let waits = self.battery.waits(time, relay, self.autopilot.as_ref());
+        let autopilot = self.autopilot.as_ref();
+        let waits = self.battery.waits(time, relay, autopilot);
+        self.battery.tell_unknown(time, relay, autopilot);
         let wake = if waits {
             self.ports.discard();
             Some(time + WAIT)

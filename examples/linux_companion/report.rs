@@ -164,7 +164,7 @@ impl Report {
                 now,
                 "endurance unknown",
                 json!({ "leaves_below_s": relay.endurance_limit_s() }),
-                "the drone's remaining time of flight is invalid, or has not been received for 10 s; the last one counts down; watch the battery",
+                "the drone's remaining time of flight is invalid, or has not been received for 10 s; the last confirmed one counts down, if there was one; watch the battery",
             ),
             Event::AtReserve => self.log.event(
                 now,

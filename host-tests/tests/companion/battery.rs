@@ -167,6 +167,8 @@ fn a_low_battery_leads_it_out_of_the_chain(kind: &str, more: &str, [full, low]: 
         .receive(|heard| heard.is_text("battery: low, asks the chain to close up"));
     pair.wait(|said| said["departure"] == "free");
     pair.line("may leave: ");
+    pair.drone
+        .receive(|heard| heard.is_text("battery: low, may fly away now"));
     for _ in 0..3 {
         let all = pair
             .drone
@@ -295,6 +297,28 @@ fn without_a_reserve_no_endurance_counts() {
     assert!(said["leaves_below_s"].is_null(), "{said:#}");
     assert!(!relay.has_printed("\"event\":\"departure\""));
     assert!(!relay.has_printed("\"event\":\"endurance unknown\""));
+}
+
+/// Checks a reserve and positions whose writer never sends an endurance.
+#[test]
+fn an_endurance_that_never_comes_is_told() {
+    let chain = Chain::on_channel(2, Medium::new(2, QUIET));
+    let fifo = chain.files.fifo("positions");
+    let own = format!("{QUICK} --reserve 180 --positions {fifo}");
+    let mut relay = chain.relay(2, &own);
+    write(&fifo, "700 0 20\n");
+    relay.line("endurance unknown: ");
+}
+
+#[test]
+fn a_reserve_without_a_source_of_the_endurance_is_refused() {
+    let chain = Chain::on_channel(2, Medium::new(2, QUIET));
+    let refused = chain.arguments(2, "--reserve 180");
+    let line = Relay::start(&refused).refused_at_once(2);
+    assert!(
+        line.contains("--reserve 180: needs --positions or --autopilot"),
+        "{line}"
+    );
 }
 
 #[test]
