@@ -222,7 +222,7 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that the time of flight can be known, and that a full battery lasts until the relay asks to leave.
+    /// Checks that the time of flight can be known, and that a full battery outlasts the reserve.
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(

@@ -56,7 +56,7 @@ pub(super) struct Endurance {
     is_own: bool,
     /// True from a margin at or below the floor until it is [`STEP`] above the floor.
     is_spent: bool,
-    /// True from a landing with a request, or at the reserve, until the margin is [`STEP`] above the floor, or the request ends.
+    /// True from a landing at the reserve, or with a request, until that is over.
     keeps_out: bool,
     /// Time of the floor, as the leader was told.
     floor_at: Instant,

@@ -394,7 +394,9 @@ fn the_last_endurance_counts_down() {
     }
 }
 
-/// Checks a silence: the last value that agreed with the one before counts down, and a single value if there is no other.
+/// Checks a silence: the last value that agreed with the one before counts down.
+///
+/// A single value does if there is no other.
 #[test]
 fn the_last_confirmed_endurance_counts_down() {
     // Seconds at which the relay requests to leave, and reaches its reserve.
@@ -427,7 +429,7 @@ fn the_last_confirmed_endurance_counts_down() {
     assert_eq!(silence(relay, 61), [Some(916), Some(1_095)]);
 }
 
-/// Checks that a decision needs 15 s after the last one, and that repeated orders do not delay the reserve.
+/// Checks that each decision needs 15 s, and that repeated orders do not delay the reserve.
 #[test]
 fn each_decision_takes_its_time() {
     let mut relay = shared(1, 1);
@@ -560,7 +562,9 @@ fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     assert!(!relay.is_at_reserve());
 }
 
-/// Checks a spent relay that lands outside of the chain, and flies again: it returns only after 15 s of high values.
+/// Checks a spent relay that lands outside of the chain, and flies again.
+///
+/// It returns only after 15 s of high values.
 #[test]
 fn a_landing_does_not_return_a_spent_relay() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
