@@ -56,13 +56,16 @@ pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 /// Maximum time by which a report is delayed on a shared channel during the first agreement.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
+/// Control state of a drone that the relay controls.
+const ENGAGED: u16 = State::Engaged as u16 + 1;
+
 /// Time by which a report that begins an alarm may be sent early. Other reports wait until the telemetry's share of
 /// the data rate allows them.
 const AHEAD: Duration = Duration::from_millis(2_000);
 
 /// Minimum time between the states in two entries of one relay. An entry is the state of a relay in a report. This
 /// time is longer than [`ROUNDING`].
-const STEP: Duration = Duration::from_millis(400);
+const STEP: Duration = Duration::from_millis(500);
 
 /// Maximum time difference between two copies of an entry (relay's state) that came by different ways. The copies
 /// differ because each relay rounds the age of an entry.
@@ -184,9 +187,10 @@ impl Reporting {
         if before == control {
             return;
         }
+        let (from, begins) = (self.reported + STEP, begins_alarm(before, control));
         for watched in &mut self.watched {
-            (watched.due, watched.own_from) = (Instant::ZERO, self.reported + STEP);
-            watched.is_alarmed |= begins_alarm(before, control);
+            (watched.due, watched.own_from) = (watched.due.min(from), from);
+            watched.is_alarmed = begins || watched.is_alarmed && control != ENGAGED;
         }
     }
 
@@ -319,7 +323,6 @@ const fn earlier(at: Instant, span: Duration) -> Instant {
 /// controls the drone.
 const fn begins_alarm(before: u16, now: u16) -> bool {
     const SILENT: u16 = State::Silent as u16 + 1;
-    const ENGAGED: u16 = State::Engaged as u16 + 1;
     const BLIND: u16 = State::Blind as u16 + 1;
     before != now && before != 0 && (now == SILENT || now == BLIND || before == ENGAGED)
 }
@@ -479,11 +482,13 @@ impl Reporting {
         let mut all = self.stored.iter_mut();
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
             if at > old.at + ROUNDING {
-                if begins_alarm(old.entry.control(), entry.control()) {
+                let [was, is] = [old.entry, entry].map(|entry| entry.control());
+                let begins = begins_alarm(was, is);
+                if begins {
                     stored.rank = Rank::Alarm;
+                } else if was == is {
+                    stored.rank = stored.rank.max(old.rank);
                 }
-                let begins = stored.rank == Rank::Alarm;
-                stored.rank = stored.rank.max(old.rank);
                 stored.detail = detail.or(old.detail);
                 *old = stored;
                 return begins;
@@ -492,7 +497,9 @@ impl Reporting {
             }
         } else if let Err(stored) = self.stored.push(stored) {
             let worst = self.stored.iter_mut().min_by_key(|old| (old.rank, old.at));
-            if let Some(worst) = worst {
+            if let Some(worst) = worst
+                && worst.rank <= stored.rank
+            {
                 *worst = stored;
             }
         }
@@ -576,10 +583,12 @@ impl Reporting {
             Wiring::Pair => now,
             Wiring::Shared => earlier(now, Duration::from_micros(half.into())),
         };
-        watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
+        if entries > 0 {
+            watched.free = watched.free.max(saved) + byte.times(FRAME + 14 * entries + detail);
+        }
         let late = Duration::from_micros((half / 4).into());
         if is_due {
-            watched.own_from = now + late.times(6);
+            watched.own_from = now + late.times(6).max(STEP);
             watched.is_alarmed = false;
         }
         watched.stores_alarm = stores_alarm;

@@ -6,7 +6,7 @@ use uav_relay::{
     Geofence, HoldReason, Instant, Interference, Mission, Phase, Placement, Profile, Report, Side,
 };
 
-use crate::alarms::Alarms;
+use crate::alarms::{Alarms, Reason};
 use crate::hops::{db, hop_sirs, hop_sirs_back};
 use crate::snapshot::{
     Condition, Fence, Frame, Hop, InterfererSnapshot, Node, Position, RelaySnapshot, Snapshot,
@@ -42,14 +42,16 @@ pub struct Chain<'a> {
 impl Chain<'_> {
     /// Returns the state of the chain at the time `now`, from the newest report of each relay by number.
     ///
-    /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`, or reports a neighbour
+    /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
+    /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
     /// beyond it [`SILENT_AFTER`] later.
     pub fn snapshot(&self, now: Instant, reports: &[Report], alarms: &Alarms) -> Snapshot {
         let is_skipped = |report: &Report| {
             let mut later = reports
                 .iter()
                 .filter(|by| by.at.since(report.at) >= SILENT_AFTER);
-            later.any(|by| has_beyond(by, report.relay))
+            let is_closed = later.any(|by| has_beyond(by, report.relay));
+            is_closed && report.neighbours != [None; 2] && alarms.lasts(Reason::Lost, report.relay)
         };
         let is_lost = |report: &Report| {
             now.since(report.at) >= SILENT_AFTER
