@@ -169,7 +169,7 @@ impl LogGains {
         hop
     }
 
-    /// Adds the derivatives of ln q with respect to the position `at`; q is the inverse of interference plus noise.
+    /// Adds the derivatives of ln q with respect to the position `at`. Here q is the inverse of interference plus noise.
     /// The first derivatives are added to `slope`, and the second derivatives, multiplied by -`weight`, to `bend`. If
     /// `convex` is true, terms that would make `bend` indefinite are left out.
     fn add_quiet(
