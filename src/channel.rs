@@ -18,8 +18,8 @@ pub enum AirGround {
     /// Obstructed links between drones and the ground. The path-loss factor eta of these links is `mu_nlos`, as
     /// between two ground stations.
     Nlos,
-    /// Partial line of sight with the weight w, 0 to 1. The path-loss factor eta of links to the ground is w `mu_los`
-    /// + (1 - w) `mu_nlos`.
+    /// Partial line of sight with the weight w, 0 to 1. The path-loss factor of links to the ground is
+    /// eta = w `mu_los` + (1 - w) `mu_nlos`.
     Weighted(f64),
 }
 

@@ -36,8 +36,8 @@ use crate::root::{PowerRatio, Real, bisected, sqrt};
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of
-/// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise s / (1 + nu
-/// s). In an interference field the factor is Upsilon(x) / `Upsilon_max`, with noise.
+/// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise
+/// s / (1 + nu s). In an interference field the factor is Upsilon(x) / `Upsilon_max`, with noise.
 pub fn quiet(mission: &Mission, at: Placement) -> f32 {
     match mission.interferer() {
         Some(interferer) => {
@@ -107,9 +107,9 @@ impl Sender {
     /// With y = y0 = 0 this is the paper's `SIR_1` for h0 = 0 and A = `p_t` / `p_MSI`, and its `SIR_i` for A = (`p_u`
     /// / `p_MSI`)(eta / `mu_los`).
     ///
-    /// For interference that the mission gives as a distribution along x, the expected SIR is p Upsilon(x) / (eta
-    /// L^2) from Tx and p Upsilon(x) / (`mu_los` L^2) from a relay. L is the length of the hop, m, and p the sender's
-    /// power, W.
+    /// For interference that the mission gives as a distribution along x, the expected SIR is
+    /// p Upsilon(x) / (eta L^2) from Tx and p Upsilon(x) / (`mu_los` L^2) from a relay. L is the length of the hop,
+    /// m, and p the sender's power, W.
     pub fn sir_at(&self, mission: &Mission, from_m: f32, to: Placement) -> f32 {
         let step = to.x_m - from_m;
         let across = to.cross_section().apart_squared(self.cross_section);

@@ -61,8 +61,8 @@ pub struct MissionConfig {
     /// 0.
     pub rx_power_w: f32,
     /// SNR gap of fitted slots, linear: 1 to 1000; 0 for equal slots. With a gap, each time slot is as long as its
-    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is log2(1 + SINR /
-    /// gap).
+    /// hop needs, and the joint method maximises the data rate. The spectral efficiency of a hop is
+    /// log2(1 + SINR / gap).
     pub fitted_gap: f32,
     /// Relative tolerance of the SIR: 1e-6 to 0.1. A chain this close to the best SIR is accepted.
     pub tolerance: f32,

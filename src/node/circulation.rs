@@ -62,7 +62,7 @@ pub(crate) enum Stage {
 /// Reply to the relay from which this relay has received the message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Reply {
-    /// The message has travelled to the last relay and back; the reply contains its result.
+    /// The message is completed; the reply contains its result.
     Result,
     /// The message was received, and its result is not known yet.
     InProgress,

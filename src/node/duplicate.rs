@@ -54,8 +54,8 @@ use crate::wire::session::{RAISED, Rival, Sender};
 /// between later claims double each time.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
-/// Time added before the first claim to this relay's node number after a start. This is about the time that a hundred
-/// relays need for their first agreement. A relay that becomes active again waits as long.
+/// Time added, after a start, before the first claim that this relay sends without a request. This is about the time
+/// that a hundred relays need for their first agreement. A relay that becomes active again waits as long.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
 /// Maximum of the doubling intervals between claims to this relay's node number. These claims are sent without a

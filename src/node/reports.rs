@@ -50,10 +50,10 @@ const MOST_DOUBLINGS: u8 = 3;
 /// reports.
 const REPEAT_AFTER: Duration = Duration::from_millis(1_000);
 
-/// Maximum time by which a report is delayed on a shared channel while the relays agree on positions.
+/// Maximum time by which telemetry waits on a shared channel while the relays agree on positions.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(2_000);
 
-/// Maximum time by which a report is delayed on a shared channel during the first agreement.
+/// Maximum time by which telemetry waits on a shared channel during the first agreement.
 pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 
 /// Control state of a drone that the relay controls.
@@ -152,7 +152,7 @@ struct Watched {
     unconfirmed: u8,
     /// Node to which a handshake must be sent that requests a reply; `None` if there is none.
     to_greet: Option<NonZeroU16>,
-    /// Time at which the next report must be sent; not earlier than `free`.
+    /// Time at which the next report must be sent. Unless it begins an alarm, it is sent no earlier than `free`.
     due: Instant,
     /// Time from which the telemetry's share of the data rate allows a report.
     free: Instant,
@@ -168,7 +168,8 @@ struct Watched {
     stores_alarm: bool,
 }
 
-/// State that this relay reports about itself: a number for its condition, setpoint, agreed position.
+/// State that this relay reports about itself. The values are the number of the state in an entry (without the control
+/// state), the setpoint, and the agreed position.
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
@@ -469,8 +470,8 @@ impl Reporting {
     }
 
     /// Stores an entry if it is newer than the stored entry of the same relay. If the store is full, the oldest entry
-    /// that was already sent is dropped; if none was sent, the oldest entry. Returns true if the entry begins an
-    /// alarm.
+    /// that was already sent is dropped; if none was sent, the oldest entry that begins no alarm, if there is one.
+    /// Returns true if the entry begins an alarm.
     fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
         let mut stored = Stored {
             entry,

@@ -190,8 +190,8 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative width of the gap between two targets, encoded by the byte `code`. The width is (1 + m / 8)
-/// 2^(e - 25). m is the number in the low three bits of `code`, e the number in the other five bits.
+/// Returns the relative width of the gap between two targets, encoded by the byte `code`. The width is
+/// (1 + m / 8) 2^(e - 25). m is the number in the low three bits of `code`, e the number in the other five bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }

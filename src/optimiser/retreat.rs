@@ -485,7 +485,8 @@ struct Piece {
 /// `value` returns the sender's x for the receiver's x, y, and for `quiet`, which is Upsilon = E[1/I] at y divided by
 /// the field's largest Upsilon. This sender's x is y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the
 /// target, and s is the first of `squares`. It is `None` if the square under the root is below the second of
-/// `squares` minus the first. Work: at most three values for each field point within reach of a hop.
+/// `squares` minus the first. Work: at most three values for each field point from `low` to `high` that a hop could
+/// reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,

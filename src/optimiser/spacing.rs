@@ -133,8 +133,8 @@ impl Hop {
     }
 
     /// Creates the hop from `sender` to a receiver at an x up to `end_m`. `at` is the receiver's lateral offset and
-    /// altitude. The hop has no minimum length. `noise` is the noise divided by the interferer's power received at 1
-    /// m, 1/m^2.
+    /// altitude. The hop has no minimum length. `noise` is the noise divided by the interferer's power received at
+    /// 1 m, 1/m^2.
     pub(crate) fn free(
         interferer: &Interferer,
         noise: f32,
@@ -263,6 +263,7 @@ impl Hop {
     }
 
     /// Returns the largest x, m, at which the receiver meets `target` with any sender in [0, `from_m`].
+    /// `None` if no x meets `target`.
     ///
     /// If the receiver has such a position at least the minimum step beyond `from_m`, the result is [`Hop::reach`]
     /// for a sender at `from_m`. Otherwise the sender is one minimum step before the receiver. Constant work.

@@ -41,11 +41,12 @@ const TOP_PER_S: f32 = 0.5;
 /// behind, but never stops for good.
 const LEAST_PART: f32 = 0.1;
 
-/// Factor on the acceleration limit for the velocity across the direction to a new setpoint.
+/// Factor on the acceleration limit for the velocity in other directions than to a new setpoint.
 ///
-/// When the setpoint changes, the moving target still has its old velocity. The component across the new direction is
-/// reduced to 0 with twice the acceleration of [`Pace`], within [`Pace::stopping_time`]. The target does not turn at
-/// once, because the drone would then overshoot the target and come back.
+/// When the setpoint changes, the moving target still has its old velocity. Its components across the new direction
+/// and away from the setpoint are reduced to 0 with twice the acceleration of [`Pace`], within
+/// [`Pace::stopping_time`]. The target does not turn at once, because the drone would then overshoot the target and
+/// come back.
 const TURN_PART: f32 = 2.0;
 
 /// Remaining distance of the moving target to the setpoint at which a stop counts as complete, m. The drone lags

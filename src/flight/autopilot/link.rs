@@ -841,7 +841,8 @@ impl Autopilot {
     /// the bearing to [`handle_bearing`](Self::handle_bearing). The line from Tx to Rx is at first the line given to [`new`](Self::new).
     /// An exchange replaces a line that [`fly_along`](Self::fly_along) has set.
     ///
-    /// Constant work: one call of each input of the relay and of the link, and a new [`Axis`](crate::flight::axis::Axis) when these positions have changed.
+    /// Constant work: one call of each input of the relay and of the link. Also a new [`Axis`](crate::flight::axis::Axis) when the
+    /// positions of Tx and Rx have changed.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }

@@ -150,7 +150,7 @@ fn hash(text: [&str; 2]) -> u32 {
     })
 }
 
-/// Returns the time from `now` to `until`, ms; `None` if it has passed.
+/// Returns the time from `now` to `until` (a wrapping time in ms); `None` if it has passed.
 fn left(now: Instant, until: u32) -> Option<Duration> {
     let left = until.wrapping_sub(millis(now.as_micros()));
     (1..=SPACING)

@@ -617,7 +617,8 @@ const DRIFT: u32 = 10;
 /// The conversion uses the minimum difference between the two clocks, because this difference belongs to the message
 /// with the least delay. A message can be late because the link is slow, and it can seem late because the autopilot's
 /// clock has lost time. If the minimum were never renewed, every message would count as late for good once the
-/// autopilot's clock has lost time. Therefore the minimum is renewed within 4 s to 8 s of messages.
+/// autopilot's clock has lost time. Therefore the minimum is renewed within 4 s to 8 s of messages. After a
+/// lasting change of the link's delay or of the clock, messages count as late only for that long.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RemoteClock {
     known: Option<Anchor>,

@@ -215,9 +215,9 @@ fn a_late_position_of_a_drone_flown_again_is_no_obstacle() {
     assert_eq!(row.setpoint(0), Some(140.0));
 }
 
-/// Checks the hold reason if a restarted neighbour does not fly to setpoints: it names this neighbour. The
-/// neighbour's companion computer restarted, and its pilot has not engaged setpoint control again. The limit of x of
-/// the neighbour's old association (session) still holds.
+/// Checks that the hold reason states that a restarted neighbour does not fly to setpoints. The neighbour's companion
+/// computer restarted, and its pilot has not engaged setpoint control again. The limit of x of the neighbour's old
+/// association (session) still holds.
 #[test]
 fn a_relay_reports_that_its_neighbour_is_not_engaged() {
     let mut row = Row::new();

@@ -11,8 +11,8 @@ use crate::time::Instant;
 use crate::wire::digest::MissionId;
 use crate::wire::message::Hello;
 
-/// Mission fields of a hello: the newest mission that the relay has stored, and two flags. The flags state if the
-/// mission is active, and if it was refused.
+/// Mission fields of a hello: the newest mission that the relay has stored, and three flags. The flags state if the
+/// mission is active at this relay, if all relays of the view are known to have it active, and if it was refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,

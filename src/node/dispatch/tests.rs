@@ -439,7 +439,7 @@ fn a_loss_and_a_mission_mismatch_name_the_node() {
     }
 }
 
-/// Checks that a spare requests no view until the leader calls it into the chain. A spare waits outside of the chain.
+/// Checks that a spare requests no view until it joins the chain. A spare waits outside of the chain.
 #[test]
 #[cfg(feature = "departures")]
 fn a_relay_outside_proposes_nothing() {

@@ -115,7 +115,7 @@ impl Link {
     }
 
     /// Records a loss of the link. `losses` is the number of recent losses before this loss. If `counted` is false,
-    /// this loss does not count.
+    /// this number stays the same at first; a long silence after the loss counts it later.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,

@@ -74,7 +74,7 @@ fn paced(settings: &Settings, all: u16, most_micros: u64) -> Duration {
 }
 
 /// Returns the silence of a neighbour after which a heartbeat is requested. This silence is the longer of two times:
-/// `Settings::probe_after`, and the round trip through a chain of `all` relays.
+/// `Settings::probe_after`, and the round trip through a chain of `all` relays (at most the longest lease).
 pub(crate) fn patience(settings: &Settings, all: u16) -> Duration {
     let round = settings.hop_time.times(2 * u32::from(all) + 2);
     round.min(longest_lease(settings)).max(settings.probe_after)

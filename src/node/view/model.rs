@@ -341,7 +341,7 @@ impl Body {
 pub(super) enum Rule {
     /// Rule of the firmware: only members vote.
     Members,
-    /// Broken rule, for a test: a departure counts as agreed on at once, at the neighbours of the relay.
+    /// Broken rule, for a test: a departure counts as agreed on at once, at all other relays.
     Inside,
     /// Broken rule, for a test: every reachable relay votes. The quorum is counted for the newest view that one of
     /// these relays knows.

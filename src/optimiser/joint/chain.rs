@@ -89,7 +89,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
     }
 
     /// Returns the altitude at which relay `index` is held, m. `None` if the relay may choose its altitude. Also
-    /// `None` if the mission allows one altitude only, since no relay then differs from the others.
+    /// `None` if the mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();

@@ -101,8 +101,8 @@ impl<'a> Site<'a> {
     /// The x of the hop's end must not be smaller than the x of the sender. The search starts at the permitted
     /// position closest to the middle of the reachable positions, and goes along the straight line to `wanted`.
     /// `None` if no allowed position is reached. With the sender at p, the interferer at m and c = target / gain > 1
-    /// the reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c -
-    /// 1).
+    /// the reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius
+    /// sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {

@@ -41,7 +41,7 @@ pub(super) enum Start {
     /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
     Near,
     /// Initial chain with relay 1 at the x of Rx, high above Rx or far to the side of Rx. The lateral offsets and
-    /// altitudes of the other relays lead from there to Rx in equal steps.
+    /// altitudes of the other relays lead from there in equal steps to the line Tx-Rx and the lowest altitude.
     Far,
 }
 

@@ -19,7 +19,7 @@ use crate::wire::message::parts::{
 };
 
 /// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target. The sender
-/// meets the target up to this x. "Farthest" means in the direction of the pass.
+/// meets the target at this x, and at no x farther away. "Farthest" means in the direction of the pass.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.

@@ -112,7 +112,7 @@ impl LogGains {
     }
 
     /// Returns the levels of hop `k` from `from` to `to`. `quiet_from` and `quiet_to` are ln q at `from` and at `to`;
-    /// q is the inverse of interference plus noise. A level is ln(SIR).
+    /// q is the inverse of interference plus noise.
     pub(super) fn levels(
         &self,
         k: u16,
@@ -128,7 +128,7 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s levels (ln SIR). They are with respect to the positions of its ends
+    /// Returns the derivatives of hop `k`'s [levels](Levels). They are with respect to the positions of its ends
     /// `from` and `to`. The second derivatives are added up, with the `weights` of both levels. If `convex` is true,
     /// terms that would make this sum indefinite are left out.
     pub(super) fn derivatives(
@@ -169,7 +169,7 @@ impl LogGains {
         hop
     }
 
-    /// Adds the derivatives of ln q with respect to the position `at`. Q is the inverse of interference plus noise.
+    /// Adds the derivatives of ln q with respect to the position `at`. Here q is the inverse of interference plus noise.
     /// The first derivatives are added to `slope`, and the second derivatives, multiplied by -`weight`, to `bend`. If
     /// `convex` is true, terms that would make `bend` indefinite are left out.
     fn add_quiet(
@@ -198,7 +198,7 @@ impl LogGains {
     }
 }
 
-/// Derivatives of a hop's levels (ln SIR) with respect to the positions of its ends. The second derivatives
+/// Derivatives of a hop's [levels](Levels) with respect to the positions of its ends. The second derivatives
 /// (`bend...`) are weighted sums over both levels, negated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Derivatives {

@@ -81,8 +81,8 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop (ln SIR, forward and backward), and their Lagrange multipliers `lambda`. Each multiplier is stored
-/// as the upper half of an f32.
+/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers `lambda`. Each multiplier is stored as the upper
+/// half of an f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -154,7 +154,7 @@ impl Spot {
 
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Computation of all hops' levels (ln SIR) at the tried positions. The field is the next hop.
+    /// Computation of all hops' [levels](Levels) at the tried positions. The field is the next hop.
     Levels(u16),
     /// Computation of the target from all levels; the field is the number of Newton steps done.
     Target(u8),
@@ -365,7 +365,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Continues the interior-point method by one bounded portion. Ready at the end, with a target in ln(SIR)
-    /// slightly below ln(SIR) of all hops at the stored positions.
+    /// slightly below all [levels](Levels) of the hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
         let done = match self.work {
@@ -413,7 +413,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the levels (ln SIR) of ten hops, from hop `k` on. For the coordinates of the hops' ends it adds
+    /// Computes the [levels](Levels) of ten hops, from hop `k` on. For the coordinates of the hops' ends it adds
     /// ln(distance to a limit) to the barrier.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
@@ -561,7 +561,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the derivatives of hop `k`'s levels (ln SIR) with respect to the positions `ends`. Also returns the
+    /// Returns the derivatives of hop `k`'s [levels](Levels) with respect to the positions `ends`. Also returns the
     /// hop's Lagrange multipliers and slacks.
     #[inline(never)]
     fn derivatives(&mut self, relays: u16, k: u16, ends: [Triple; 2]) -> (Derivatives, Weights) {
