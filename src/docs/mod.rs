@@ -6,6 +6,7 @@
 //! | [`planning`] | number of relays, their positions, and whether the plan is proven optimal |
 //! | [`link`] | both directions, data rates, and access to the radio |
 //! | [`lost_relays`] | behaviour when a relay fails or comes back, or the chain is split |
+//! | [`batteries`] | replacement of a drone whose battery runs low |
 //! | [`uploads`] | new missions in flight |
 //! | [`sensing`] | estimation and tracking of an unknown interferer |
 //! | [`flight`] | control of the drone through its autopilot |
