@@ -1,6 +1,5 @@
 //! Cost of the joint method on board.
 
-use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
 use uav_relay::Mission;
 use uav_relay::optimiser::joint::{Seat, Solver};

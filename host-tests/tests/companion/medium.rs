@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -23,6 +23,9 @@ pub(crate) struct Noise {
     pub(crate) corrupt: f64,
     pub(crate) seed: u64,
 }
+
+/// Maximum time by which a channel with a data rate makes up for a late wake-up of its thread.
+const LATEST: Duration = Duration::from_millis(20);
 
 pub(crate) const QUIET: Noise = Noise {
     loss: 0.0,
@@ -93,8 +96,14 @@ impl Medium {
         }
         let ptys = ptys.into_iter().map(|pty| Some(Arc::new(pty))).collect();
         let byte = Duration::from_secs(10) / baud;
+        let mut free = Instant::now();
         let paced = move |_, sent: &[u8]| {
-            std::thread::sleep(byte * u32::try_from(sent.len()).unwrap());
+            // A busy machine wakes this thread late. The next frame makes up for that, so that the data rate stays.
+            let begin = Instant::now()
+                .checked_sub(LATEST)
+                .map_or(free, |at| at.max(free));
+            free = begin + byte * u32::try_from(sent.len()).unwrap();
+            std::thread::sleep(free.saturating_duration_since(Instant::now()));
             true
         };
         Self::of(paths, ptys, QUIET, Box::new(paced), None)
