@@ -1054,21 +1054,27 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
     let mut rings = Vec::new();
     let mut open = vec![&value];
     while let Some(value) = open.pop() {
-        let coordinates = value.get("coordinates");
-        let list = |key: &str| value.get(key).and_then(|list| list.as_array());
-        match value.get("type").and_then(|kind| kind.as_str()) {
-            Some("FeatureCollection") => open.extend(list("features").into_iter().flatten().rev()),
-            Some("GeometryCollection") => {
-                open.extend(list("geometries").into_iter().flatten().rev());
+        let Some(kind) = value.get("type").and_then(|kind| kind.as_str()) else {
+            return Err(fail("has an object without a type".to_owned()));
+        };
+        // A part that is left out would be airspace in which relays fly.
+        let lacks = |part: &str| fail(format!("has a {kind} without {part}"));
+        let list = |key: &str| {
+            let list = value.get(key).and_then(|list| list.as_array());
+            list.filter(|list| !list.is_empty())
+                .ok_or_else(|| lacks(key))
+        };
+        match kind {
+            "FeatureCollection" => open.extend(list("features")?.iter().rev()),
+            "GeometryCollection" => open.extend(list("geometries")?.iter().rev()),
+            "Feature" => open.push(value.get("geometry").ok_or_else(|| lacks("geometry"))?),
+            "Polygon" => rings.extend(list("coordinates")?.first()),
+            "MultiPolygon" => {
+                for polygon in list("coordinates")? {
+                    rings.push(polygon.get(0).ok_or_else(|| lacks("a boundary"))?);
+                }
             }
-            Some("Feature") => open.extend(value.get("geometry")),
-            Some("Polygon") => rings.extend(coordinates.and_then(|all| all.get(0))),
-            Some("MultiPolygon") => {
-                let all = coordinates.and_then(|all| all.as_array());
-                rings.extend(all.into_iter().flatten().filter_map(|one| one.get(0)));
-            }
-            Some(kind) => return Err(fail(format!("has a {kind}"))),
-            None => return Err(fail("has an object without a type".to_owned())),
+            _ => return Err(fail(format!("has a {kind}"))),
         }
     }
     let point = |at: &serde_json::Value| {

@@ -1011,6 +1011,25 @@ fn wrong_areas_are_refused_by_name() {
     let folder = folder.path();
     std::fs::write(folder.join("zones.geojson"), r#"{ "type": "FeatureCollection", "features": [ { "type": "Feature", "properties": {},
         "geometry": { "type": "Polygon", "coordinates": [[[8.52, 47.199], [8.523, 47.199], [8.523, 47.201], [8.52, 47.199]]] } } ] }"#).unwrap();
+    let good = r#"{ "type": "Polygon", "coordinates": [[[8.52, 47.199], [8.523, 47.199], [8.523, 47.201], [8.52, 47.199]]] }"#;
+    for (name, damaged) in [
+        ("keys", r#"{ "type": "Feature", "Geometry": {} }"#),
+        ("empty", r#"{ "type": "Polygon", "coordinates": [] }"#),
+        (
+            "members",
+            r#"{ "type": "MultiPolygon", "coordinates": [[]] }"#,
+        ),
+        (
+            "object",
+            r#"{ "type": "MultiPolygon", "coordinates": { "0": [] } }"#,
+        ),
+    ] {
+        std::fs::write(
+            folder.join(format!("{name}.geojson")),
+            format!(r#"{{ "type": "GeometryCollection", "geometries": [{good}, {damaged}] }}"#),
+        )
+        .unwrap();
+    }
     std::fs::write(folder.join("swapped.geojson"), r#"{ "type": "Polygon", "coordinates": [[[47.199, 8.52], [47.199, 8.523], [47.201, 8.523], [47.199, 8.52]]] }"#).unwrap();
     std::fs::write(
         folder.join("line.geojson"),
@@ -1141,6 +1160,23 @@ fn wrong_areas_are_refused_by_name() {
         (
             zone("file = \"line.geojson\""),
             ["has a LineString", "Polygon or MultiPolygon"],
+        ),
+        // A damaged part beside a good one is not left out.
+        (
+            zone("file = \"keys.geojson\""),
+            ["has a Feature without geometry", "Polygon"],
+        ),
+        (
+            zone("file = \"empty.geojson\""),
+            ["has a Polygon without coordinates", "Polygon"],
+        ),
+        (
+            zone("file = \"members.geojson\""),
+            ["has a MultiPolygon without a boundary", "Polygon"],
+        ),
+        (
+            zone("file = \"object.geojson\""),
+            ["has a MultiPolygon without coordinates", "Polygon"],
         ),
         (
             zone("file = \"swapped.geojson\""),
