@@ -582,8 +582,8 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// Of the coordinates that are not at a limit of their permitted range, `low` to `high`, it is the coordinate
-    /// with which F changes most. x is preferred. F is half the margin of the hop to its target: 0 for a hop of
+    /// The selected coordinate is not at a limit of its permitted range, `low` to `high`, and F changes most with it.
+    /// x is preferred. F is half the margin of the hop to its target: 0 for a hop of
     /// maximum length (see `hop`). The second result is the derivative of F with respect to the selected coordinate.
     fn axis(
         &self,
