@@ -29,7 +29,8 @@ pub(super) enum Rule {
     NumberOrTwo(Range),
     /// List of exactly one number for each of these ranges.
     Numbers(&'static [Range]),
-    /// List of such lists, with the least and greatest number of lists.
+    /// List of such points, each a list with one number for each of these ranges. Also the least and greatest number of
+    /// points.
     Points(&'static [Range], [usize; 2]),
     Choice(&'static [&'static str]),
     Text,

@@ -80,13 +80,13 @@ pub struct TerrainSpec {
     pub mast_m: f64,
     /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
     ///
-    /// The highest ground within the relay's position error counts.
+    /// The height counts from the highest ground at the positions where the relay may be within its position error.
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground below it, m; `None` for no limit.
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
-    /// The ground between antennas counts as higher by this error.
+    /// The planner raises the ground between two antennas by up to this error.
     pub error_m: f64,
 }
 

@@ -5,7 +5,7 @@
 
 use crate::snapshot::{Alarm, Urgency};
 
-/// Number of alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
+/// Number of stored alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
 /// alarms the oldest. Alarms that still last are not dropped.
 pub const MOST: usize = 200;
 
@@ -175,9 +175,10 @@ impl Alarms {
         }
     }
 
-    /// Ends the alarms of a reason about relay `subject`.
+    /// Ends the alarms for `reason` about relay `subject`.
     ///
-    /// `None` ends only the part that relay `by` has reported.
+    /// If `subject` is `None`, removes relay `by` from the reporters of all alarms for `reason`. Such an alarm ends
+    /// when it has no reporters left.
     pub fn end(&mut self, time_s: f64, reason: Reason, subject: Option<u16>, by: u16) {
         let lasting = self.entries.iter_mut().filter(|it| it.lasts());
         for entry in lasting.filter(|it| it.reason == reason) {

@@ -149,8 +149,9 @@ impl Hostile {
         Ok(())
     }
 
-    /// Rejects a `--kill` of a relay that is off already, and a first `--boot` before the first `--kill`. A `--boot`
-    /// of a relay without any `--kill` is a reboot, and allowed.
+    /// Rejects a `--kill` of a relay that is off, and a `--boot` of a relay before its first `--kill`.
+    ///
+    /// A `--boot` of a relay without any `--kill` is allowed: the relay reboots.
     fn in_order(&self) -> Result<(), Failure> {
         let kills = self.kill.iter().map(|one| (one, true));
         let mut all: Vec<(&RelayEvent, bool)> = kills
@@ -442,7 +443,7 @@ pub struct Flight {
     pub rotation: Rotation,
 }
 
-/// Largest |x|, |y| and height of the start position that an option gives a drone, m.
+/// Largest |x|, |y| and height, m, of a drone's start position in the file of `--start`.
 const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {

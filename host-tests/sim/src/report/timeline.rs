@@ -348,7 +348,7 @@ fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
-/// Number of lines that a shortened log keeps at its start, and again at its end.
+/// Number of lines at the start, and also at the end, that a shortened log keeps.
 const ENDS: usize = 20;
 
 /// Formats the log with a line for each event. If the log has more than 40 lines, the middle lines are left out.

@@ -187,7 +187,7 @@ pub struct LinkSpec {
 }
 
 impl Default for LinkSpec {
-    /// Returns a link of 115 200 baud and 2 ms latency, as of a telemetry radio at short range.
+    /// Returns a link of 115 200 baud and 2 ms latency, typical of a telemetry radio at short range.
     fn default() -> Self {
         Self {
             baud: 115_200,

@@ -91,7 +91,7 @@ const ACCELERATION_MPS2: f64 = 3.0;
 /// Time without a position target after which a PX4 leaves OFFBOARD and hovers (`COM_OBL_RC_ACT` 5).
 const LOST: Duration = Duration::from_millis(1_000);
 
-/// Time with a stream of position targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
+/// Time with position targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
 const RESUMES: Duration = Duration::from_millis(1_200);
 
 /// Time that the restart of an autopilot takes. The autopilot is silent meanwhile.
@@ -320,8 +320,8 @@ impl Vehicle {
 
     /// Updates the flight mode and the flight state, which the pilot and the autopilot decide.
     ///
-    /// After a change, position targets of the relay count as allowed for some time, until the relay must have
-    /// learned of the change.
+    /// For [`MODE_KNOWN_WITHIN`] after a change, position targets of the relay do not count as errors: the relay may
+    /// not know the change yet.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);

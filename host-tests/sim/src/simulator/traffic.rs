@@ -394,7 +394,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Processes the packets that are created or arrive until `until`.
+    /// Processes all creations and arrivals of packets up to the time `until`.
     fn pass(&mut self, until: Ps) {
         loop {
             let end = self.ends.peek().map_or(Ps::MAX, |Reverse((at, ..))| *at);
