@@ -30,8 +30,8 @@ const REPORTED: usize = 60_000;
 
 /// Largest lateral distance y_H of the interferer in the search, as a multiple of the scene's size.
 ///
-/// At this distance the interference is already the same at all relay positions to a thousandth, so a larger distance
-/// would change nothing. The size of the scene is its largest extent in x, y or altitude.
+/// At this distance the interference differs by at most a thousandth between the relay positions, so that a larger
+/// distance would change nothing. The size of the scene is its largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
 /// Grid step of the search for the lateral distance y_H of the interferer. The grid is even in u = asinh(y_H / lowest
@@ -286,7 +286,8 @@ impl Space {
     /// Minimises the error by the simplex method from `start`, a point (x, u) of the search space.
     ///
     /// `share` is the size of the first simplex as a fraction of the length over which the error changes noticeably.
-    /// The search ends at the relative `tolerance` of the error or after `most` steps.
+    /// The search ends when the errors at the simplex's corners agree to the relative `tolerance`, or after `most`
+    /// steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -542,8 +543,9 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// Coordinate of a grid near which the function sampled on the grid changes fastest. The grid's cells are smallest
-/// there, with a size that depends on `width`.
+/// Coordinate at which a sampled function changes fastest. A grid has its smallest cells there.
+///
+/// The size of these cells depends on `width`.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
     /// Coordinate at which the sampled function changes fastest, m. It is an x or an altitude, like the other values

@@ -54,7 +54,7 @@ pub(super) enum Need {
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
-    /// Other keys that may not be given beside this key, because their meanings overlap.
+    /// Other keys that are forbidden beside this key, because their meanings overlap.
     pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
@@ -97,7 +97,7 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that a table must have if it has none of the keys `others`. A table may not have both this key and one of `others`.
+/// Creates a key that a table must have if it has none of the keys `others`. A table with both this key and one of `others` is rejected.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),

@@ -32,7 +32,7 @@ pub enum Refusal {
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The scenario combines fitted slots with a table of rate steps, to which relays cannot fit slots.
+    /// The scenario has fitted slots and a table of rate steps: relays fit slots only to Shannon's formula.
     Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),

@@ -61,10 +61,10 @@ pub struct Scene {
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
-    /// Areas of the sources that may be anywhere in them, by index in `sources`.
+    /// Areas of sources whose positions are uncertain, by index in `sources`.
     ///
-    /// Each receiver gets the interference from the nearest point of the area. The SIR of a hop is then its SIR for
-    /// the source's worst position for this hop.
+    /// Such a source may be anywhere in its area. Each receiver gets the interference from the area's point nearest to
+    /// it, so that the SIR of a hop is the SIR for the worst position of the source.
     pub areas: BTreeMap<usize, Area>,
     /// Least and greatest altitude of the sources, m, by index in `sources`.
     ///
@@ -191,7 +191,7 @@ impl Scene {
 
     /// Returns the power of each source, W, and the offset from it to (`x`, `y`), m.
     ///
-    /// A source that may be anywhere in an area is at its nearest point.
+    /// A source with an area is at the area's point nearest to (`x`, `y`).
     pub fn offsets(&self, x: f64, y: f64) -> impl Iterator<Item = (f64, [f64; 2])> {
         let each = self.sources.iter().enumerate();
         each.map(move |(at, source)| {

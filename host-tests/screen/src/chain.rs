@@ -252,7 +252,7 @@ pub(crate) const fn control(state: State) -> &'static str {
     }
 }
 
-/// Returns the reason why a drone that is flown by its relay holds its position.
+/// Returns the reason why a drone holds its position; `None` if it moves or no relay controls it.
 pub(crate) fn hold_reason(report: &Report) -> Option<String> {
     let pairs = report.hold_reasons.into_iter().zip(report.neighbours);
     let mut reasons = pairs.filter(|_| is_flown(report));

@@ -405,9 +405,9 @@ impl Shared {
 
     /// Returns `answer`, or a refusal after too many wrong passwords, from `peer` or from all addresses.
     ///
-    /// If `answer` refuses a wrong password, this password is counted. The server then refuses the right password, too, but not tasks:
-    /// their token cannot be guessed. It refuses this computer only for wrong passwords from this computer, so that a tunnel to it still
-    /// works.
+    /// If `answer` refuses a wrong password, this password is counted. After too many, the server refuses requests with the right password,
+    /// too. It still accepts tasks, because their token cannot be guessed. It refuses this computer only for wrong passwords from this
+    /// computer, so that a tunnel to it still works.
     fn limited(&self, answer: Answer, peer: IpAddr) -> Answer {
         if self.access.password.is_none() || matches!(answer, Answer::Post(..)) {
             return answer;

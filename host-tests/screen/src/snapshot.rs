@@ -180,7 +180,7 @@ pub struct InterfererSnapshot {
     pub position: Position,
     /// Transmit power, W.
     pub power_w: Option<f64>,
-    /// Radius around the position within which the interferer is believed to be, m.
+    /// Radius around the position within which the interferer is expected, m; `None` if unknown.
     pub uncertainty_m: Option<f64>,
     /// True if the relays estimate the interferer by measurements.
     pub is_estimated: bool,

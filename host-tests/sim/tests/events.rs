@@ -284,7 +284,8 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Checks that of two relays with one number the later relay gets no setpoint. Both relays must report the duplicate.
+/// Checks that of two relays with the same number the later one gets no setpoint. Both relays must report the
+/// duplicate.
 ///
 /// Runs `COUNT` chains for each loss rate; `COUNT` is an environment variable.
 #[test]

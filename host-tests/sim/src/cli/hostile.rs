@@ -487,7 +487,7 @@ impl Flight {
 
     /// Adds the drones to `setup` if `--fly` is given. Without `--start` they start evenly spaced from Tx to Rx.
     ///
-    /// `axis` is the geographic line from Tx to Rx. `None` takes an arbitrary place on Earth.
+    /// `axis` is the geographic line from Tx to Rx. If it is `None`, the line is at an arbitrary place on Earth.
     pub fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
         if !self.fly {
             return Ok(());

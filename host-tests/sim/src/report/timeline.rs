@@ -157,7 +157,7 @@ pub fn line(moment: &Moment) -> String {
 
 /// Longest time between two successive log entries that are grouped as one event, s.
 ///
-/// Neighbours may detect the same failure at different times.
+/// The neighbours of a relay can detect the same failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
 /// Groups log entries about the same event, sorted by time.

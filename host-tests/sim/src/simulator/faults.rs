@@ -12,7 +12,7 @@ use uav_relay::{Duration, Instant};
 pub struct Faults {
     /// Probability that a frame never arrives.
     pub loss: f64,
-    /// Probability that one to eight bytes of a frame change. The delimiter may be among them.
+    /// Probability that one to eight bytes of a frame change. The delimiter can be one of these bytes.
     pub corrupt: f64,
     /// Probability that a frame arrives twice.
     pub duplicate: f64,

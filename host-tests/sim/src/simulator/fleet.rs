@@ -62,7 +62,7 @@ impl FleetSpec {
 
 /// Returns a geographic line of `distance_m` metres at an arbitrary place. It is for a scenario without such a line.
 ///
-/// The line leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
+/// The line leads eastward from 47.4 N, 8.54 E. `None` if no line can have this length.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
     const TX: [f64; 2] = [47.4, 8.54];
     let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;
@@ -143,17 +143,16 @@ pub(super) struct Vehicle {
     /// True while the pilot of this drone sees no other drone moving nearby.
     pub(super) is_clear: bool,
     last_target_at: Option<Instant>,
-    /// True while a PX4 is in its failsafe. It resumes OFFBOARD once it receives a stream of targets again.
+    /// True while a PX4 is in its failsafe. The PX4 resumes OFFBOARD once it receives a stream of targets.
     is_failing: bool,
     streamed_since: Instant,
     began: Instant,
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Time until which forbidden position targets of the relay do not count as errors.
+    /// Time until which position targets do not count as errors although the autopilot rejects them.
     ///
-    /// The autopilot has changed its mode or state, so that it no longer accepts targets, and the relay may not know
-    /// yet.
+    /// The autopilot has changed its mode or state, and the relay may not know this yet.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,

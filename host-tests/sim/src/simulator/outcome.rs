@@ -218,7 +218,7 @@ pub struct Outcome {
     /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
-    /// never two.
+    /// never two such drones at the same time.
     pub nearest_lent: Option<Nearest>,
     /// Smallest margin during the run, m. The margin is the distance of two drones minus the distance that they have
     /// to keep.

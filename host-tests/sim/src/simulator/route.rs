@@ -104,10 +104,10 @@ impl Track {
         }
     }
 
-    /// Returns this record with other positions: relay 1 has the first of `places` in all its states.
+    /// Returns this record with other positions: relay 1 gets the first of `places`, relay 2 the second.
     ///
-    /// The other relays follow in order. Positions are x, y and altitude, m. States in which a relay has no position
-    /// keep none.
+    /// The further relays follow in order. Positions are x, y and altitude, m. A state in which a relay has no position
+    /// is not changed.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self

@@ -90,7 +90,7 @@ pub struct Setup {
     pub boots: Vec<(u16, Instant)>,
     /// Relays that request to leave the chain: number from 1, time, and remaining endurance, s, if known.
     ///
-    /// They are switched off once they may leave.
+    /// A relay is switched off once it has permission to leave.
     pub leaves: Vec<(u16, Instant, Option<u16>)>,
     /// Relays that cancel their departure: number from 1 and time.
     pub stays: Vec<(u16, Instant)>,
@@ -106,7 +106,7 @@ pub struct Setup {
     pub partitions: Vec<Partition>,
     /// True if relays sign frames, with a key drawn from the seed. The epoch counts the starts of a relay.
     pub auth: bool,
-    /// Uploads of missions during the run. Without `auth` none takes place, because uploads must be signed.
+    /// Uploads of missions during the run. Without `auth` no upload takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
     /// Ends of the chain whose ground stations request reports from the relays, each with its start. Without `auth` no
     /// station requests reports.

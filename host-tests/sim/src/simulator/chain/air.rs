@@ -294,9 +294,9 @@ impl Chain {
             .any(|part| part.parts(number(one), number(other), self.now))
     }
 
-    /// Returns true if relay `by` can receive relay `of` (both from 0), apart from their distance.
+    /// Returns true if no failure prevents relay `by` from receiving relay `of` (both from 0) at present.
     ///
-    /// This is so unless a partition or a one-way link failure prevents it at present.
+    /// A failure is a partition or a one-way link failure. The radio range is not checked.
     pub(super) fn hears(&self, by: usize, of: usize) -> bool {
         let deaf = &self.setup.deaf;
         !self.are_parted(by, of)

@@ -116,7 +116,7 @@ impl Chain {
 
     /// Moves drone `index` (from 0) for one time step, and lets its relay and autopilot exchange messages.
     ///
-    /// If the relay is off, the pilot lands the drone after a while.
+    /// If the relay is off, the pilot lands the drone after [`LANDS_AFTER`].
     fn drive(&mut self, index: usize) {
         let now = self.now;
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]

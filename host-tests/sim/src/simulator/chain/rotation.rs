@@ -453,8 +453,8 @@ impl Chain {
         }
     }
 
-    /// Switches relay `index` (from 0) on. If `spare` is true, it waits outside of the chain; otherwise it joins as a
-    /// lost relay that returns.
+    /// Switches relay `index` (from 0) on. If `spare` is true, the relay waits outside of the chain; otherwise the
+    /// relay joins as a lost relay that returns.
     fn switch_on(&mut self, index: usize, spare: bool) {
         let node = u16::try_from(index + 1).unwrap_or(u16::MAX);
         self.setup.spares.retain(|other| *other != node);
