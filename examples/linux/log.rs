@@ -50,7 +50,8 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Requests that the writer thread confirms that all earlier lines are written or dropped.
+    /// Request for a confirmation. The writer thread confirms through the channel once all earlier lines are written or
+    /// dropped.
     Flush(SyncSender<()>),
 }
 

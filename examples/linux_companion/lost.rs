@@ -13,7 +13,7 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost since its start: it does not receive them any more.
+/// Relays that this relay has lost since its start, and does not receive at present.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,

@@ -192,8 +192,8 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Returns the CRC of the record that begins at word `first`. It covers all words but the last, and then the
-    /// journal's key.
+    /// Returns the CRC of the record that begins at word `first`. The CRC covers all words of the record except the
+    /// last, which stores the CRC, and then the journal's key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();
