@@ -48,7 +48,7 @@ impl Rest<'_> {
 
 /// Decodes the body of a message, with the tables of `FORMAT.md` instead of the crate's code.
 ///
-/// Returns the layout of the message and the values of its fields.
+/// Returns the layout of the message and the values of its fields. The body begins with the message tag.
 ///
 /// # Errors
 /// The reason for which a receiver has to reject the body according to the tables.
@@ -65,7 +65,8 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes the message fields `fields` from `body`. Also returns an error text if bytes are missing or left over.
+/// Decodes the message fields `fields` from `body`. Also returns an error text if bytes are missing or left over;
+/// otherwise `None`.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();
