@@ -152,7 +152,8 @@ impl FileOptions {
         })
     }
 
-    /// Removes the options of the file that the command line also gives or excludes by another option.
+    /// Removes the options of the file that the command line overrides. They are also on the command line, or excluded
+    /// by another option there.
     ///
     /// Returns the remaining options, and the overrides. An override is a removed option whose value differs from the
     /// value on the command line.

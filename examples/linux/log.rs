@@ -74,7 +74,7 @@ impl Log {
     /// Starts the writer thread; each line names `source`.
     ///
     /// # Errors
-    /// One line that names the file that can not be opened.
+    /// One line that names the file that cannot be opened.
     pub fn open(options: &LogOptions, source: Source) -> Result<Self, String> {
         let path = options.log_file.clone();
         let file = match &path {

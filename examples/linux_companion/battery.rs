@@ -61,7 +61,8 @@ impl Battery {
 
     /// Returns true while a relay that has just started waits for its endurance.
     ///
-    /// If the battery is low, the relay leaves before it has sent anything, and does not join the chain.
+    /// A relay that restarts with a low battery then leaves before it takes part in any agreement, and does not join
+    /// the chain.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
         let left_s = relay.endurance_s(now);
         if left_s.is_some() && left_s < relay.endurance_limit_s() {

@@ -7,8 +7,8 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 use serde_json::{Value, json};
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// Maximum number of attempts of a socket call. A call can fail because the peer has refused an earlier datagram; the
-/// next call then succeeds.
+/// Maximum number of attempts of a socket call. A call can fail because the peer has refused an earlier datagram, and
+/// is then repeated.
 const ATTEMPTS: usize = 4;
 
 #[derive(Debug)]

@@ -90,7 +90,8 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
 /// measurement of your receiver.
 ///
 /// To estimate the interferer, the relay also needs the drone's position. If the mission gives the interference as a
-/// distribution along x, call `Relay::restart` at the leader after enough samples, so that the chain agrees again.
+/// distribution along x, call `Relay::restart` at the leader after enough samples. The chain then agrees on positions
+/// for the measured interference.
 const fn measured() -> Option<Sample> {
     None
 }

@@ -106,7 +106,8 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Returns the payload of the newest record, if any. `WORDS` must be the payload's length, words.
+    /// Returns the payload of the newest record; `None` if there is no valid record. `WORDS` must be the payload's
+    /// length, words.
     ///
     /// Work: linear in the words of the sectors, and a CRC for the newest valid record and each record stored after
     /// it.

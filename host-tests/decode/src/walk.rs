@@ -21,7 +21,8 @@ impl Rest<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    /// Reads a variable-length integer of the postcard format; an error unless it has its shortest form.
+    /// Reads a variable-length integer of the postcard format. Returns an error if the integer is not in its shortest
+    /// form.
     fn varint(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {

@@ -86,7 +86,7 @@ impl<const IN: usize> Buffers<IN> {
 /// Interval at which the watchdog is fed, unless the relay's timers are late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. For a drone that does not join the chain.
+/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. Used for a drone that does not join the chain.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();

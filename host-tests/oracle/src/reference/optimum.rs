@@ -24,8 +24,8 @@ impl Link {
         }
     }
 
-    /// Returns the largest target SIR (linear) at which a bisection finds that [`Link::feasible`] meets it. It is
-    /// accurate to 1e-13 relative.
+    /// Returns the largest target SIR (linear) that a bisection with [`Link::feasible`] finds. It is accurate to 1e-13
+    /// relative.
     ///
     /// If all relays share one altitude, the result is the optimum. Otherwise it may be below the optimum, because the
     /// greedy chain can fail at one target and succeed at a larger one. `None` without relays, or if every chain has an

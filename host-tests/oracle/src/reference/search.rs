@@ -2,7 +2,7 @@
 
 use super::link::Link;
 
-/// Number of golden-section steps in one grid cell, which shrinks the cell by a factor of about 2e-9.
+/// Number of golden-section steps in one grid cell. They shrink the cell to about 2e-9 of its width.
 const STEPS: usize = 42;
 
 const PEAKS: usize = 4;
