@@ -129,8 +129,7 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks that two recorded optimum SIRs agree for each of forty scenarios. The two were found by searches with
-/// different random seeds.
+/// Checks that the two recorded optimum SIRs of each of forty scenarios agree. They were found by searches with different random seeds.
 ///
 /// [`optima`] has the SIRs of all 2 000 numbered scenarios, without positions. [`optimum`] has the SIRs of forty of
 /// them, with positions.

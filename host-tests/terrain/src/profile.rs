@@ -26,7 +26,7 @@ const MOST_POINTS: f64 = 20_000.0;
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
 pub const SITE_ERROR_M: f64 = 15.0;
 
-/// Distance from a site over which the error of the heights grows, m.
+/// Distance from Tx or Rx at which the assumed error of the heights reaches its full value, m.
 const GROWTH_M: f64 = 100.0;
 
 /// Terrain along the line from Tx to Rx.
@@ -162,7 +162,8 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the point of the earth's surface at `x_m` along the line and `y_m` beside it. Its height is that of the datum.
+    /// Returns the point at `x_m` along the line and `y_m` beside it, at altitude 0. Altitude 0 is the straight line from the ground at Tx
+    /// to the ground at Rx.
     ///
     /// # Errors
     /// A line that names the position, if it is too far from the line.
@@ -203,7 +204,7 @@ impl<'a> Ground<'a> {
     /// Returns the highest ground within `radius_m` of a position, m above the mean sea level.
     ///
     /// # Errors
-    /// Those of [`height_m`](Self::height_m).
+    /// A line that names a position: the elevation files do not cover it, or have no height there.
     pub fn highest_m(&self, node: Node, radius_m: f64) -> Result<f64, String> {
         let rings = (radius_m / self.step_m).ceil().min(64.0);
         let mut highest = self.height_m(node.x_m, node.y_m)?;
@@ -229,7 +230,7 @@ impl<'a> Ground<'a> {
     /// Returns the profile of the hop between two antennas.
     ///
     /// # Errors
-    /// Those of [`height_m`](Self::height_m).
+    /// A line that names a position: the elevation files do not cover it, or have no height there.
     pub fn profile(&self, nodes: [Node; 2]) -> Result<Profile, String> {
         let [from, to] = nodes;
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);

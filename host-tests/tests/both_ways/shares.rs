@@ -10,7 +10,7 @@ impl Shares {
         self.0.push(share);
     }
 
-    /// Returns the ratio that `percent` per cent of the scenes do not reach.
+    /// Returns a percentile of the ratios: `percent` per cent of them are below it.
     pub(crate) fn percentile(&self, percent: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);

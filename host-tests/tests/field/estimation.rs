@@ -16,7 +16,7 @@ const I_MAX_W: f32 = 3.476_175_5e-7;
 /// Statistics of the estimates of Upsilon, the mean inverse interference, for one pair of Beta shapes.
 #[derive(Default, Debug)]
 struct EstimateStatistics {
-    /// Number of samples sets from which an estimate could be made.
+    /// Number of sample sets that were sufficient for an estimate.
     made: u32,
     /// Number of estimates within 5 % of the truth.
     close: u32,

@@ -26,7 +26,7 @@ const NEAR: u16 = 32;
 
 /// Returns the mark of a membership view: passes carry the mission digest plus this mark.
 ///
-/// It is the lower half of the view's 32-bit name plus the byte-swapped upper half.
+/// The mark is the lower half of the view's 32-bit name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

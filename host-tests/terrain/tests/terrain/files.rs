@@ -12,7 +12,7 @@ pub(crate) struct Raster {
     pub(crate) size: [u32; 2],
     pub(crate) epsg: u16,
     pub(crate) nodata: Option<f32>,
-    /// True if the tie point is a height, false if it is the corner of a cell.
+    /// True if the file's tie point is the position of a height, false if it is the corner of a cell.
     pub(crate) is_point: bool,
     /// GDAL's metadata, XML.
     pub(crate) metadata: Option<&'static str>,
