@@ -130,15 +130,14 @@ impl<'a> Ground<'a> {
 
     /// Returns the terrain with an assumed error of its heights: the ground counts as higher by `error_m`.
     ///
-    /// The error is 0 at Tx and at Rx, because their antennas stand on the same ground. It grows to `error_m` over
-    /// 100 m from there.
+    /// The error is 0 at Tx and at Rx, because their antennas stand on the same ground. Within 100 m from Tx or Rx it grows to `error_m`.
     #[must_use]
     pub const fn with_error_m(self, error_m: f64) -> Self {
         Self { error_m, ..self }
     }
 
-    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by
-    /// this amount. It is 0 at Tx and Rx, and grows over 100 m from them.
+    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by this amount. The
+    /// amount is 0 at Tx and Rx, and has its full value 100 m away from them.
     pub fn raise_m(&self, x_m: f64) -> f64 {
         let from_site_m = x_m.min(self.axis.distance_m() - x_m);
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)

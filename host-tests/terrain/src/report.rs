@@ -97,7 +97,7 @@ impl TerrainReport {
     /// Creates the report of a chain with relays at `places`.
     ///
     /// # Errors
-    /// A line that names the place: a part of the terrain is not covered by the elevation files, or a hole.
+    /// A line that names the position: the elevation files do not cover it, or have no height there.
     pub fn new(
         ground: &Ground<'_>,
         places: &[Placement],

@@ -41,7 +41,8 @@ struct Ridge {
 }
 
 impl Ridge {
-    /// Samples the ground. The relays are up to `off_m` beside the line, with an error of `error_m`.
+    /// Samples the ground. The relays are up to `off_m` beside the line, with a position error of up to `error_m`. Also returns the
+    /// altitudes of the antennas of Tx and Rx above the datum, m.
     fn new(ground: &Ground<'_>, [off_m, error_m]: [f64; 2]) -> Result<(Self, [f64; 2]), String> {
         let [tx, rx] = ground.ends;
         let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
@@ -133,7 +134,7 @@ fn steps_of(length_m: f64, step_m: f64) -> (f64, u32) {
 /// for a relay without such an interval around its position.
 ///
 /// # Errors
-/// A line that names the place: it is not covered by the elevation files, or a hole.
+/// A line that names the position: the elevation files do not cover it, or have no height there.
 pub fn rooms(
     ground: &Ground<'_>,
     places: &[Placement],

@@ -175,7 +175,7 @@ impl Chain {
         points
     }
 
-    /// Improves the positions `start` by grid searches around each. The grids become finer when they no longer help.
+    /// Improves the positions `start` by grid searches around each position. When a grid gives no improvement, a finer grid follows.
     ///
     /// Returns the SIR of the worst hop, and the positions. The SIR of a hop is the smaller of forward SIR and
     /// backward SIR / `reverse`.

@@ -96,7 +96,7 @@ const SCRIPT: [&[Fault]; 14] = [
     &[("no quorum", 0, "critical no quorum", "no quorum  ")],
 ];
 
-/// Prints the times of faults: until a companion notices them, and until their alarm, s. Returns texts of late alarms.
+/// Prints the times from each fault until a companion notices it, and until its alarm, s. Returns a text for each late alarm.
 fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     let mut failures = Vec::new();
     for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(times) {
