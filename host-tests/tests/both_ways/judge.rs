@@ -9,7 +9,7 @@ pub(crate) struct Chain {
     pub(crate) powers_w: Vec<f64>,
     /// Altitude of all relays, m; used if `altitudes_m` is empty.
     pub(crate) altitude_m: f64,
-    /// Altitudes of the relays from Tx on, m. Empty if all have the common one.
+    /// Altitudes of the relays from Tx on, m. Empty if all relays have the common altitude.
     pub(crate) altitudes_m: Vec<f64>,
     /// Least distance between two neighbouring relays, m.
     pub(crate) apart_m: f64,

@@ -25,7 +25,7 @@ impl Shares {
         self.percentile(0.0)
     }
 
-    /// Prints the worst, the 1 % and the median ratio as a table row with the label `what`.
+    /// Prints the worst ratio, the first percentile and the median as a table row with the label `what`.
     pub(crate) fn report(&self, what: &str) {
         let [worst, first, median] = [0.0, 1.0, 50.0].map(|percent| self.percentile(percent));
         println!(

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
-/// GeoTIFF that a test writes: north-west height, size of a cell, EPSG code and nodata value.
+/// GeoTIFF that a test writes: position of the north-west height, cell size, EPSG code, nodata value.
 pub(crate) struct Raster {
     pub(crate) corner: [f64; 2],
     pub(crate) cell: [f64; 2],
