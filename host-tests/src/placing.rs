@@ -232,7 +232,8 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
 pub struct Reaches {
     /// Number of hops whose farthest x is short of Rx, because of the target SIR.
     pub inside: u32,
-    /// Number of hops that meet the target SIR at their farthest x, but miss it at some smaller x. The interferer is between the two.
+    /// Number of hops that meet the target SIR at their farthest x, but miss it at some smaller x. The interferer is between these
+    /// positions.
     pub leaps: u32,
     /// Number of hops that meet their target SIR at no position of the receiver.
     pub infeasible: u32,

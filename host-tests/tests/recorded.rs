@@ -24,8 +24,8 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
     );
 }
 
-/// Returns the recorded problems of the tests whose name begins with `set`, and their optima. Problems whose optimum
-/// is recorded without positions are left out.
+/// Returns the recorded problems of all sets whose name begins with `set`, with their optima. A problem is left out if the positions of its
+/// optimum are not recorded.
 fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     let wanted = move |record: &&Record| record.set.starts_with(set);
     let placed = |record: &'static Record| {

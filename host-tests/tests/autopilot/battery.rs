@@ -566,7 +566,7 @@ fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     assert!(!relay.is_at_reserve());
 }
 
-/// Checks that a relay with a low battery does not rejoin the chain by a landing and a take-off.
+/// Checks that a landing and a take-off do not bring a relay with a low battery back into the chain.
 ///
 /// The relay rejoins only after 15 s of high endurance.
 #[test]
@@ -618,7 +618,7 @@ fn a_restarted_autopilot_has_no_home() {
     assert!(pair.relay.endurance_s(pair.vehicle.now).is_some());
 }
 
-/// Checks that the link requests battery messages only while none arrive. They may also stop later.
+/// Checks that the link requests battery messages only while none arrive, at first or later.
 #[test]
 fn messages_of_the_battery_are_requested_while_they_are_missing() {
     let mut pair = Pair::flying(Kind::ArduCopter);

@@ -369,7 +369,7 @@ fn a_fence_breach_by_a_moving_target_is_named() {
     assert_eq!(rig.text_count("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks that a drone flies on by less than 40 m if its pilot gives it to the relay at full speed. Then the drone must stop.
+/// Checks that a drone flies on by less than 40 m if its pilot gives up control at full speed. Then the drone must stop.
 #[test]
 fn a_drone_handed_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

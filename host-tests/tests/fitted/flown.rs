@@ -59,7 +59,7 @@ fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     assert_eq!(at, 1.0, "{what}: {slots:?}");
 }
 
-/// Checks that each time slot is as long as its hop needs for its data at its true SINR.
+/// Checks that each time slot is as long as the hop needs for its data at the hop's true SINR.
 fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
     let places: Vec<Placement> = solved.iter().map(|(at, _)| *at).collect();
     let time = case.time(&places);

@@ -180,8 +180,8 @@ fn a_full_line_is_placed() {
     }
 }
 
-/// Checks that relays refuse fitted slots without the joint method, or with an unknown interferer. They also refuse fitted slots with
-/// `listen`.
+/// Checks that relays refuse fitted slots without the joint method, or with an unknown interferer. They also refuse fitted slots with the
+/// setting `listen`.
 #[test]
 fn fitted_slots_need_the_joint_method() {
     let config = MissionConfig {

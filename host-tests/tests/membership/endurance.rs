@@ -10,8 +10,8 @@ use super::*;
 /// Reserve of all relays in these tests, s. In addition, 180 s are reserved for the replacement of a relay.
 const RESERVE_S: u16 = 180;
 
-/// Returns the setup of a chain of relays with a reserve that runs for `seconds_s`. `left_s` returns a drone's endurance without the way
-/// home, s; its arguments are the relay and the time in s. `None` stands for no new value.
+/// Returns the setup of a simulation of `seconds_s` whose relays have a reserve. `left_s` returns a drone's endurance without the way home,
+/// s; its arguments are the relay and the time in s. `None` stands for no new value.
 fn drained(relays: u16, seconds_s: u16, left_s: impl Fn(u16, u16) -> Option<u16>) -> Setup {
     let mut setup = departing(relays, &[]);
     setup.reserve = Some(Duration::from_millis(1_000 * u64::from(RESERVE_S)));
