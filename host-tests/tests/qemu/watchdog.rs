@@ -11,7 +11,7 @@ use crate::fleet::{Image, PATIENCE, image};
 /// Trace prefix of QEMU's device at the watchdog's address.
 const DEVICE: &str = "I2S2ext: unimplemented device write (size 4, ";
 
-/// Register writes that start, unlock and set the watchdog to 6 s, and feed it.
+/// Register writes that start the watchdog, unlock it, set it to 6 s and feed it, in this order.
 const BEGINS: [&str; 5] = [
     "offset 0x000, value 0x0000cccc)",
     "offset 0x000, value 0x00005555)",

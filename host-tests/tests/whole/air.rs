@@ -140,7 +140,7 @@ pub(crate) struct Air {
     pub(crate) spare: usize,
     /// Total time in which at most `spare` relays had no position of the common agreement, µs.
     pub(crate) flown_us: u64,
-    /// Time at which at most `spare` relays had no position of the common agreement for the first time, µs.
+    /// First time at which at most `spare` relays had no position of the common agreement, µs. `None` before then.
     pub(crate) first_us: Option<u64>,
     /// Longest time in which more than `spare` relays lacked an agreed position, µs.
     pub(crate) longest_us: u64,

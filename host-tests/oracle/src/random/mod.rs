@@ -91,7 +91,7 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     }
 }
 
-/// Returns the link with receiver noise of 1e-6 to 1e4 times the interference at a random position. The noise stays
+/// Returns the link with added receiver noise. The noise is 1e-6 to 1e4 times the interference at a random position,
 /// within the limit of a mission.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);
