@@ -89,7 +89,8 @@ fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     quads
 }
 
-/// Returns f64 to try in an offer: limits, multiples of its path-loss factors, and their neighbours.
+/// Returns f64 to try in an offer: limits, path-loss factors, and the f64 next to each of these. The factors are the
+/// body's own, and 1e20 times these.
 fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     let own = body
         .windows(8)

@@ -41,7 +41,7 @@ pub struct Most {
     pub relays: u16,
 }
 
-/// Lowest target SIR of [`Most::of`], as a fraction of the highest possible SIR of the first hop.
+/// Lowest target SIR that [`Most::of`] tries, as a fraction of the first hop's highest possible SIR.
 const DEPTH: f32 = 1e-20;
 
 /// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
@@ -104,7 +104,8 @@ impl Most {
 
 /// Returns positions with which the mission's N relays meet the SIR `target`, relay 1 first.
 ///
-/// `None` if they do not meet it. Every hop but one has its maximum length, and meets the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
+/// `None` if they do not meet it. All hops but one have their maximum length, and their SIR is `target` to 1e-4 relative. Work: at most two
+/// chains, each with a reach and a required position for every relay.
 pub fn places(
     mission: &Mission,
     target: f32,
@@ -207,7 +208,7 @@ fn ends<F: Fn(u16) -> Profile>(
     is_complete.then(|| chain.link(at).ending(chain.target, before_m, reach))?
 }
 
-/// Returns true if the reaches of a pass end within the last hop.
+/// Returns true if the last hop meets the target when every relay is at its reach.
 fn closes<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     ends(chain, |_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
@@ -240,7 +241,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>>
     Some(places)
 }
 
-/// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
+/// Largest number of relays tried beyond the minimum, if the minimum separation makes the minimum fail.
 const MORE: u16 = 32;
 
 const TARGETS: u8 = 48;
@@ -282,12 +283,11 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target SIR that the mission's N relays meet, all with `profile`, in a field. It is linear, to
-/// an f32's step.
+/// Returns the highest target SIR that N relays with the same `profile` meet in a field. It is linear, and exact to one f32 step.
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
-/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven
-/// field. Work: 48 chains, each three square roots for every point of the field and relay.
+/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
+/// each three square roots for every point of the field and relay.
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
     let met = |target: f32| is_met_by_equals(mission, target, profile);

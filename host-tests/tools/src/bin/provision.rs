@@ -678,9 +678,9 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
         .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
-/// Tells the user which options override the scenario's section `network`.
+/// Prints which options override values of the scenario's section `network`.
 ///
-/// Users must not rely on a value of the file that is not used.
+/// Otherwise a user could rely on a value of the file that is not used.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
         command::print_line(&format!(
@@ -713,11 +713,10 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
     }
 }
 
-/// Returns the method to provision. It comes from the command line or plan, else from the section; else it is
-/// `align`.
+/// Returns the method to provision: `method`, else that of the section `network`, else `align`.
 ///
-/// `of_file` is the method in section `network`. A plan made with another method is rejected; an option that
-/// overrides the section is reported.
+/// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If the two differ, the
+/// plan's method is rejected; the command line's is used, and this is printed.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

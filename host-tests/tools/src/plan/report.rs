@@ -381,7 +381,7 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
-    /// Location of the interferer in its area by relays with `[listen]`; absent without.
+    /// Location of the interferer in its area by relays with `[listen]`; absent without `[listen]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub locating: Option<Locating>,
     /// True if relays may leave the line sideways: the table then has a column for y.
