@@ -87,7 +87,7 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers.
+    /// Returns true while the drone follows the relay's setpoints, also while it hovers at one.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }

@@ -402,8 +402,8 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the smallest x, m, such that no position between this x and `point` is better than `point`. A position is better if it
-    /// receives the next relay's signal from farther away, at some rate step of the way back.
+    /// Returns the smallest x, m, such that no position between this x and `point` is better than `point`. A position
+    /// is better if it receives the next relay's signal from farther away, at some rate step of the way back.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

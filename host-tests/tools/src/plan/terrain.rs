@@ -167,7 +167,7 @@ impl Elevation {
 /// Largest number of samples along one side of an area.
 const SAMPLES: f64 = 200.0;
 
-/// Returns points of an area and its boundary at most `step_m` apart, or at a 200th of its sides.
+/// Returns points of an area and its boundary, spaced at most `step_m` or a 200th of the area's side.
 fn sampled(area: &Area, step_m: f64) -> Vec<[f64; 2]> {
     let [low, high] = area.bounds();
     #[expect(

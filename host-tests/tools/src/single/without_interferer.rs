@@ -133,11 +133,10 @@ fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> 
     [one.min(other), one.max(other)]
 }
 
-/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without
-/// a field.
+/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without a field.
 ///
-/// It only evaluates positions where the second hop's mean SIR is one of its targets, so it may miss the optimum of a
-/// field that changes much between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// The algorithm evaluates only positions at which the second hop's mean SIR equals one of its targets. It can miss the optimum of a field
+/// that changes much between two such positions. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two::new(mission, profile);
