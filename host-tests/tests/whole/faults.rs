@@ -100,8 +100,8 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
 }
 
 /// Checks that a relay outside the chain does not attract a relay of the chain. Relay 3 is left out of the chain, and
-/// has links to neither relay 1 nor relay 2. An error in relay 3's hello could count relays 1 and 2 as connected to
-/// relay 3. Relay 6 would then choose relay 3 as its neighbour in place of relay 5 every 16 s.
+/// has links to neither relay 1 nor relay 2. Its hello must not count these two as connected to it: otherwise relay 6
+/// chooses relay 3 as its neighbour in place of relay 5 every 16 s.
 #[test]
 fn a_left_out_relay_attracts_no_other() {
     let (air, share) = flown_with_flaps(2, (10_191_000, 25_107_000), 325);
@@ -112,7 +112,7 @@ fn a_left_out_relay_attracts_no_other() {
 /// Random seeds of links that stay up a little longer than the longest hold-down of 90 s.
 ///
 /// After repeated losses of a link, a relay does not use the link until the hold-down has passed. In these runs one end
-/// of the link uses the link again before the other end. Soon afterwards the link is lost again.
+/// of the link uses it earlier than the other end. Soon afterwards the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
 /// Checks that one flapping link costs at most a tenth of the time with agreed positions. The link fails and returns

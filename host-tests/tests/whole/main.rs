@@ -268,8 +268,8 @@ fn a_relay_with_far_later_views_joins_within_120_s() {
 
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
-/// Returns the number of chains, the results of those that recovered late, and the results of those in which two
-/// agreements were in use at the same time.
+/// If `forward`, about half of the steps are forward, otherwise all are back. Returns the number of chains, the results
+/// of those that recovered late, and the results of those in which two agreements were in use at the same time.
 fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);

@@ -162,8 +162,8 @@ struct Flight {
 impl Flight {
     /// Returns the messages of a step with the ports at which they arrive.
     ///
-    /// These are the step's message, and perhaps the next neighbour's answer if the message starts a round along the
-    /// chain.
+    /// The first is the step's message. If it starts a round along the chain, and `answered` is true, the next
+    /// neighbour's answer follows.
     fn messages(&mut self, step: &Step) -> Vec<(Port, WireMessage)> {
         let (from, to) = self.ports;
         let tag = step.message.tag();

@@ -101,7 +101,7 @@ fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     near.chain(strange).map(f64::to_le_bytes).collect()
 }
 
-/// Asserts that the crate decodes or refuses a body as the tables of the format do. Returns the verdict.
+/// Asserts that the crate decodes or refuses a body as the tables of the format do. Returns the result of both.
 fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     let read = Message::decode(body);
     let verdict = read.as_ref().map(|_| ()).map_err(|error| *error);
@@ -112,7 +112,7 @@ fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     verdict
 }
 
-/// Numbers of message bodies by verdict: accepted, wrongly encoded, out of range.
+/// Numbers of message bodies by result of decoding: accepted, wrongly encoded, out of range.
 #[derive(Default, Debug)]
 struct VerdictCounts([usize; 3]);
 

@@ -168,10 +168,10 @@ fn unexpected_or_unfit_messages_are_stale() {
     }
 }
 
-/// Checks that a sweep message drops the target SIRs that would need its sender beyond Rx.
+/// Checks that a sweep message drops the target SIRs that would put its sender beyond Rx.
 ///
-/// In a field of interference, the message lists the position that its sender needs for each target SIR. Here no
-/// target remains, so that the relay forwards an empty list.
+/// In a field of interference, the message lists the position that its sender needs for each target SIR. Here no target
+/// remains, so that the relay forwards an empty list.
 #[test]
 fn a_reach_beyond_rx_leaves_no_feasible_target() {
     let (mut bench, from, to) = relay_4(mission(Interference::Field(FIELD)));

@@ -76,9 +76,9 @@ fn a_returning_neighbours_newer_view_causes_a_request() {
     }
 }
 
-/// Checks that a relay holds a sweep message back while its next neighbour has chosen another node.
+/// Checks that a relay forwards no sweep message while its next neighbour has chosen another node.
 ///
-/// It forwards the message once the neighbour has chosen this relay.
+/// The relay forwards the message once the neighbour has chosen this relay.
 #[test]
 fn a_pass_waits_for_a_neighbour_busy_with_another() {
     let (mut bench, sweep) = sixth();

@@ -16,8 +16,7 @@ use super::signed::{NOW, SignedBench, settings};
 use super::uploads::fourth;
 use super::votes::{FLIES, REFUSED, WHOLE, hello};
 
-/// Latitude, longitude and height of Tx, then of Rx, in units of 1e-7 degrees and mm. Their distance is 1 km within 1
-/// mm.
+/// Latitude, longitude and height of Tx, then of Rx, in units of 1e-7 degrees and mm. Their distance is 1000.000 m.
 const A_KILOMETRE: [i32; 6] = [
     474_000_000,
     85_400_000,

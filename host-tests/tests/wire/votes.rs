@@ -90,7 +90,8 @@ pub(crate) fn loaded_hello(newest: u32, mission: u16, neighbour: u16, flags: u8)
 
 /// Returns a copy of a hello with other values for received nodes and connected relays.
 ///
-/// Bit 0 of `hears` is the nearest node. `behind` is the number of connected relays from the sender (included) away from the destination.
+/// Bit 0 of `hears` is the nearest node. `behind` is the number of connected relays from the sender (included) away
+/// from the destination.
 pub(crate) fn with_neighbours(hears: u8, behind: u16, hello: &WireMessage) -> WireMessage {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

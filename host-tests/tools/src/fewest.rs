@@ -218,8 +218,8 @@ fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     closes(chain) && (closes(&chain.plainly()) || chain.place(0).is_some())
 }
 
-/// Returns positions that meet the target; `None` if there are none. It first computes each relay's reach, the farthest
-/// x at which its hop meets the target; then, from the last relay back, the x that the next hop requires.
+/// Returns positions that meet the target; `None` if there are none. The function first computes each relay's reach, the farthest x at
+/// which its hop meets the target; then, from the last relay back, the x that the next hop requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let mut places = vec![Placement::default(); usize::from(chain.mission.relays())];

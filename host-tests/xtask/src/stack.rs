@@ -53,8 +53,8 @@ pub struct Calls {
 impl Calls {
     /// Parses a `disassembly` by `llvm-objdump -d --no-show-raw-insn` into a call graph.
     ///
-    /// `constants` are the words of the read-only data: an odd one that is a function's address plus 1 is a pointer
-    /// to that Thumb function.
+    /// `constants` are the words of the read-only data. An odd word that equals a function's address plus 1 is a pointer to that Thumb
+    /// function.
     ///
     /// # Errors
     /// [`StackError::Dynamic`] for a function that moves the stack pointer by a register.

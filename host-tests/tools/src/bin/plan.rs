@@ -250,7 +250,7 @@ fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Resul
     })
 }
 
-/// Plans a given number of relays with the terrain in the objective.
+/// Plans a given number of relays. The hops' SIRs include the diffraction losses of the terrain.
 fn above_terrain(
     scenario: &Scenario,
     ask: &PlanRequest,
@@ -282,7 +282,7 @@ fn above_terrain(
     })
 }
 
-/// Compares a plan over `terrain` with the plan that ignores it.
+/// Compares a plan over `terrain` with the plan that ignores the terrain.
 fn compared(
     scenario: &Scenario,
     ask: &PlanRequest,
@@ -706,9 +706,9 @@ fn joined(lines: [Option<String>; 2]) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("; "))
 }
 
-/// Computes the location of the interferer by relays with `[listen]`, and writes the maps.
+/// Computes how well relays with `[listen]` locate the interferer, and writes the maps.
 ///
-/// They are the files of `--area-svg`, `--area-geojson` and `--listen-svg`.
+/// The maps are the files of `--area-svg`, `--area-geojson` and `--listen-svg`. `None` without `[listen]`.
 fn over_area(
     options: &Options,
     scenario: &Scenario,

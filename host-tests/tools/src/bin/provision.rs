@@ -287,7 +287,7 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
-    /// Simulates the flight over terrain and no-fly areas. Returns it if there is terrain, and the positions are known.
+    /// Simulates the flight over terrain and no-fly areas. `None` without terrain, or if the positions are not known.
     ///
     /// # Errors
     /// A hop that is blocked, a relay too low or too high, or elevation files that cannot be used.
@@ -334,7 +334,7 @@ impl<'a> Asked<'a> {
         Ok(Some(flight))
     }
 
-    /// Prints that terrain and no-fly areas of the scenario are not checked, and why.
+    /// Prints why terrain and no-fly areas of the scenario are not checked. Returns `None`: no flight is simulated.
     fn unchecked(&self, why: &str) -> Option<Simulated> {
         let has_terrain = self.scenario.terrain.is_some();
         for (what, is_there) in [
@@ -348,7 +348,7 @@ impl<'a> Asked<'a> {
         None
     }
 
-    /// Returns true if files for the whole flight are asked for.
+    /// Returns true if the user requests files for all relays.
     const fn is_whole(&self) -> bool {
         self.options.folder.all || self.options.folder.bundle.is_some()
     }
@@ -716,7 +716,7 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
 /// Returns the method to provision: `method`, else that of the section `network`, else `align`.
 ///
 /// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If the two differ, the
-/// plan's method is rejected; the command line's is used, and this is printed.
+/// plan's method is rejected; the command line's method is used, and the user is told.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

@@ -42,9 +42,9 @@ impl Chain {
 /// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
 /// `host-tests/tests/multi_interferer`).
 ///
-/// If the minimum separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a
-/// position when another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the
-/// relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
+/// If the minimum separation binds, the SIR is the best of the chains that keep it. Without a minimum separation,
+/// relays may share a position when another hop is the bottleneck. `None` without relays or interferers, if altitudes
+/// differ, if the relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
 ///
 /// Work: about 50 targets, twice with a minimum separation. For each target: some thousand points of the line per
 /// change of power along the chain, and a few intervals per relay.

@@ -28,7 +28,7 @@ const COLOURS: [[f64; 3]; 5] = [
 /// Number of steps of the legend.
 const STEPS: u32 = 5;
 
-/// Quantity of a map.
+/// Quantity that a map shows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Shown {
     /// SIR of the worst hop.

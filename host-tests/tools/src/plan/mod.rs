@@ -144,11 +144,11 @@ pub struct Fitted {
     /// True if the plan has the positions for the hypothetical interferer. False if it has the best positions found
     /// against all interferers.
     pub kept: bool,
-    /// Loss by the positions for the hypothetical interferer, as a fraction of the plan's SIR, 0 to 1. It is a loss of data rate if each
-    /// time slot is as long as its hop needs. `None` if no such positions were found.
+    /// Loss by the positions for the hypothetical interferer, as a fraction of the plan's SIR, 0 to 1. It is a loss of
+    /// data rate if each time slot is as long as its hop needs. `None` if no such positions were found.
     pub loss: Option<f64>,
-    /// True if the data rate decides which positions are better, because the time slots are fitted. A fitted slot is as long as its hop
-    /// needs.
+    /// True if the data rate decides which positions are better, because the time slots are fitted. A fitted slot is as
+    /// long as its hop needs.
     pub by_rate: bool,
 }
 
@@ -279,8 +279,8 @@ impl Plan {
     }
 }
 
-/// Returns the data link, with a bandwidth of 1 Hz, if the relays maximise the data rate. Their time slots are then fitted: as long as each
-/// hop needs. `None` if the relays maximise the SIR.
+/// Returns the data link, with a bandwidth of 1 Hz, if the relays maximise the data rate. Their time slots are then
+/// fitted: as long as each hop needs. `None` if the relays maximise the SIR.
 fn fitted_radio(scenario: &Scenario, free_altitude: bool) -> Option<Radio> {
     let fits = free_altitude && scenario.has_fitted_slots();
     let link = scenario.link.clone().filter(|_| fits)?;

@@ -169,7 +169,7 @@ pub struct FlownRelay {
     pub x_m: f32,
     /// Altitude of its position above the line between the sites, m.
     pub altitude_m: f32,
-    /// Interval of x, m, in which no hop gets worse while its neighbours are in their intervals.
+    /// Interval of x, m, in which no hop gets worse while this relay's neighbours are in their intervals.
     ///
     /// Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -197,7 +197,7 @@ pub struct Flight {
     /// Gain of the plan for the terrain over these positions, dB; absent if the plan has these positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
-    /// Largest distance of a relay from its position in the plan for the terrain, m; absent as `loss_db`.
+    /// Largest distance of a relay from its position in the plan for the terrain, m. Absent if the plan has these positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Positions of the relays.
@@ -207,7 +207,7 @@ pub struct Flight {
     position_error_m: f64,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
-    /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high.
+    /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high. `None` if they can.
     #[serde(skip)]
     pub problem: Option<String>,
 }
@@ -265,7 +265,7 @@ impl Flight {
         })
     }
 
-    /// Adds the difference from a `plan` with other positions, and `terrain_sir_db` with terrain.
+    /// Adds the differences from `plan`. `terrain_sir_db` is the SIR of its worst hop with terrain.
     #[must_use]
     pub fn compared(self, plan: &Plan, terrain_sir_db: f64) -> Self {
         let apart = plan.places.iter().zip(&self.relays).map(|((from, _), to)| {
@@ -435,7 +435,7 @@ fn losses(
 /// Reason for the user why nothing is known after the loss of a relay.
 const NOWHERE: &str = "the other relays find no positions";
 
-/// Returns a warning for each relay whose loss leads another one into a no-fly area.
+/// Returns a warning for each relay whose loss leads another relay into a no-fly area.
 ///
 /// The flight is simulated without terrain. There are no warnings without no-fly areas.
 ///

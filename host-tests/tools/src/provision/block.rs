@@ -154,7 +154,6 @@ impl Flight {
     /// Sets the time slots of the relays as `scenario` describes them, if their method is the joint method.
     ///
     /// # Errors
-    ///
     /// [`BlockError::Refused`] if the relays cannot use slots that are as long as each hop needs.
     pub fn with_access(self, scenario: &Scenario) -> Result<Self, BlockError> {
         if self.method != Method::Joint {

@@ -473,7 +473,6 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
 /// The entries name files that the program writes. A missing entry stays missing.
 ///
 /// # Errors
-///
 /// An absolute path is in another folder.
 fn written_files(section: &mut dyn TableLike, name: &str, keys: &[&str]) -> Result<(), String> {
     for key in keys {
@@ -520,10 +519,9 @@ fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
     section.insert(key, value(path.display().to_string()));
 }
 
-/// Returns the udev rules for the ports `ports`. A port needs no rule if its name is not of the bundle.
+/// Returns the udev rules for the ports `ports` whose names begin with [`LINK`]. Other ports need no rule.
 ///
 /// # Errors
-///
 /// A name of a port has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.
 fn rules(section: &dyn TableLike, ports: &[&str]) -> Result<String, String> {
     let paths = ports.iter().filter_map(|port| section.get(port)?.as_str());

@@ -376,7 +376,7 @@ fn fitted_slots_with_free_altitudes_are_planned_as_on_board() {
     }
 }
 
-/// Checks that the list of rates with free altitudes has the same rates as single plans, both ways.
+/// Checks that the list of rates with free altitudes has the rates of single plans, in both directions.
 #[test]
 fn rates_with_free_altitudes_are_those_of_the_plans() {
     for access in ["slots", "fitted"] {

@@ -49,7 +49,7 @@ type Image = (
 
 /// Firmware images whose costs are measured, with the largest permitted flash, static RAM and stack.
 ///
-/// Relay and ground station share some code. In an image with `auth` this sharing adds 0.4 KB of flash, and saves 0.8
+/// Relay and ground station share some code. This sharing costs an image with `auth` 0.4 KB of flash, and saves it 0.8
 /// KB of stack.
 const IMAGES: &[Image] = &[
     (
