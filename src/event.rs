@@ -6,7 +6,7 @@
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event of the relay that a firmware may react to. The firmware reads the changed state from the relay.
+/// Event of the relay, to which a firmware can react. The firmware reads the changed state from the relay.
 ///
 /// A field `node` is a relay's index in the chain as configured before flight, as in
 /// [`Relay::neighbours`](crate::Relay::neighbours).

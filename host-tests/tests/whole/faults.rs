@@ -100,8 +100,8 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
 }
 
 /// Checks that a relay outside the chain does not attract a relay of the chain. Relay 3 is left out of the chain, and
-/// has links to neither relay 1 nor relay 2. Its hello must not count these two as connected to it: otherwise relay 6
-/// chooses relay 3 as its neighbour in place of relay 5 every 16 s.
+/// has links to neither relay 1 nor relay 2. Relay 3's hello must not count these two as connected to relay 3:
+/// otherwise relay 6 chooses relay 3 as its neighbour in place of relay 5 every 16 s.
 #[test]
 fn a_left_out_relay_attracts_no_other() {
     let (air, share) = flown_with_flaps(2, (10_191_000, 25_107_000), 325);

@@ -310,7 +310,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
 
 /// Checks that clocks that step forward seldom let two agreements be in use at the same time.
 ///
-/// A relay whose clock steps forward stops waiting for the leases of others too early. Two parts of the chain may
+/// A relay whose clock steps forward stops waiting for the other relays' leases too early. Two parts of the chain can
 /// then use different agreements until these leases expire.
 #[test]
 fn clocks_that_step_forward_seldom_split_the_chain() {

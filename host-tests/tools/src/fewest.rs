@@ -49,15 +49,13 @@ const DEPTH: f32 = 1e-20;
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// Returns the minimum number of relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`]. `target` is
-    /// a linear SIR above 0.
+    /// Returns the minimum number of relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR above 0.
     ///
-    /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive
-    /// count if `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a
-    /// reach for each relay, and all of them again with a minimum separation; in an interference field at most 32
-    /// chains of equal relays.
+    /// The mission's own number of relays is ignored. `profile_of` returns the profile of relay 1..=N. If the result is `proven`, it equals
+    /// an exhaustive count: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work with one interferer: a reach for each relay,
+    /// and two reaches with a minimum separation. Work in an interference field: at most 32 chains of equal relays.
     ///
-    /// `None` if no number of relays meets it; [`Most::of`] returns the best that they can meet.
+    /// `None` if no number of relays meets the target; [`Most::of`] returns the best target that they can meet.
     pub fn of(mission: &Mission, target: f32, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let found = counted(mission, target, &profile_of)?;
         if !(mission.config().min_separation_m > 0.0) || !found.proven {

@@ -43,7 +43,7 @@ impl std::fmt::Display for StackError {
 
 impl std::error::Error for StackError {}
 
-/// Call graph of an image: functions by address, and functions that may be called through a pointer.
+/// Call graph of an image: functions by address, and functions that can be called by pointer.
 #[derive(Clone, Debug, Default)]
 pub struct Calls {
     functions: BTreeMap<u64, Function>,

@@ -52,7 +52,7 @@ const AROUND: i32 = 2;
 /// Comparison of the positions for the terrain with the positions that ignore the terrain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OverTerrain {
-    /// SIR of the worst hop with terrain, dB, at the positions that ignore it. Absent without such positions.
+    /// SIR of the worst hop with terrain, dB, at the positions that ignore the terrain. Absent without such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
     /// Gain of the plan compared with the positions that ignore the terrain, dB.

@@ -176,12 +176,12 @@ pub struct FlownRelay {
     pub room_m: Option<[f64; 2]>,
 }
 
-/// Terrain below the chain after the loss of one relay, when the others have closed the gap.
+/// Terrain below the chain after the loss of one relay, when the other relays have closed the gap.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Without {
     /// Number of the lost relay.
     pub lost: u16,
-    /// SIR of the worst hop with terrain, dB; absent if the others find no positions.
+    /// SIR of the worst hop with terrain, dB; absent if the other relays find no positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_sir_db: Option<f64>,
     /// Problems in this chain: blocked hops; relays or paths that are too low or in a no-fly area. Absent if there are none.

@@ -297,7 +297,8 @@ impl Bundle<'_> {
 
     /// Returns the parameters that the chain needs in the autopilot of relay `index`.
     ///
-    /// Drones return at different altitudes, because a returning drone crosses the line of the others.
+    /// Drones return at different altitudes, because a returning drone crosses the line along which the other drones
+    /// fly.
     ///
     /// # Errors
     /// The highest altitude is above the range of a fence.

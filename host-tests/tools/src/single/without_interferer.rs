@@ -42,8 +42,8 @@ pub struct Noise {
 
 /// Returns the optimal position of a relay with `profile` against `noise` only, and its SNR (linear).
 ///
-/// Only the mission's distance, Tx power and channel are used. The altitude is that of `profile`; a lower one is
-/// always better. Constant work.
+/// Only the mission's distance, Tx power and channel are used. The relay flies at the altitude of `profile`; a lower altitude would always
+/// be better. Constant work.
 pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found {
     let config = mission.config();
     let (d, h) = (config.distance_m, profile.altitude_m);
