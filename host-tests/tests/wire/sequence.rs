@@ -135,9 +135,9 @@ fn a_token_is_forwarded_and_its_result_returned() {
 
 /// Checks that messages that the relay does not await are stale.
 ///
-/// The relay does not await an answer to another message, a message of another kind, and a message of a round that is
-/// over. A token (message of Algorithm 2) is stale if the relay has no position, if the interference is a field, or if
-/// the token's position is beyond Rx.
+/// The relay does not await answers to other messages, messages of another kind, or messages of a round that is over. A
+/// token (message of Algorithm 2) is stale if the relay has no position, if the interference is a field, or if the
+/// token's position is beyond Rx.
 #[test]
 fn unexpected_or_unfit_messages_are_stale() {
     for config in missions() {

@@ -30,7 +30,7 @@ pub const MOST_RELAYS: u16 = 50;
 /// Number of altitudes of the first grid at each x.
 const LEVELS: u32 = 12;
 
-/// Largest number of points of a hop's profile during the search, relative to the whole line.
+/// Largest number of terrain points along the whole line during the search. A hop has its share of them.
 const POINTS: f64 = 800.0;
 
 /// Largest number of points of a profile at the end of the search, as in reports.
@@ -111,7 +111,7 @@ pub struct Search<'a> {
 impl<'a> Search<'a> {
     /// Creates a search above the line of the scenario, with at most 800 points of a profile.
     ///
-    /// On a longer line each point has the height of the highest ground near it.
+    /// If the line has more terrain cells, each point has the height of the highest ground near it.
     ///
     /// # Errors
     /// A line that names the position: the elevation files do not cover it, or have no height there.
