@@ -348,7 +348,7 @@ impl<'a> Asked<'a> {
         None
     }
 
-    /// Returns true if the user requests files for all relays.
+    /// Returns true with the option `--all` or `--bundle`.
     const fn is_whole(&self) -> bool {
         self.options.folder.all || self.options.folder.bundle.is_some()
     }
