@@ -28,7 +28,7 @@ pub(crate) struct Block {
     pub(crate) kind: Kind,
     /// True for a block `console`: lines that begin with `$ ` are commands, the others are output.
     is_console: bool,
-    /// True if numbers in the output may differ from those on the page, such as times.
+    /// True if numbers in the output, such as times, are permitted to differ from those on the page.
     pub(crate) noisy: bool,
     lines: Vec<String>,
 }
