@@ -286,8 +286,7 @@ impl Axis {
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle between the directions of this line and `other` at their Tx, radians in [0, π]. Constant
-    /// work.
+    /// Returns the angle between this line and the line `other`, each at its own Tx, radians in [0, π]. Constant work.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }

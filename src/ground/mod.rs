@@ -212,9 +212,9 @@ impl Ground {
     /// long enough for the relative error of [`Listen`](crate::Listen). One measurement per
     /// [`Listen::every`](crate::Listen::every) is enough.
     ///
-    /// A link carries one frame of 23 bytes and a tag, a shared channel one to each of the four nearest relays. A
-    /// relay that is absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next one
-    /// replaces a lost one.
+    /// Over a wire one frame of 23 bytes and a tag is sent, on a shared channel one such frame to each of the four
+    /// nearest relays. A relay that is absent or has restarted is sent a handshake instead. Reports are not
+    /// acknowledged: the next one replaces a lost one.
     pub fn measured(&mut self, power_w: f32) -> bool {
         if !is_level(power_w) {
             return false;

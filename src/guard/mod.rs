@@ -121,8 +121,8 @@ pub struct Guard {
     owner: FenceOwner,
     /// True while this relay requests a halt of the chain.
     ///
-    /// Either it is on the wrong side of a neighbour, or its order along x was unknown for several seconds
-    /// (reminders) in a row.
+    /// Reason: it is on the wrong side of a neighbour, or its order along x was unknown for several seconds (reminders)
+    /// in a row.
     disorder: bool,
     /// Number of seconds (reminders) in a row in which the order along x was unknown.
     unordered: u8,
@@ -176,8 +176,8 @@ impl Guard {
 
     /// Handles a position report of the flight controller, measured at time `at`.
     ///
-    /// The first setpoint is a position reported since the start, with its altitude and lateral offset, even outside
-    /// of the geofence, but within [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
+    /// The first setpoint is a reported position, measured after the start. It can be outside of the geofence, within
+    /// [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
     pub fn position(&mut self, at: Instant, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
@@ -259,8 +259,8 @@ impl Guard {
     /// neighbour.
     ///
     /// The previous neighbour may still hover. This relay keeps clear of the previous neighbour until
-    /// [`forget`](Self::forget) is called. It also ends when the previous neighbour, or a node between the two, is
-    /// linked and has sent a message.
+    /// [`forget`](Self::forget) is called. It also stops to do so once the previous neighbour, or a node between the
+    /// two, has become the neighbour and has sent a message.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {

@@ -30,8 +30,8 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the path compute for long. They do so before they forward the
-/// message. Their frames are then twice as long, and each relay may take thirty steps of a computation.
+/// Factor on the wait for a reply if the relays on the path first compute for long, then forward. Such frames are twice
+/// as long, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
 /// Number of retransmissions after which the wait before the next retransmission no longer doubles. After n

@@ -94,9 +94,9 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. This is so if
-    /// the settings select the joint method, and the mission leaves the lateral offset or the altitude free, or has
-    /// fitted slots (as long as each hop needs).
+    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. This is so if the
+    /// settings select the joint method, and the mission leaves the lateral offset or the altitude free, or has fitted
+    /// slots (time slots that are as long as each hop needs).
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();

@@ -100,7 +100,7 @@ pub(crate) struct Lease {
 #[derive(Clone, Copy, Debug)]
 struct Departures {
     requests: Requests,
-    /// Number of relays of the view when no relay requested to leave.
+    /// Number of relays that the view had when no relay requested to leave.
     complement: u16,
     /// Relay that requests to leave, 0 for none, and the time of its first request. Requests in earlier views count,
     /// too.
@@ -156,12 +156,13 @@ impl Lease {
         self.current.is_some() && !self.circulation.is_outstanding()
     }
 
-    /// Returns the leader's orders for the next renewal, by the requests in the last renewal.
+    /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If
-    /// there is a spare, it joins first, unless the view already has more relays than without requests. A relay that
-    /// does not arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than
-    /// that duration, or than its remaining endurance: so half of the endurance remains.
+    /// A relay is ordered to leave once all relays were in place in two consecutive renewals. The relay that left
+    /// before it has then received this information. If there is a spare, the spare joins first, unless a spare has
+    /// joined already: the view then has more relays than before the request. A relay that does not arrive counts as in
+    /// place after half of the maximum duration of a lease. No relay waits for the order longer than this maximum
+    /// duration, or than its remaining endurance. So at least half of the endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -238,10 +239,10 @@ impl Lease {
 
     /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before `rest`.
     ///
-    /// A member of `base` that has not accepted `view` may still have a lease. No renewal completes without all
-    /// members, so if this relay was a member, that lease ends by `vouched_until`. The age of an outstanding renewal
-    /// counts as a round trip only if this relay was a member of `base` and no relay is `lost`; otherwise it measures
-    /// an outage.
+    /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
+    /// that lease ends by `vouched_until`, because no renewal completes without all members. The age of an outstanding
+    /// renewal counts as a round trip only if this relay was a member of `base` and `lost` is false. If a relay is lost
+    /// (`lost` is true), the age measures an outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,

@@ -200,7 +200,7 @@ impl MissionUpdate {
     }
 
     /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. "Recent" means within the
-    /// last two `dead_after`.
+    /// last two periods of `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -309,8 +309,8 @@ impl MissionUpdate {
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the last refused mission. `None` if there is none, if it is `active`, or if the stored mission is
-    /// newer.
+    /// Returns the last refused mission. `None` if there is none, if it is the mission `active`, or if the stored
+    /// mission is newer.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
@@ -469,9 +469,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the limit exceeded.
     ///
-    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. If a relay has a fixed
-    /// altitude, this altitude may be the lower or upper limit of its geofence. Then the limit of the loaded mission
-    /// counts instead, because all relays must decide alike.
+    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. If the fixed altitude of a
+    /// relay is the lower or upper limit of its geofence, the limit of the loaded mission counts instead. Reason: all
+    /// relays must decide alike.
     fn encloses(
         &self,
         member: &Member,

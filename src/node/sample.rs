@@ -35,14 +35,14 @@ pub enum Sample {
     },
     /// Mean interference power at a position, for the estimate of an unknown interferer.
     ///
-    /// The firmware averages it until the relative error of the mean is the one in
-    /// [`Listen`](crate::sensing::Listen). It excludes the signals of the chain, and includes the receiver's noise,
-    /// which the relay subtracts (`MissionConfig::noise_w`).
+    /// The firmware averages the power until the relative error of the mean is the error stated in
+    /// [`Listen`](crate::sensing::Listen). The power excludes the signals of the chain, and includes the receiver's
+    /// noise; the relay subtracts this noise (`MissionConfig::noise_w`).
     Heard {
         /// Position of the drone at the measurement. Each coordinate differs from the coordinate of Tx by at most 100
         /// times the distance from Tx to Rx.
         at: Placement,
-        /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
+        /// Received power, W. It must exceed the receiver's noise by 1e-30 to 1e6 W (`MEASURED_W`).
         power_w: f32,
     },
     /// Mean interference power measured at Tx, on the ground. The firmware gives it to one of the first four relays,

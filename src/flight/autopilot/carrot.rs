@@ -34,14 +34,14 @@ const CARROT_PART: f32 = 0.96;
 /// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the
 /// difference of maximum speed and present speed.
 ///
-/// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
+/// The target approaches its maximum speed smoothly, because a drone does not stop accelerating at once.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum speed of the moving target, as a fraction of the speed limit. The target slows down for a drone that lags
-/// behind, but never stops for good.
+/// Minimum speed of the moving target, as a fraction of the speed limit. If the drone lags behind, the target slows
+/// down, at most to this speed.
 const LEAST_PART: f32 = 0.1;
 
-/// Factor on the acceleration limit for the velocity in other directions than to a new setpoint.
+/// Factor on the acceleration limit for velocity that does not lead toward a new setpoint.
 ///
 /// When the setpoint changes, the moving target still has its old velocity. Its components across the new direction
 /// and away from the setpoint are reduced to 0 with twice the acceleration of [`Pace`], within
@@ -367,10 +367,11 @@ impl Target {
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the sent target. Returns true, once, if they differ. They count
-    /// as different only after the target was sent for some time, and several reports differ.
+    /// Compares the autopilot's reported target with the sent target. Returns true, once, when the two count as
+    /// different: the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row named another
+    /// target.
     ///
-    /// While the target moves, the report may lag behind it by the time between two messages.
+    /// For a moving target a larger difference is allowed, because the report shows an earlier position of the target.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
         self.is_reported = true;
         let Some(point) = axis.point(self.carrot.place) else {

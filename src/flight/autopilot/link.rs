@@ -49,7 +49,8 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change to its report of the fence breach that caused it.
+/// Maximum time from an ArduCopter's mode change until its report of a fence breach. The fence breach has caused the
+/// mode change.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
 /// Time for which a reason not to control the drone must last before it is reported to the operator.
@@ -99,8 +100,8 @@ pub struct Autopilot {
     /// Release that has not been reported yet, and the time to report it. A release is the end of the relay's control
     /// of the drone.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and the begin of this reason. `None` if the
-    /// pilot can give control.
+    /// Reason why the pilot cannot give the relay control of the drone, and its begin (time). `None` if the pilot can
+    /// give control.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
     /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
@@ -318,15 +319,16 @@ impl Autopilot {
     ///
     /// With `None` the targets have no heading.
     ///
-    /// [`exchange`](Self::exchange) then calls [`handle_bearing`](Self::handle_bearing) with [`Relay::bearing`].
+    /// If a side is set, [`exchange`](Self::exchange) calls [`handle_bearing`](Self::handle_bearing) with
+    /// [`Relay::bearing`].
     pub const fn point_antenna(&mut self, side: Option<Side>) {
         self.antenna = side;
     }
 
     /// Sets the time of flight with a full battery, s, and the speeds of return and descent, m/s.
     ///
-    /// At first they are NaN (unknown: a percentage without a remaining time says nothing), 5 and 1.5. The speeds are clamped to 0.1 to 20.
-    /// From the first call on an ArduCopter is requested to send the messages of its battery.
+    /// Before the first call the three values are NaN, 5 and 1.5. With NaN the battery's percentage gives no remaining time. The speeds are
+    /// clamped to 0.1 to 20. From the first call on, the link requests the battery messages of an ArduCopter.
     pub const fn set_endurance(&mut self, full_s: f32, return_m_s: f32, descent_m_s: f32) {
         let [level, down] = [return_m_s.clamp(0.1, 20.0), descent_m_s.clamp(0.1, 20.0)];
         self.vehicle.battery.setup = Some([full_s, level, down]);

@@ -199,15 +199,15 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within
-    /// `spacing` after an equal line.
+    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. A line must not be sent within
+    /// `spacing` ms after an equal line.
     fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
         self.recent.retain(|(_, until)| left(now, *until).is_some());
         let until = millis(now.as_micros()).wrapping_add(spacing);
         self.recent.iter().all(|(of, _)| *of != hash) && self.recent.push((hash, until)).is_ok()
     }
 
-    /// Removes the line at index `at`; unlike `Vec::remove`, without a panic if there is none.
+    /// Removes the line at index `at`; unlike `Vec::remove`, it does not panic if there is no such line.
     fn remove_line(&mut self, at: usize) {
         let mut index = 0;
         self.lines.retain(|_| {
@@ -327,8 +327,8 @@ pub enum AutopilotEvent {
     /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
     /// cause may be a fence.
     Released(Release),
-    /// Reason for which the pilot cannot give the relay control of the drone, by OFFBOARD or GUIDED. Or the reason
-    /// for which the relay does not use the mode that the pilot has chosen.
+    /// The pilot cannot give the relay control of the drone by OFFBOARD or GUIDED, for this reason. If the pilot has
+    /// chosen the mode already, the relay does not use it, for this reason.
     Waits(WaitReason),
     /// The pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
     Ready,

@@ -173,7 +173,7 @@ impl Streams {
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     ///
-    /// Messages of the battery are requested only if it `counts`.
+    /// Battery messages are requested only if `counts` is true.
     pub(super) fn take(&mut self, now: Instant, kind: Kind, counts: bool) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {

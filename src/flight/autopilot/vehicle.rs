@@ -94,7 +94,8 @@ pub(super) struct Vehicle {
     granted: bool,
     /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
-    /// True if OFFBOARD or GUIDED, now or once entered, counts as the pilot's choice. See [`Self::review_choice`].
+    /// True if OFFBOARD or GUIDED counts as the pilot's choice. This is about the present mode, or about the next
+    /// change to OFFBOARD or GUIDED. See [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -104,7 +105,7 @@ pub(super) struct Vehicle {
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
+    /// Measurement time of the last position. Positions too far from the line Tx to Rx count, too.
     measured_at: Option<Instant>,
     position: Option<Position>,
     /// Place to return to (HOME_POSITION); `None` if unknown.
@@ -113,8 +114,8 @@ pub(super) struct Vehicle {
 }
 
 impl Vehicle {
-    /// Processes a received message. The first sender that identifies itself as an autopilot is kept for good,
-    /// because the same port may also receive other vehicles.
+    /// Processes a received message. After the first heartbeat of an autopilot, messages of all other senders are
+    /// ignored: the same port can also receive other vehicles.
     pub(super) fn read(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
@@ -255,8 +256,8 @@ impl Vehicle {
     /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its
     /// failsafe after a second without one. A PX4 is therefore sent targets only after it has reported a mode other
     /// than OFFBOARD outside of a failsafe: since the link started, since the last failsafe, and since the link was
-    /// last interrupted or late. An ArduCopter does not change to GUIDED by itself. There another mode since the
-    /// start of the link and since the last silence is enough.
+    /// last interrupted or late. An ArduCopter does not change to GUIDED by itself. An ArduCopter only needs to have
+    /// reported another mode once: since the start of the link, and since its last silence.
     pub(super) fn review_choice(&mut self, now: Instant) {
         let before = |at: Option<Instant>, limit| at.is_some_and(|at| now.since(at) < limit);
         self.chosen &= match self.kind() {
@@ -319,8 +320,8 @@ impl Vehicle {
         self.home = None;
     }
 
-    /// Converts the stored position to another line from Tx to Rx by `moved`. Drops the position if that returns
-    /// `None`.
+    /// Converts the stored position to another line from Tx to Rx by the function `moved`. The position is dropped if
+    /// `moved` returns `None`.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -328,7 +329,7 @@ impl Vehicle {
         });
     }
 
-    /// Records a message of the battery, or of the place to return to. Returns false for any other.
+    /// Records a message about the battery, or about the place to return to. Returns false for any other message.
     fn read_battery(&mut self, now: Instant, message: Incoming) -> bool {
         match message {
             // On the ground a PX4 computes the time from an assumed current.
@@ -355,9 +356,10 @@ impl Vehicle {
         self.heard_at.is_some() && (!self.armed || is_grounded)
     }
 
-    /// Returns the newest remaining time of flight, once, and the time of the way home, s.
+    /// Returns the newest remaining time of flight and the time of the flight home, s.
     ///
-    /// `None` before the home is known. NaN is unknown, as the way home is without a recent position, and to a home far from the line.
+    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an unknown time. The
+    /// time of the flight home is unknown without a recent position, and if the home is too far from the line Tx to Rx.
     pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let home = axis.place(self.home?);
@@ -416,27 +418,31 @@ impl Vehicle {
     }
 }
 
-/// Time on the ground after which an armed drone counts as landed: a single report in flight does not.
+/// Time for which an armed drone must report that it is on the ground before it counts as landed. A single wrong report
+/// in flight thus has no effect.
 const LANDED: Duration = Duration::from_millis(2_000);
-/// Age from which on SYS_STATUS counts instead of BATTERY_STATUS, and a position gives no way home.
+/// Age from which on a BATTERY_STATUS or a position is too old for the endurance. SYS_STATUS is then used instead of
+/// BATTERY_STATUS, and the time of the flight home is unknown.
 const OLD: Duration = Duration::from_millis(10_000);
-/// Part of a reported remaining time that counts.
+/// Factor on the remaining time that the autopilot reports: 10 % are a reserve.
 const CERTAIN: f32 = 0.9;
 
-/// Endurance by the battery's messages.
+/// Remaining time of flight, from the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Arguments of `Autopilot::set_endurance`; `None` for [`UNSET`](Self::UNSET) without requests.
+    /// Arguments of `Autopilot::set_endurance`. `None` before its first call: [`UNSET`](Self::UNSET) is used, and no
+    /// messages are requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
-    /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
+    /// Remaining time of flight, s; NaN if unknown. `None` once the link has taken it, and on the ground.
     newest: Option<f32>,
 }
 
 impl Battery {
     const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
 
-    /// Returns true for BATTERY_STATUS of the first `battery`, and without one for SYS_STATUS (`None`).
+    /// Returns true if a message about `battery` is used: BATTERY_STATUS of battery 0. SYS_STATUS (`None`) is used only
+    /// if no such BATTERY_STATUS came in the last 10 s.
     fn is_first(&mut self, now: Instant, battery: Option<u8>) -> bool {
         if battery == Some(0) {
             self.detailed_at = Some(now);
@@ -445,9 +451,9 @@ impl Battery {
         battery.map_or(is_only, |id| id == 0)
     }
 
-    /// Returns the remaining time of flight, s, as reported, or else by the percentage.
+    /// Returns the remaining time of flight, s: the reported time, or else computed from the percentage.
     ///
-    /// NaN is unknown. Without a valid percentage a PX4 has no estimate of the time either.
+    /// NaN if unknown: without a valid percentage the time of a PX4 is no estimate either.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
     fn left_s(&self, percent: i8, remaining_s: i32) -> f32 {
         if !(0..=100).contains(&percent) {
@@ -730,7 +736,7 @@ impl OffLine {
 pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True from a report on the ground of a position far from the line, until a position near the line.
+    /// True from the report of a drone on the ground as far from the line, until it is near the line.
     reported_on_ground: bool,
 }
 
@@ -749,7 +755,7 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx-Rx again. After that a new departure from the line on the ground is reported again.
+    /// Records that the drone is near the line Tx-Rx again. A drone on the ground that is far from the line after that is reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;
@@ -872,8 +878,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// Checks messages that a cable holds back and delivers at once after 7 s. The age of the first one is 7 s, and
-    /// later ones are the younger the later they were sent.
+    /// Checks messages that a cable holds back and delivers at once after 7 s. The age of the first message is 7 s.
+    /// Each later message has a smaller age, because it was sent later.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;

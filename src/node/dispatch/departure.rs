@@ -73,7 +73,7 @@ pub(crate) struct Leaving {
     ended: [bool; 2],
     /// True for each side whose neighbour has selected the relay beyond this relay.
     passed: [bool; 2],
-    /// True for a spare, also for one that has requested to leave since.
+    /// True if this relay is a spare. Remains true if the spare requests to leave.
     spare: bool,
     free: bool,
     /// True while the drone has no endurance for a return to the chain.
@@ -214,14 +214,16 @@ impl Node {
         }
     }
 
-    /// Returns true until this relay has taken part in anything. The first leader has once it starts a pass.
+    /// Returns true until this relay has taken part in the protocol. For the first leader this ends when it starts a
+    /// pass.
     fn is_untouched(&self) -> bool {
         let Layers { round, view, .. } = &self.layers;
         let is_loaded = self.member.view == ViewId::LOADED && view.outstanding().is_none();
         round.is_fresh() || is_loaded && round.is_untouched()
     }
 
-    /// Cancels the request to leave if nothing of it has been granted. Returns true if it has cancelled it.
+    /// Cancels this relay's request to leave. Returns false, and does nothing, if the leader has already ordered the
+    /// departure, or if the relay has already left the chain.
     pub(crate) fn withdraw(&mut self, now: Instant) -> bool {
         let is_untouched = self.is_untouched();
         let leaving = &mut self.layers.leaving;
@@ -236,7 +238,7 @@ impl Node {
         true
     }
 
-    /// Returns true if every departure is refused for good.
+    /// Returns true if this relay cannot leave the chain with its settings: it has no guard, or two wires.
     pub(crate) fn is_refused(&self, now: Instant) -> bool {
         let refusal = self.layers.departure_refusal(now, &self.member);
         let lasting = [Departure::NeedsGuard, Departure::NeedsChannel];
@@ -248,7 +250,8 @@ impl Node {
         self.layers.leaving.spent = spent;
     }
 
-    /// Returns true if the drone may fly away; `None` unless this relay has requested to leave.
+    /// Returns true if the drone may fly away, false if it has to wait. `None` unless this relay has requested to
+    /// leave.
     pub(crate) fn leaves(&self) -> Option<bool> {
         let leaving = &self.layers.leaving;
         leaving.requested.then_some(leaving.free)

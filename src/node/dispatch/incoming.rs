@@ -14,8 +14,8 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if node `from` may not send such a
-    /// message. Work: at most the computation of this relay's positions for 16 target SIRs.
+    /// Handles an intact message from node `from` at `side`. Returns false if such a message is not allowed from node
+    /// `from`. Work: at most the computation of this relay's positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,

@@ -12,8 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side`, Tx or Rx. Returns false if a ground station may not send
-    /// this kind of message.
+    /// Handles a message from the ground station at `side`, Tx or Rx. Returns false if this kind of message is not
+    /// allowed from a ground station.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,

@@ -115,7 +115,7 @@ impl Link {
     }
 
     /// Records a loss of the link. `losses` is the number of recent losses before this loss. If `counted` is false,
-    /// this number stays the same at first; a long silence after the loss counts it later.
+    /// this loss does not count yet; it counts later if the node is then silent for long.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -214,8 +214,8 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false earlier
-    /// than `probe_after` after `since`.
+    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false until the
+    /// search has lasted for `probe_after`.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
@@ -270,8 +270,8 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node
-    /// has been received without gaps for long enough: for `probe_after` or `more`, whichever is longer.
+    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node has
+    /// been received without gaps for `probe_after`, and for the time `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,

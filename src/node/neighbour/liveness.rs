@@ -130,10 +130,10 @@ impl Liveness {
         }
     }
 
-    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is
-    /// kept, because it describes the channel. The unanswered requests to the previous node count as a run. But they
-    /// do not count if the link `was_down`, because they then measure an outage. If the link `flaps` slowly, all runs
-    /// are dropped.
+    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is kept,
+    /// because it describes the channel. The unanswered requests to the previous node count as a run, unless `was_down`
+    /// is true: they then measure an outage of the link. If `flaps` is true (the link flaps slowly), all runs are
+    /// dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS

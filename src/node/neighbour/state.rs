@@ -41,7 +41,7 @@ enum NeighbourState {
     NoPeer,
     /// Linked: this relay and the node have selected each other, by the node's last report.
     Linked,
-    /// Pairing: this relay has selected a node, but this node has not selected this relay, or no longer.
+    /// Pairing: this relay has selected a node, but this node does not select this relay (any more).
     Pairing {
         since: Instant,
     },
@@ -499,8 +499,8 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, without the lost next node. For each of
-    /// these nodes the selection is delayed, because a nearer node may still answer.
+    /// Returns the number of nodes between this relay and the candidate, without the nearest node. The nearest node is
+    /// lost. Each of the other nodes delays the selection of the candidate, because a nearer node could still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -526,8 +526,8 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records where a view proposal came from: the neighbour on this side, or this relay itself. A relay itself
-    /// proposes only without a neighbour toward the leader.
+    /// Records where a view proposal came from: the neighbour on this side, or this relay itself. This relay makes a
+    /// proposal only if it has no neighbour toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }

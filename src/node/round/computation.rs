@@ -202,8 +202,8 @@ impl Computation {
         self.began = true;
     }
 
-    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if
-    /// `ladder` is `Some`. `last` is true if no other algorithm follows.
+    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`; with
+    /// `None`, the search's own first targets. `last` is true if no other algorithm follows.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,

@@ -217,7 +217,7 @@ impl Round {
         self.work_at = Some(now + PAUSE);
     }
 
-    /// Cancels the next step of a computation: the first leader starts no pass.
+    /// Cancels the next step of a computation. The first leader thus starts no pass if it leaves the chain before.
     pub(crate) const fn cancel_work(&mut self) {
         self.work_at = None;
     }
