@@ -186,7 +186,7 @@ impl Estimator {
 struct Fit {
     /// Mean m of the accepted samples, each the interference power I divided by `I_max`.
     m: f32,
-    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without cancellation.
+    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without loss of digits.
     rest: f32,
     /// Standard deviation s of the accepted samples, each the interference power I divided by `I_max`.
     s: f32,

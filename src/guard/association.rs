@@ -12,8 +12,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove the neighbour's restart. A smaller
-/// number may be late messages from an earlier session.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer such
+/// messages are possibly late messages of an earlier session.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of seconds after which a neighbour's halt request expires if it is not repeated.
@@ -155,7 +155,7 @@ impl Association {
     }
 
     /// Returns true if `fence` states that the neighbour has left the current association (session). A repetition of
-    /// this message does not count again, because the next association has another number.
+    /// this message does not count, because the next association has another number.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
@@ -188,8 +188,7 @@ impl Association {
     }
 
     /// Returns true if a message belongs to a left association (session). This relay or its neighbour has left it. If
-    /// this relay has left the association, its leave notice is sent again, until the neighbour starts a new
-    /// association.
+    /// this relay has left the association, its leave notice is repeated, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -452,7 +451,7 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
+    /// Limits this relay's x to `x_m`, the x of its first setpoint. Reason: some relays were never received.
     ///
     /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has the separation from all of them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {

@@ -212,7 +212,7 @@ impl Guard {
         true
     }
 
-    /// Starts again because the line from Tx to Rx has changed. Earlier positions and messages are void.
+    /// Restarts the guard because the line from Tx to Rx has changed. Earlier positions and messages are void.
     ///
     /// The relay begins with the first position that is reported after `now`, once the drone has stopped. With
     /// `None`, it begins with the first position after the start. Lost relays may hover anywhere beyond this relay,
@@ -276,7 +276,7 @@ impl Guard {
 
     /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
     ///
-    /// `others` states that the chain has more relays at that side. If none of these relays has been received, this
+    /// `others` is true if the chain has more relays at that side. If none of these relays has been received, this
     /// relay keeps clear of everything beyond its present x until it receives one of them.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
@@ -469,8 +469,8 @@ impl Guard {
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
-    /// Schedules again all messages that may have been lost; returns true if there are any. Call it about every
-    /// second.
+    /// Schedules repetitions of all messages that were possibly lost; returns true if there are any. Call it about
+    /// every second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
         self.unordered = if begun && !self.is_ordered() {

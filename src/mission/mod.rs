@@ -745,7 +745,7 @@ impl Mission {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index`, m, if the relays between it and Rx may share one x.
+    /// Returns the largest x of relay `index`, m, if the relays between it and Rx can share one x.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }

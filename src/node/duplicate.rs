@@ -96,7 +96,7 @@ pub(crate) struct IndexClaims {
     /// relay already had a position at the first such frame. `None` without such a frame.
     contest: Option<(Instant, bool)>,
     /// Times at which two nodes were last seen to use one number. Entry 0 is for this relay's number, entry 1 for a
-    /// neighbour's number.
+    /// neighbour's number; `None` for never.
     observed: [Option<Instant>; 2],
     /// Time at which this relay last received one of its own frames; `None` if none has been received.
     echoed: Option<Instant>,

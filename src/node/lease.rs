@@ -71,7 +71,7 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Time until which the lease of another member may run because this relay took part in a renewal.
+    /// Latest possible end of another member's lease that is based on this relay's part in a renewal.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which positions agreed on in it may be used.
     accepted: (ViewId, Instant),
@@ -114,8 +114,9 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease state of a relay that starts at `now`. Before a restart it may have taken part in a
-    /// lease that it does not remember, so other relays may still count on this relay for `dead_after`.
+    /// Creates the lease state of a relay that starts at `now`. Before a restart the relay has possibly taken part in a
+    /// lease renewal. So other relays can still have a lease for up to `dead_after`, which this relay does not
+    /// remember.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Pending,
@@ -197,8 +198,8 @@ impl Lease {
         orders
     }
 
-    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. A lease
-    /// from before this relay's restart may still run at these members.
+    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. These
+    /// members can still have a lease from before this relay's restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
@@ -221,8 +222,8 @@ impl Lease {
         matches!(self.state, LeaseState::Pending)
     }
 
-    /// Returns the silence after which a neighbour may count as lost. It is the lease duration of the last renewal,
-    /// but at least `dead_after`.
+    /// Returns the silence after which a neighbour is permitted to count as lost. It is the lease duration of the last
+    /// renewal, but at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
@@ -365,7 +366,8 @@ impl Lease {
     }
 
     /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this relay.
+    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this relay; `None`
+    /// at the last relay.
     fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
@@ -472,7 +474,7 @@ impl Lease {
         }
     }
 
-    /// Returns the lease renewal to forward, if one is pending, and marks it as sent.
+    /// Returns the pending lease renewal to forward, and marks it as sent; `None` if none is pending.
     pub(crate) fn poll_onward(&mut self, context: &Context<'_>) -> Option<Message> {
         let is_due = self.circulation.poll_forward();
         let current = self.current.filter(|_| is_due)?;
@@ -486,7 +488,7 @@ impl Lease {
         }))
     }
 
-    /// Returns the reply to a lease renewal, if one is pending, and marks it as sent.
+    /// Returns the pending reply to a lease renewal, and marks it as sent; `None` if none is pending.
     pub(crate) fn poll_back(&mut self, context: &Context<'_>) -> Option<Message> {
         let reply = self.circulation.poll_reply()?;
         let current = self.current?;

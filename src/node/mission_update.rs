@@ -58,7 +58,7 @@ struct Offering {
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
-    /// Time at which the offer to the neighbour is sent again; `None` if it is not sent again.
+    /// Time at which the offer to the neighbour is repeated; `None` if it is not repeated.
     at: Option<Instant>,
     /// Number of mission offers sent since the mission or the neighbour last changed.
     tries: u8,
@@ -270,7 +270,7 @@ impl MissionUpdate {
         Some((upload, answers.then_some(offering.nonce)))
     }
 
-    /// Schedules the offer to the neighbour on each side again if its timer has expired.
+    /// Schedules a repetition of the offer to the neighbour on each side if its timer has expired.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             if let Some(offering) = self.offering(side)
@@ -287,8 +287,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules replies to the ground station at `side`. If `reports` is true, the reply is a hello. If `asks` is
-    /// the number of a request, the stored upload is sent.
+    /// Schedules replies to the ground station at `side`. If `reports` is true, the reply is a hello. If `asks` is the
+    /// number of a request (not `None`), the stored upload is sent.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -455,7 +455,7 @@ impl MissionUpdate {
     }
 
     /// Returns the configured geofence for the active mission; `None` without a guard. An active mission with its own Tx and Rx positions
-    /// may have another distance Tx-Rx than the loaded mission. The geofence's maximum x is changed by the difference.
+    /// can have another distance Tx-Rx than the loaded mission. The geofence's maximum x is changed by the difference.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {

@@ -59,8 +59,8 @@ pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 /// Control state of a drone that the relay controls.
 const ENGAGED: u16 = State::Engaged as u16 + 1;
 
-/// Time by which a report that begins an alarm may be sent early. Other reports wait until the telemetry's share of
-/// the data rate allows them.
+/// Time by which a report that begins an alarm is allowed to be sent early. Other reports wait until the telemetry's
+/// share of the data rate allows them.
 const AHEAD: Duration = Duration::from_millis(2_000);
 
 /// Minimum time between the states in two entries of one relay. An entry is the state of a relay in a report. This
@@ -169,7 +169,7 @@ struct Watched {
 }
 
 /// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), the setpoint, and the agreed position.
+/// state), the setpoint, and the agreed position. `None` for an unknown position.
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {

@@ -159,7 +159,7 @@ pub(super) struct SensorState {
     pub(super) transmitter: Average,
     /// Average of the interference power that Rx, on the ground, has reported to this relay.
     pub(super) receiver: Average,
-    /// True while this relay withholds its measurements, because they contradict those of the other nodes.
+    /// True while this relay withholds its measurements. They contradict the measurements of the other nodes.
     pub(super) off: bool,
     /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
     /// measurements.
@@ -169,7 +169,7 @@ pub(super) struct SensorState {
     /// State of the leader's search for a faulty sensor. The search leaves out the measurements of one relay after
     /// the other.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements contradict the measurements of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
     /// True if the last collected measurements contradict each other, but the faulty sensor was not found.
     pub(super) contradicted: bool,

@@ -65,7 +65,7 @@ const HALVES_MS: u64 = 1_387;
 /// distance of 20 m to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
-/// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
+/// Maximum age of a drone's position that is used to compute the drone's lag behind the moving target. The drone's
 /// position is compared with the target's position of the same time.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
@@ -127,12 +127,12 @@ impl Pace {
 
     /// Returns the time from a changed setpoint until a drone that flew at maximum speed has stopped.
     ///
-    /// It is 9.8 s by default, and intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
+    /// The time is 9.8 s by default. It is the value for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
     ///
-    /// The drone reacts after 1.2 s. The moving target that it follows then slows down: first with the deceleration a
-    /// (maximum acceleration) to the speed a / k, where k is the gain near the setpoint, and from there in proportion
-    /// to the remaining distance, which is at most 0.25 m after this time. a is the acceleration of this pace, and k
-    /// is 0.5 /s. At most 8 steps.
+    /// The drone reacts after 1.2 s. Then the moving target slows down: first with the deceleration a to the speed a/k,
+    /// then in proportion to the remaining distance. Here a is the acceleration of this pace, and k is 0.5 /s, the
+    /// ratio of speed to distance near the setpoint. After the returned time the remaining distance is at most 0.25 m.
+    /// At most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
     #[expect(
@@ -306,7 +306,7 @@ fn length(a: [f32; 3]) -> f32 {
 
 /// Interval at which the position of a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
-/// Interval at which a standing target is sent again to a PX4. A PX4 leaves OFFBOARD after a second without a target.
+/// Interval at which a standing target is repeated to a PX4. A PX4 leaves OFFBOARD after a second without a target.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent

@@ -32,19 +32,19 @@ use crate::flight::mavlink::signing::Signing;
 /// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// MAVLink system number of this component until the system number of the autopilot is known. It is the default of
-/// autopilots.
+/// MAVLink system number of this component until the system number of the autopilot is known. The number is the default
+/// of autopilots.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Maximum time between two targets to a PX4 that counts as on time. After a longer time the PX4 may have entered its
-/// failsafe.
+/// Maximum time between two targets to a PX4 that counts as on time. After a longer time the PX4 has possibly entered
+/// its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Time for which positions must be received regularly before [`State::Blind`] (position lost) ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
-/// Time used instead of [`RECOVERY`] if the drone's position is lost again within [`SHORT_TIME`].
+/// Time used instead of [`RECOVERY`] if the drone's position is lost twice within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
@@ -73,8 +73,8 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Tx and Rx positions with which the link was created. The array is empty unless a mission uploaded in flight
-    /// can replace them.
+    /// Tx and Rx positions with which the link was created. The array is empty in a build without mission uploads
+    /// (feature `upload`).
     loaded: [Sites; UPLOAD as usize],
     pace: Pace,
     clock: MonotonicClock,
@@ -89,16 +89,16 @@ pub struct Autopilot {
     /// Side of the neighbour that a directional antenna points to; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
     target: Option<Target>,
-    /// Position where the moving target stops after the setpoint was withdrawn.
+    /// Position where the moving target stops after the setpoint was withdrawn. `None` while there is a setpoint.
     stop: Option<Placement>,
-    /// Time at which the autopilot last stopped reporting the drone's position.
+    /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never has.
     blind_at: Option<Instant>,
     /// Time since which positions are received again in the state [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
     /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Release that has not been reported yet, and the time to report it. A release is the end of the relay's control
-    /// of the drone.
+    /// Release that has not been reported yet, and the time to report it; `None` if there is none. A release is the end
+    /// of the relay's control of the drone.
     release: Option<(Release, Instant)>,
     /// Reason why the pilot cannot give the relay control of the drone, and its begin (time). `None` if the pilot can
     /// give control.
@@ -173,8 +173,9 @@ impl Autopilot {
 
     /// Sets a number that differs at each start of the companion, such as the relay's seed.
     ///
-    /// It marks this link's clock requests (TIMESYNC). Without it, a reply to an earlier start, buffered in a cable,
-    /// may count as a reply to this link. A mode that the pilot chose before the restart then counts as a new choice.
+    /// The number marks this link's clock requests (TIMESYNC). Without the mark, a reply from before a restart of the
+    /// companion, buffered in a cable, could count as a reply to this link. A mode that the pilot chose before the
+    /// restart would then count as a new choice.
     pub const fn set_seed(&mut self, seed: u32) {
         self.vehicle.echo.seed(seed);
     }
@@ -267,10 +268,10 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Sets the line from Tx to Rx along which the drone flies, when a mission changes the two positions. Call it
-    /// when `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds
-    /// its position until the next setpoint, because the present one belongs to the previous line. Constant work; the
-    /// same line again has no effect.
+    /// Sets the line from Tx to Rx along which the drone flies, when a mission changes the two positions. Call it when
+    /// `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its
+    /// position until the next setpoint, because the present one belongs to the previous line. Constant work; a call
+    /// with the present line has no effect.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
         if axis == self.axis {
@@ -315,7 +316,7 @@ impl Autopilot {
         self.bearing = bearing.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// Sets the side of the neighbour that a directional antenna, forward on the drone, points to.
+    /// Sets the side of the neighbour to which a directional antenna points, mounted facing forward.
     ///
     /// With `None` the targets have no heading.
     ///
@@ -334,14 +335,15 @@ impl Autopilot {
         self.vehicle.battery.setup = Some([full_s, level, down]);
     }
 
-    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`. `None` for
+    /// an unknown number.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
     /// Sets whether the relay is ready to control the drone; true at the start. While it is false, a PX4 in
     /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD. Nothing else changes: a drone that the
-    /// relay controls stays under control, and an ArduCopter accepts GUIDED all the same.
+    /// relay controls stays under control, and an ArduCopter accepts GUIDED in any case.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
@@ -682,7 +684,8 @@ impl Autopilot {
         self.target_frame(now, &target.carrot)
     }
 
-    /// Returns the frame that sets the autopilot's target to the position of `carrot`, the moving target.
+    /// Returns the frame that sends the position of `carrot`, the moving target, to the autopilot. `None` if this
+    /// position is too far from the line Tx to Rx.
     fn target_frame(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;

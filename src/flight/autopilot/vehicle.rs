@@ -18,7 +18,7 @@ pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 /// Age from which on a received position of the drone is too old to be used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the autopilot after which a PX4 may have entered its failsafe. It does so after a second without a
+/// Silence of the autopilot after which a PX4 has possibly entered its failsafe. A PX4 does so after a second without a
 /// target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
@@ -66,7 +66,7 @@ pub(super) enum VehicleUpdate {
     Found,
     /// The message shows that the autopilot has restarted.
     Restarted,
-    /// The message has new information that may change the control state.
+    /// The message has new information, which can change the control state.
     StateChanged,
     /// The message has a new position of the drone, in the mission's coordinates.
     Position(Position),
@@ -87,7 +87,7 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// Time at which the last message of any kind was received from the autopilot.
+    /// Time at which the last message of any kind was received from the autopilot; `None` before the first.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the autopilot's mode is OFFBOARD or GUIDED, in which the relay sets the target.
@@ -105,7 +105,8 @@ pub(super) struct Vehicle {
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position. Positions too far from the line Tx to Rx count, too.
+    /// Measurement time of the last position; `None` before the first. Positions too far from the line Tx to Rx count,
+    /// too.
     measured_at: Option<Instant>,
     position: Option<Position>,
     /// Place to return to (HOME_POSITION); `None` if unknown.
@@ -251,7 +252,7 @@ impl Vehicle {
         }
     }
 
-    /// Withdraws the right to control the drone if the autopilot may have changed its mode by itself.
+    /// Withdraws the right to control the drone if the autopilot has possibly changed its mode by itself.
     ///
     /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its
     /// failsafe after a second without one. A PX4 is therefore sent targets only after it has reported a mode other
@@ -278,7 +279,7 @@ impl Vehicle {
         self.chosen = false;
     }
 
-    /// Returns true if messages of the autopilot may have been delayed, so that they show an old state.
+    /// Returns true if messages of the autopilot are possibly delayed, so that they show an old state.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         self.echo.is_late(now) || self.measured_at.is_none_or(|at| now.since(at) >= STALE)
     }
@@ -398,7 +399,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the drone's position if it is known and recent, and the drone is in the air.
+    /// Returns the drone's position if it is known and recent, and the drone is in the air; else `None`.
     pub(super) fn place_in_air(&self, now: Instant) -> Option<Placement> {
         let position = self.position(now)?;
         (self.armed && self.in_air).then_some(position.place)
@@ -505,12 +506,12 @@ const SHIFT: u32 = 20;
 /// Tag in the TIMESYNC requests of a link whose seed was not set.
 const TAG: u32 = 0xA_52A5;
 
-/// Measurement of the delay of the link to the autopilot by echoes (TIMESYNC). It gives an upper bound of the age of
-/// received messages.
+/// Measurement of the delay of the link to the autopilot by echoes (TIMESYNC). The measurement gives an upper bound of
+/// the age of received messages.
 ///
-/// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's
-/// clock may lose time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes
-/// stay in order: a message received after a reply was sent after the request, so it is not older than the request.
+/// A cable, a radio or a router can buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock
+/// can run slow. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in
+/// order: a message received after a reply was sent after the request, so it is not older than the request.
 ///
 /// A request has a tag, drawn at each start of the companion. A reply buffered since before a restart therefore does
 /// not count.
@@ -525,7 +526,7 @@ pub(super) struct Echo {
     due: Option<Instant>,
     /// Time of the first TIMESYNC request to the autopilot; `None` before it.
     begun_at: Option<Instant>,
-    /// Time at which the newest TIMESYNC request with a reply was sent.
+    /// Time at which the newest TIMESYNC request with a reply was sent; `None` without a reply.
     answered_at: Option<Instant>,
 }
 
@@ -581,7 +582,7 @@ impl Echo {
         self.answered_at
     }
 
-    /// Returns true while the autopilot's messages may be older than `LATE`.
+    /// Returns true while the autopilot's messages are possibly older than `LATE`.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         match (self.answered_at, self.begun_at) {
             (Some(at), _) => now.since(at) >= LATE,
@@ -608,7 +609,7 @@ const HALF: Duration = Duration::from_millis(4_000);
 
 /// Minimum number of messages in each half of the time window over which the minimum delay is taken.
 ///
-/// If the link pauses, a half may contain only the late messages that arrive after the pause. Their delay would then
+/// If the link pauses, a half can contain only the late messages that arrive after the pause. Their delay would then
 /// count as normal.
 const LEAST: u8 = 8;
 
@@ -682,9 +683,9 @@ impl RemoteClock {
     }
 }
 
-/// Converts `micros`, µs, to milliseconds, which wrap after 49 days as the autopilot's do.
+/// Converts `micros`, µs, to milliseconds, which wrap after 49 days like the autopilot's milliseconds.
 ///
-/// It uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
+/// The function uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -724,8 +725,8 @@ impl OffLine {
 
 /// Detection of a drone that is too far from the line Tx to Rx for the mission's coordinates.
 ///
-/// It finds Tx and Rx positions with latitude and longitude swapped, because these are valid and nothing else shows
-/// the mistake.
+/// It detects Tx and Rx positions with latitude and longitude swapped. Such positions are valid, and no other check
+/// finds the mistake.
 ///
 /// | position | effect |
 /// | --- | --- |
@@ -741,8 +742,8 @@ pub(super) struct OffLineDetector {
 }
 
 impl OffLineDetector {
-    /// Records a position of the drone that is too far from the line Tx to Rx. Returns true if a report is due: in
-    /// the air once in 10 s, on the ground only once until the drone is near the line again.
+    /// Records a position of the drone that is too far from the line Tx to Rx. Returns true if a report is due: in the
+    /// air once in 10 s, on the ground once, until the drone has been near the line.
     pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
@@ -755,13 +756,13 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx-Rx again. A drone on the ground that is far from the line after that is reported again.
+    /// Records that the drone is near the line Tx-Rx. A drone on the ground that is far from the line after that is reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;
     }
 
-    /// Returns the newest position, if it was far from the line and less than 3 s ago.
+    /// Returns the newest position if it is far from the line and less than 3 s old; else `None`.
     pub(super) fn newest(&self, now: Instant) -> Option<Geodetic> {
         let fresh = self
             .newest
@@ -794,7 +795,7 @@ mod tests {
         );
     }
 
-    /// Checks that messages may be old as long as no TIMESYNC request has been sent.
+    /// Checks that the link counts as late as long as no TIMESYNC request has been sent.
     #[test]
     fn the_delay_is_unknown_before_the_first_request() {
         assert!(Echo::default().is_late(Instant::ZERO));

@@ -29,7 +29,7 @@ use crate::wire::message::{Hello, Requests};
 const IN_PLACE_M: f32 = 3.0;
 
 /// Time after which an ordered departure counts as blocked, in units of `dead_after`. The reason is that the two
-/// neighbours do not receive each other. The departure is requested again after the same time.
+/// neighbours do not receive each other. The departure is requested once more after the same time.
 const BLOCKED_AFTER: u32 = 4;
 
 /// State of a relay that leaves the chain or waits outside of it.
@@ -85,12 +85,14 @@ pub(crate) struct Leaving {
     /// Position at which the drone counts as in place. `None` until the chain has agreed, and while the setpoint
     /// moves.
     goal: Option<Placement>,
-    /// Spare (relay that waits outside) from which a frame was received last, and the time of this frame.
+    /// Spare (relay that waits outside) from which a frame was received last, and the time of this frame. `None` if no
+    /// such frame was received.
     heard_spare: Option<(u16, Instant)>,
-    /// Relay outside of the chain, on this side, that must be informed when it may leave.
+    /// Relay outside of the chain, at this side, that must be informed when it is allowed to leave. `None` if there is
+    /// none.
     waiting: Option<(Side, u16)>,
-    /// Relays that may leave and that were reported to the firmware. One bit mask for each side, with a bit for each
-    /// distance.
+    /// Relays that are allowed to leave, and that were reported to the firmware. One bit mask for each side, with a bit
+    /// for each distance.
     told: [u8; 2],
 }
 
@@ -245,7 +247,7 @@ impl Node {
         refusal.is_some_and(|why| lasting.contains(&why))
     }
 
-    /// Records if the drone has no endurance for a return to the chain.
+    /// Records if the drone has no endurance for a return to the chain: yes if `spent` is true.
     pub(crate) const fn set_spent(&mut self, spent: bool) {
         self.layers.leaving.spent = spent;
     }
@@ -364,8 +366,8 @@ impl Node {
         complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
     }
 
-    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. The event is raised once;
-    /// again only after the node has been a neighbour again.
+    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. The event is raised once. It is
+    /// raised a second time only if the node was a neighbour in the meantime.
     pub(super) fn on_freed(&mut self, side: Side, to: u16) {
         let bit = mask(to.abs_diff(self.member.node));
         if let Some(told) = self.layers.leaving.told.get_mut(side as usize)
@@ -381,7 +383,8 @@ impl Node {
         self.layers.lease.orders().joiner == to && self.is_beside(side, to)
     }
 
-    /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to.
+    /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to. `None` if there
+    /// is no such position.
     pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
         // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
         let is_held = [Side::Upstream, Side::Downstream]

@@ -291,7 +291,7 @@ impl Node {
     }
 
     /// Returns the side of node `sender`. `None` unless the node is a neighbour, a possible neighbour, or a ground
-    /// station that may upload missions.
+    /// station that is permitted to upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);

@@ -101,7 +101,7 @@ impl Node {
     ///
     /// An offer that repeats no recent number is answered by a hello; the next offer can repeat the number of this
     /// hello. After any other offer a hello is sent only if this relay has stored or refused the mission, or has a
-    /// newer mission. Otherwise the hello would trigger the same offer again.
+    /// newer mission. Otherwise the hello would trigger a repetition of the offer.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,

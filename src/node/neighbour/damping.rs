@@ -135,7 +135,8 @@ impl Link {
 /// Records of lost links to the four nearest nodes on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that will be selected as the neighbour once it has been received without gaps for long enough.
+    /// Node that will be selected as the neighbour once it has been received without gaps for long enough. `None` if
+    /// there is no such node.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -164,9 +165,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames (`counts`
-    /// is false) only the loss of a flapping link counts. If another link on this side flaps, this link takes over
-    /// its loss count, because all links of a side cross the same gap in the chain.
+    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames `counts` is
+    /// false: then only the loss of a flapping link counts. If another link on this side flaps, the lost link takes
+    /// over the loss count of the flapping link. Reason: all links of a side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,

@@ -124,7 +124,7 @@ pub(super) struct Hellos {
 impl Hellos {
     pub(super) const NONE: Self = Self { due: 0, reply: 0 };
 
-    /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
+    /// Schedules a hello to the node `distance` relays away; if `ask` is true it requests an answer.
     pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.due |= bit;

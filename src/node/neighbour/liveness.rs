@@ -107,7 +107,7 @@ pub(crate) struct Liveness {
 pub(crate) struct Silence {
     /// True if this check has found that the neighbour is lost.
     pub(crate) lost: bool,
-    /// Time at which the neighbour's silence is checked again.
+    /// Time of the next check of the neighbour's silence.
     pub(crate) next_check: Instant,
 }
 
@@ -218,8 +218,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost. It is never lost before a silence of `dead`. `tick` is the
-    /// time to the next check.
+    /// Checks at `now` if the silent neighbour is lost. The neighbour is never lost before a silence of `dead`. `tick`
+    /// is the time to the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -41,8 +41,8 @@ pub(super) struct JointPlace {
     /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
     /// used in an interference field.
     pub(super) end_m: f32,
-    /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays may stop
-    /// before that x to help the next hop.
+    /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays are allowed
+    /// to stop before that x, to help the next hop.
     pub(super) plain: bool,
 }
 
@@ -52,7 +52,8 @@ pub(super) struct FittedSlots {
     /// x of this relay in its joint solution, m, and its slots at this x, as shares of the frame. `None` without a
     /// solution.
     pub(super) solved: Option<(f32, SlotShares)>,
-    /// Begin and end of this relay's slots at the agreed positions, as shares of the frame.
+    /// Begin and end of this relay's slots at the agreed positions, as shares of the frame. `None` without an
+    /// agreement.
     pub(super) agreed: Option<SlotShares>,
 }
 
@@ -150,7 +151,7 @@ impl Computation {
         self.after = None;
     }
 
-    /// Starts the leader's search for the best target SIR again, from its first step.
+    /// Restarts the leader's search for the best target SIR from its first step.
     pub(crate) fn restart(&mut self) {
         self.task.clear();
         // A new solution makes the leader try the same targets as the first time.
@@ -577,8 +578,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from it the x that the previous relay
-    /// must take. If the previous relay has no such x, the commitment is revoked.
+    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from `place` the x that the previous
+    /// relay must take. If there is no such x, or `place` is `None`, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;
