@@ -789,7 +789,7 @@ pub enum Progress {
         /// is farther from the station.
         by: u16,
     },
-    /// The upload is outdated: a relay has stored a newer mission, or another one with the same version.
+    /// The upload is outdated. A relay has stored a newer mission, or another mission with the same version.
     Outdated {
         /// Version of the newer mission that the relay has stored.
         version: u16,

@@ -207,7 +207,7 @@ impl Association {
         fence.association == self.left_number
     }
 
-    /// Schedules a pending leave notice for sending again; returns true if a notice is pending.
+    /// Schedules a repetition of a pending leave notice; returns true if a notice is pending.
     pub(super) const fn remind(&mut self) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             leave_notice.due = true;
@@ -316,8 +316,8 @@ impl Association {
         })
     }
 
-    /// Counts a message of another association (session). Returns true once so many such messages were received in a
-    /// row that the neighbour must have restarted.
+    /// Counts a message of another association (session). Returns true once [`MAX_FOREIGN_MESSAGES`] such messages were
+    /// received in a row: the neighbour must have restarted.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.foreign_messages = self.foreign_messages.saturating_add(1);
         self.foreign_messages >= MAX_FOREIGN_MESSAGES
@@ -478,7 +478,7 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. It has the minimum
+    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. This relay has the minimum
     /// separation at x = `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {

@@ -259,8 +259,8 @@ impl Guard {
     /// neighbour.
     ///
     /// The previous neighbour may still hover. This relay keeps clear of the previous neighbour until
-    /// [`forget`](Self::forget) is called. It also stops to do so once the previous neighbour, or a node between the
-    /// two, has become the neighbour and has sent a message.
+    /// [`forget`](Self::forget) is called, or until the previous neighbour, or a node between the two, is the neighbour
+    /// and has sent a message.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -367,7 +367,7 @@ impl Guard {
 
     /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. This relay or a
     /// neighbour may need it; a neighbour's request is forwarded to the neighbour on the opposite side. `clear` is true
-    /// if this relay may change its lateral offset and altitude.
+    /// if nothing forbids this relay to change its lateral offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();

@@ -591,8 +591,8 @@ impl Mission {
         }
     }
 
-    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, as
-    /// for [`Mission::reverse`]. Without the feature `altitude` the function returns a constant.
+    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, because
+    /// relays then spread evenly. Without the feature `altitude` the function returns a constant.
     pub const fn fitted_gap(&self) -> f32 {
         if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap

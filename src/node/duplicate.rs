@@ -55,11 +55,12 @@ use crate::wire::session::{RAISED, Rival, Sender};
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
 /// Time added, after a start, before the first claim that this relay sends without a request. This is about the time
-/// that a hundred relays need for their first agreement. A relay that becomes active again waits as long.
+/// that a hundred relays need for their first agreement. A relay that was passive and becomes active waits for the same
+/// time.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum of the doubling intervals between claims to this relay's node number. These claims are sent without a
-/// request. Later claims follow every `dead_after`.
+/// Maximum interval between claims that this relay sends without a request. The interval doubles up to this value;
+/// after that a claim follows every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
 /// Number of claims by which this relay defends its node number against another node's claim. The interval between

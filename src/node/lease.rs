@@ -53,7 +53,7 @@ use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// No lease yet: this view has no agreement, or it is unknown if all members know the agreement.
+    /// No lease yet. Either this view has no agreement, or it is unknown if all members know the agreement.
     Pending,
     Until(Instant),
     Lapsed,
@@ -287,8 +287,8 @@ impl Lease {
         self.is_whole
     }
 
-    /// Records that this relay has agreed on its position. At the leader (`leads`) this means that all members have
-    /// agreed, so the first lease renewal is scheduled.
+    /// Records that this relay has agreed on its position. At the leader (`leads` is true) this means that all members
+    /// have agreed, so the first lease renewal is scheduled.
     pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {

@@ -215,7 +215,7 @@ impl MissionUpdate {
         })
     }
 
-    /// Records the nonce in a hello of the neighbour at `side`. The next mission offer repeats it.
+    /// Records the nonce in a hello of the neighbour at `side`. The next mission offer repeats this nonce.
     pub(crate) fn record_hello_number(&mut self, side: Side, nonce: u16, now: Instant) {
         if let Some(offering) = self.offering(side) {
             offering.nonce = nonce;

@@ -212,8 +212,8 @@ impl Reporting {
         }
     }
 
-    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry
-    /// belongs to a relay from which no report can come by way of `from`.
+    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry belongs
+    /// to a relay from which no report can come through `from`.
     pub(crate) fn handle(
         &mut self,
         now: Instant,

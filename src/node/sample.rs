@@ -45,20 +45,21 @@ pub enum Sample {
         /// Received power, W. It must exceed the receiver's noise by 1e-30 to 1e6 W (`MEASURED_W`).
         power_w: f32,
     },
-    /// Mean interference power measured at Tx, on the ground. The firmware gives it to one of the first four relays,
-    /// usually relay 1.
+    /// Mean interference power measured at Tx, on the ground. The firmware gives the value to one of the first four
+    /// relays, usually relay 1.
     Transmitter {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
     /// Mean interference power measured at Rx, on the ground. The firmware gives the value to the last relay of the
-    /// view. It may also give the value to the three relays before the last relay. Such a relay uses the value once
-    /// it is the last relay itself.
+    /// view. The firmware can also give the value to the three relays before the last relay. Such a relay uses the
+    /// value once it is the last relay itself.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from it.
+    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from this
+    /// SIR.
     FirstHop {
         /// Signal-to-interference ratio (SIR), linear, above 0.
         sir: f32,

@@ -219,8 +219,8 @@ impl Carrot {
         way(self.place, setpoint)
     }
 
-    /// Moves the target toward `setpoint` for the time until `now`. `drone` is the drone's position and its age, if
-    /// known.
+    /// Moves the target toward `setpoint` for the time from its last step until `now`. `drone` is the drone's position
+    /// and the age of this position; `None` if unknown.
     pub(super) fn advance(
         &mut self,
         now: Instant,

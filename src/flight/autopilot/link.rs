@@ -100,8 +100,8 @@ pub struct Autopilot {
     /// Release that has not been reported yet, and the time to report it; `None` if there is none. A release is the end
     /// of the relay's control of the drone.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and its begin (time). `None` if the pilot can
-    /// give control.
+    /// Reason why the pilot cannot give the relay control of the drone, and when the reason began. `None` if the pilot
+    /// can give control.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
     /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
@@ -111,8 +111,8 @@ pub struct Autopilot {
     /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
     /// because of the upstream neighbour, the second because of the downstream neighbour.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons why the guard (collision avoidance) holds the drone back, and since when. The first is because
-    /// of the upstream neighbour, the second because of the downstream neighbour.
+    /// Newest reasons why the guard (collision avoidance) holds the drone back, and when they last changed. The first
+    /// is because of the upstream neighbour, the second because of the downstream neighbour.
     newest_hold: ([Option<HoldReason>; 2], Instant),
     /// True from the acceptance of a new view (set of relays) until its relays have agreed on positions.
     is_new_view: bool,
@@ -541,7 +541,7 @@ impl Autopilot {
         }
     }
 
-    /// Reports the reason for which the relay cannot control the drone, once it has lasted for a second.
+    /// Reports the reason for which the relay cannot control the drone, once the reason has lasted for 1 s.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
             self.reported_wait = None;
@@ -570,8 +570,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the present reason not to control the drone must be reported. `None` once it has
-    /// been reported.
+    /// Returns the time at which the present reason not to control the drone must be reported. `None` once the reason
+    /// has been reported.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -708,8 +708,8 @@ impl Autopilot {
         message.encode(self.own(), self.peer(), sequence)
     }
 
-    /// Returns the MAVLink address of this component. It has the system number of its autopilot, since it is a part
-    /// of the vehicle.
+    /// Returns the MAVLink address of this component. The address has the autopilot's system number, because this
+    /// component is a part of the vehicle.
     fn own(&self) -> Address {
         Address {
             component: COMPONENT,
@@ -737,8 +737,8 @@ impl Autopilot {
     }
 
     /// Returns the position of a drone too far from the line Tx to Rx, and its distance from that line. Such a drone
-    /// has no position in the mission's coordinates. `None` for a drone near the line, and without a position for 3
-    /// s. Constant work.
+    /// has no position in the mission's coordinates. `None` if the drone is near the line, or if its last position is
+    /// older than 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.off_line_detector.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)

@@ -163,8 +163,8 @@ fn left(now: Instant, until: u32) -> Option<Duration> {
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the lines sent in the last 10 s. Each has the earliest time at which an equal line may be sent
-    /// again, in ms that wrap.
+    /// Hashes of the lines sent in the last 10 s. Each hash has the earliest time at which an equal line is allowed, in
+    /// wrapping ms.
     recent: Vec<(u32, u32), RECENT>,
     /// Hash of the last line sent on each topic, 0 before the first line. An equal line that would have to wait is
     /// dropped.
@@ -328,8 +328,8 @@ pub enum AutopilotEvent {
     /// Release: the relay no longer controls the drone. The event comes together with [`State::Standby`], or up to 1.3 s later if the cause
     /// is possibly a fence.
     Released(Release),
-    /// The pilot cannot give the relay control of the drone by OFFBOARD or GUIDED, for this reason. If the pilot has
-    /// chosen the mode already, the relay does not use it, for this reason.
+    /// The relay cannot control the drone now, for this reason. The pilot cannot give the relay control by OFFBOARD or
+    /// GUIDED, or the relay does not use the mode that the pilot has chosen.
     Waits(WaitReason),
     /// The pilot can now give the relay control of the drone, by the mode OFFBOARD or GUIDED.
     Ready,

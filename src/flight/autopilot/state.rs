@@ -195,8 +195,8 @@ impl Release {
     }
 }
 
-/// Reason for which the pilot cannot give the relay control of the drone. If the pilot has chosen the mode OFFBOARD or
-/// GUIDED already, the relay does not use this mode for the same reason.
+/// Reason for which the relay cannot control the drone now. The pilot cannot give the relay control, or the relay does
+/// not use the mode OFFBOARD or GUIDED that the pilot has chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {

@@ -15,7 +15,7 @@ const WINDOW: Duration = Duration::from_millis(4_000);
 /// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Number of [`WINDOW`]s in which a message is missing before it is no longer requested. A message without which the
+/// Number of [`WINDOW`]s without a message after which this message is no longer requested. A message without which the
 /// drone cannot fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
 /// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.

@@ -133,8 +133,8 @@ impl Trust {
         }
     }
 
-    /// Returns the next signature mismatch to report, once. `hears` is true if the autopilot answers requests, false
-    /// if it does not, and `None` while that is unknown.
+    /// Returns the next signature mismatch to report; each kind is returned once. `hears` is true if the autopilot
+    /// answers requests, false if it does not, and `None` while that is unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL

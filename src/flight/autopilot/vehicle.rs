@@ -454,7 +454,7 @@ impl Battery {
 
     /// Returns the remaining time of flight, s: the reported time, or else computed from the percentage.
     ///
-    /// NaN if unknown: without a valid percentage the time of a PX4 is no estimate either.
+    /// NaN if the percentage is not valid: then a PX4 has no estimate of the time either.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
     fn left_s(&self, percent: i8, remaining_s: i32) -> f32 {
         if !(0..=100).contains(&percent) {
@@ -737,7 +737,7 @@ impl OffLine {
 pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True from the report of a drone on the ground as far from the line, until it is near the line.
+    /// True once a drone on the ground was reported as off the line; false once it is near the line.
     reported_on_ground: bool,
 }
 

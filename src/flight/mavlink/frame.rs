@@ -128,7 +128,7 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows. These are messages of this crate, and messages whose payload may contain frames.
+/// Messages that the parser knows. These are messages of this crate, and messages whose payload can contain frames.
 ///
 /// The parser skips a message with such a payload as a whole, so that it does not take a frame inside the payload for a
 /// received one.

@@ -358,8 +358,8 @@ impl Node {
         neighbour == 0 || node.abs_diff(own) < neighbour.abs_diff(own)
     }
 
-    /// Returns true if node `to` at `side`, outside of the chain, may leave. It may leave once the view without it is
-    /// agreed on, and the relays of this view are in place.
+    /// Returns true if node `to` at `side`, outside of the chain, is allowed to leave. This is so once the view without
+    /// it is agreed on, and the relays of this view are in place.
     pub(super) fn frees(&self, side: Side, to: u16) -> bool {
         let lease = &self.layers.lease;
         let complete = lease.is_whole() && lease.until().is_some() && lease.orders().in_place;

@@ -293,8 +293,8 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). If this has just
-    /// become true, retransmits unanswered messages, because the neighbour can answer now.
+    /// Records if the neighbour at `side` has selected this relay: yes if `mutual` is true. If this has just become
+    /// true, retransmits unanswered messages, because the neighbour can answer now.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

@@ -224,8 +224,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first` is
-    /// true), messages that the node could not verify are sent again.
+    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first` is true),
+    /// messages that the node could not verify are repeated.
     pub(crate) fn on_authentic(&mut self, now: Instant, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;

@@ -28,8 +28,8 @@ impl Node {
         self.reporting.handle_frame(now, from);
     }
 
-    /// Returns the next node to which a handshake must be sent, because its report has not arrived. `None` if there is
-    /// no such node.
+    /// Returns the next node to which a handshake must be sent, because no report of this node has arrived. `None` if
+    /// there is no such node.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         self.reporting.poll_greeting()
     }

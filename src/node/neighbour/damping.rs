@@ -75,7 +75,7 @@ struct Link {
     losses: u8,
     /// True if the last loss does not count as flapping, because the channel was bad.
     excused: bool,
-    /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
+    /// True if the last loss was an outage: no frame came for longer than `dead_after` after the loss.
     was_down: bool,
     /// Time between the last two losses of the link; 0 if no earlier loss counted.
     interval: Duration,
@@ -272,7 +272,7 @@ impl Damping {
     }
 
     /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node has
-    /// been received without gaps for `probe_after`, and for the time `more`.
+    /// been received without gaps for at least `probe_after` and at least `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,

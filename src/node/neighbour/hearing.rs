@@ -54,8 +54,8 @@ impl ReportLimiter {
         nodes: 0,
     };
 
-    /// Returns true if the node `distance` relays away may be reported now, and marks it as reported. A node may be
-    /// reported once a minute.
+    /// Returns true if a report of the node `distance` relays away is allowed now. Marks the node as reported. One
+    /// report a minute is allowed for each node.
     pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {

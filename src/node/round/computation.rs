@@ -38,7 +38,7 @@ pub(super) enum PassKind {
 pub(super) struct JointPlace {
     /// Lateral offset and altitude of the position that this relay computed.
     pub(super) cross_section: CrossSection,
-    /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
+    /// Largest allowed x of this relay, m. Beyond this x the later relays could not keep the minimum separation. Not
     /// used in an interference field.
     pub(super) end_m: f32,
     /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays are allowed
@@ -479,7 +479,7 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay on this pass has its own power or fixed altitude, other than the mission's.
+    /// True if a later relay on this pass has a power or fixed altitude that differs from the mission's.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
