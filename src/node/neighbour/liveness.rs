@@ -107,7 +107,7 @@ pub(crate) struct Liveness {
 pub(crate) struct Silence {
     /// True if this check has found that the neighbour is lost.
     pub(crate) lost: bool,
-    /// Time at which the neighbour's silence is checked again.
+    /// Time of the next check of the neighbour's silence.
     pub(crate) next_check: Instant,
 }
 
@@ -130,10 +130,10 @@ impl Liveness {
         }
     }
 
-    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is
-    /// kept, because it describes the channel. The unanswered requests to the previous node count as a run. But they
-    /// do not count if the link `was_down`, because they then measure an outage. If the link `flaps` slowly, all runs
-    /// are dropped.
+    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is kept,
+    /// because it describes the channel. The unanswered requests to the previous node count as a run, unless `was_down`
+    /// is true: they then measure an outage of the link. If `flaps` is true (the link flaps slowly), all runs are
+    /// dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -218,8 +218,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost. It is never lost before a silence of `dead`. `tick` is the
-    /// time to the next check.
+    /// Checks at `now` if the silent neighbour is lost. The neighbour is never lost before a silence of `dead`. `tick`
+    /// is the time to the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,
