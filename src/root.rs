@@ -47,9 +47,9 @@ pub trait Real:
 impl Real for f32 {}
 impl Real for f64 {}
 
-/// Halves the interval from `low` to `high` `steps` times, and returns its ends.
+/// Halves the interval from `low` to `high` `steps` times, and returns the ends of the last interval.
 ///
-/// The value searched is the one up to which `holds` returns true. It is assumed to be true at `low` and false at `high`.
+/// `holds` must be true from `low` to some value, and false from this value to `high`. The last interval contains this value.
 pub fn bisected<T: Real>(low: T, high: T, steps: u8, mut holds: impl FnMut(T) -> bool) -> (T, T) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {

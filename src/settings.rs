@@ -95,7 +95,7 @@ pub struct Measure {
     pub samples: u32,
 }
 
-/// Settings that a firmware may choose.
+/// Options of a relay, which its firmware chooses.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -126,8 +126,8 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one
-    /// round trip of messages along the chain is enough. For the bracketed schedule only.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one round
+    /// trip of messages along the chain is enough. It has an effect only with the bracketed schedule.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
@@ -155,13 +155,13 @@ pub struct Settings {
     /// position in 32 equal steps. With 0 it moves in one step.
     ///
     /// If all drones arrive together, no hop is worse on the way than before or after
-    /// ([`docs::batteries`](crate::docs::batteries)). Choose it so that the longest way, about a spacing of the
-    /// chain, takes no more than the drones' usual speed. Use the same value for all relays of a chain. At most four
-    /// times `dead_after`.
+    /// ([`docs::batteries`](crate::docs::batteries)). Choose the duration so that the drones fly the longest way, about
+    /// a spacing of the chain, at their usual speed or slower. Use the same value for all relays of a chain. At most
+    /// four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
-    /// True if a relay without a guard may leave the chain (`Relay::leave`). Its neighbours then fly close to the drone
-    /// that still holds its place: beside the end of a chain to within a few metres.
+    /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
+    /// the drone that still holds its place. At an end of the chain they come as close as a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
@@ -240,8 +240,8 @@ impl Settings {
     /// relays in range of each other, with the overhead of a frame.
     ///
     /// `probe_after` is 5 s, or longer if the channel would be overloaded with 5 s ([`ChannelLoad::carried`]).
-    /// `dead_after` is three times `probe_after`. `hop_time` is that of [`ChannelLoad::hop_time`] with a latency of
-    /// 10 ms, but at least 30 ms. Set a longer `hop_time` for a radio that buffers frames longer. All relays of a
+    /// `dead_after` is three times `probe_after`. `hop_time` is the value of [`ChannelLoad::hop_time`] with a latency
+    /// of 10 ms, but at least 30 ms. Set a longer `hop_time` for a radio that buffers frames longer. All relays of a
     /// chain need the same settings.
     ///
     /// ```

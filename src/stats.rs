@@ -25,7 +25,7 @@ pub struct Stats {
     pub crc: u32,
     /// Received intact frames of another version of the frame format.
     pub version: u32,
-    /// Received handshake frames with the right authentication tag, which only establish sessions.
+    /// Received handshake frames with the right authentication tag. Handshakes only establish sessions.
     pub handshakes: u32,
     /// Intact frames without an authentication tag, received by a relay with a key. A relay without a key counts
     /// mission offers here, because it accepts offers only with a key.

@@ -113,7 +113,7 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// | up to 100 ms before the latest | stands still until the caller's time has caught up |
 /// | earlier than that | goes on from the latest, in step with the caller's time from now on |
 ///
-/// Timers continue after a backward step, which extends a lease at most by the time between two calls.
+/// Timers continue after a backward step. The step extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
     /// Time of the caller's clock up to which this clock has advanced.

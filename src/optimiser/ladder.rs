@@ -19,8 +19,8 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target SIR at the lower end of the ladder's middle gap, linear. With 16 targets it is the eighth target. In a
-    /// ladder with a single target it is this target.
+    /// Lower one of the two middle targets, linear SIR: the eighth of 16 targets. In a ladder with a single target it
+    /// is this target.
     anchor: f32,
     /// Code of the relative width of the gap between the two middle targets. The width is the difference of the two
     /// targets divided by the lower target. The code is a float of 5 exponent and 3 mantissa bits. Code 0: `anchor`

@@ -23,14 +23,14 @@ use crate::sir::{Sender, in_noise, square};
 /// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
 const ROWS: u8 = 5;
 
-/// Number of rounds of the coarse-to-fine search; each halves the range of altitudes.
+/// Number of rounds of the coarse-to-fine search. Each round halves the range of altitudes.
 const ROUNDS: u8 = 9;
 
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
 /// Number of equal intervals of x on each side of the interferer. The search evaluates both hops at the ends of the
-/// intervals. Only for traffic in both directions.
+/// intervals. It is used only for traffic in both directions.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -300,9 +300,8 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude in the range that the current round tries, m. `part` is the altitude's place in this
-    /// range: 0 is the lowest altitude, 1 the highest. The result never exceeds the highest altitude, in spite of
-    /// rounding.
+    /// Returns an altitude in the range that the current round tries, m. `part` 0 is the lowest altitude of the range,
+    /// 1 the highest. The result never exceeds the highest altitude, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }

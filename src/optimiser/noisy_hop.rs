@@ -231,9 +231,9 @@ pub(super) fn before(x_m: f32, d: f32) -> f32 {
     }
 }
 
-/// Returns the shortest length from `least` to `most`, m, at which `hop` meets its target, or `None`.
+/// Returns the shortest length from `least` to `most`, m, at which `hop` meets its target.
 ///
-/// The hop must not meet the target at `least`.
+/// `None` if there is no such length. The hop must not meet the target at `least`.
 pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     if !(hop.ratio <= MOST_RATIO) {
         return None;
@@ -250,8 +250,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the length, m, from which a hop without noise meets its target as it gets longer. `None` if there is no
-/// such length; the length may be negative. The hop's margin to its target is 0 there, and rises.
+/// Returns the length, m, from which on longer hops without noise meet the target. The hop's margin to its target is 0
+/// at this length, and rises with the length. `None` if there is no such length; the length may be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -275,7 +275,7 @@ mod tests {
     use crate::features::NOISE;
 
     /// Returns the smallest hop length at which `hop` meets its target, m, by trial in fine steps. The test compares
-    /// [`closest`] with it.
+    /// the result of [`closest`] with this length.
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)

@@ -27,11 +27,12 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only with data in both
-/// directions.
+/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Used only with data in
+/// both directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of points of an interference field that one call evaluates. One target may need more.
+/// Maximum number of points of an interference field that one call evaluates. The evaluation of one target is completed
+/// even if it needs more points.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay of a pass along the chain, as its message describes it.
@@ -46,7 +47,7 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// Returns a previous relay with this altitude and power, above the line, without a measurement.
+    /// Returns a previous relay with this altitude and power, lateral offset 0, and no measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -62,7 +63,7 @@ pub struct Link<'a> {
     pub mission: &'a Mission,
     /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
-    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
+    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the relay next to Rx.
     pub index: u16,
     /// Lateral offset, altitude and transmit power of this relay.
     pub own: Station,
@@ -86,7 +87,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x at which a pass starts: that of Tx, or of Rx in an interference field, m.
+/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx in an interference field.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -351,8 +352,8 @@ impl<'a> Link<'a> {
     /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
     /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
-    /// position. The search assumes that its possible positions are an interval, although there may be holes. Bounded
-    /// by two reaches, in an interference field by three for each of its points.
+    /// position. The search assumes that the possible positions of the previous relay are one interval, although this
+    /// interval can have gaps. Bounded by two reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,

@@ -44,7 +44,7 @@ pub(crate) enum Sender {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are the same.
+    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are equal.
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
@@ -53,8 +53,8 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number. It thus wins against a node that starts later. Of two
-/// nodes with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number. With this bit the relay wins against a node that starts
+/// later. Of two nodes with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -89,14 +89,14 @@ struct Peer {
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
-    /// Largest nonce that this node has sent; 0 if none was sent.
+    /// Largest nonce that this relay has received from the node; 0 if none was received.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
 }
 
-/// Counts consecutive handshakes of a node with an outdated nonce. Several show that the node's epoch went back, or
-/// that it restarted in the same epoch.
+/// Counts consecutive handshakes of a node with an outdated nonce. Several of them show that the node's epoch went
+/// back, or that the node restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
@@ -404,7 +404,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns the sender of `frame`, which bears this relay's own number: this relay or another node. Work: the
+    /// Returns the sender of `frame`, whose sender number is this relay's own: this relay, or another node. Work: the
     /// computation of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
@@ -423,8 +423,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the node that made `nonce`: this relay, or another node that uses its node number. `Unknown` if the
-    /// nonce's epoch (start counter) is older than this relay's.
+    /// Returns the node that made `nonce`: this relay, or another node with this relay's node number. `Unknown` if the
+    /// nonce's epoch (start counter) is older than this relay's epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {

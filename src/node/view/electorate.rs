@@ -89,9 +89,9 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on the view `proposal`, and returns the votes so far, including this one. `None` if this relay has
-    /// already promised `proposal` or a later view. `received` has the votes of earlier relays; `None` at the
-    /// proposer. `other_leases` has the remaining times of other relays' leases.
+    /// Votes on the view `proposal`, and returns the votes so far, including this vote. `None` if this relay has already promised
+    /// `proposal` or a later view. `received` has the votes of earlier relays; `None` at the proposer. `other_leases` has the remaining
+    /// times of other relays' leases.
     pub(crate) fn vote(
         &mut self,
         node: u16,

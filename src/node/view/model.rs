@@ -86,7 +86,8 @@ fn departures_and_joins_keep_one_sequence_of_views() {
     }
 }
 
-/// Checks that the model check finds a departure that reduces the quorum before it is agreed on.
+/// Checks that the model check finds a wrong rule for departures. By this rule a departure reduces the quorum before
+/// the chain has agreed on the departure.
 #[test]
 fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     let check = Check {
@@ -613,8 +614,9 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. No such view may
-    /// have more member relays than its number of relays.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Each of these views
+    /// must also have at most as many members as its number of relays. A member is a relay that knows this view as the
+    /// newest agreed view, and has a vote in it.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {

@@ -166,7 +166,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
 /// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as logarithms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
-    /// Position (x, y, h) of the interferer.
+    /// Position (x, y, h) of the interferer, in units of the distance from Tx to Rx.
     pub(super) source: Triple,
     /// Receiver noise divided by the interferer's power received at the distance D (nu).
     pub(super) noise: f32,
@@ -243,7 +243,8 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays in a segment. Only one segment of the chain has its computed moves in memory at a time.
+/// Number of relays whose computed moves are in memory at one time. This is one segment of the chain, or 0 without the
+/// feature `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 

@@ -294,8 +294,9 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point at which the line from `best` to `wanted` leaves a circle. `middle` is the circle's centre, and
-/// `rim` its squared radius, m^2. `None` if `best` is outside.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. The points are lateral offsets and
+/// altitudes. `middle` is the circle's centre, and `rim` its squared radius, m^2. `None` if `best` is outside of the
+/// circle.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -488,19 +489,19 @@ const STIFFNESS: f32 = 100.0;
 /// distance from Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference of a hop's squared length from the maximum, up to which it counts as stretched. It applies to
-/// hops that end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
+/// Relative tolerance up to which the squared length of a hop counts as its maximum. The tolerance applies to hops that
+/// end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns three numbers about a relay at `to` that may be too near the interferer. The first number is the
-    /// missing squared distance, m^2; 0 if the relay is far enough away. The second number is the weight of the
-    /// penalty for it. The third number is the derivative of the first with respect to ln(target SIR). `c` is the
-    /// target SIR divided by the sender's gain.
+    /// Returns three numbers about a relay at `to` that can be too near the interferer. The first number is the squared
+    /// distance that the relay lacks, m^2; 0 if the relay is far enough away. The second number is the weight of the
+    /// penalty for this. The third number is the derivative of the first number with respect to ln(target SIR).
     ///
-    /// A hop of maximum length from p to p' that ends near the interferer at m is short. It violates the minimum
-    /// separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with the inverse q of interference plus noise.
-    /// With the noise nu that is so if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// `c` is the target SIR divided by the sender's gain. A hop of maximum length from p to p' that ends near the
+    /// interferer at m is short. It violates the minimum separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2,
+    /// with the inverse q of interference plus noise. With the noise nu that is so if |p' - m|^2 < L / (1 - nu L) for L
+    /// = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);

@@ -210,7 +210,7 @@ impl Reports {
     }
 }
 
-/// Report whose content a relay without the feature `telemetry` hands on without decoding it.
+/// Report whose content a relay without the feature `telemetry` forwards without decoding it.
 #[cfg(not(feature = "telemetry"))]
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reports(Vec<u8, 86>);

@@ -319,8 +319,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts; of two spares the
-    /// spare with the lower number.
+    /// Merges the requests of two parts of the chain. If both parts have a departure, the more urgent one counts. If
+    /// both have a spare, the spare with the lower number counts.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
@@ -378,7 +378,7 @@ impl RenewalBody {
     /// Returns the nodes that leave and join, 0 for none.
     ///
     /// # Errors
-    /// [`MessageError::Value`] if a number is above 1000, or if both numbers are present and 0.
+    /// [`MessageError::Value`] if a number is above 1000, or if two numbers are encoded that are both 0.
     fn nodes(&self) -> Result<[u16; 2], MessageError> {
         let Some([a, b, c, d]) = self.nodes else {
             return Ok([0; 2]);

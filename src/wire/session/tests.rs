@@ -119,8 +119,8 @@ fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     }
 }
 
-/// Checks that a lost handshake does no lasting harm. The node that lacks a proof of the other's presence requests it
-/// again.
+/// Checks that both nodes prove their presence to each other although one handshake is lost. A node without this proof
+/// requests a handshake again.
 #[test]
 fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {

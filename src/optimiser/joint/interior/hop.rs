@@ -90,7 +90,8 @@ impl LogGains {
         }
     }
 
-    /// Returns the logarithms of both gains of hop `k`, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
+    /// Returns the logarithms of both gains of hop `k`; the backward gain is divided by r. `k` is 1 (from Tx) to N + 1
+    /// (to Rx).
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;

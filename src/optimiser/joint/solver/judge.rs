@@ -16,8 +16,8 @@ use core::task::Poll;
 /// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). A chain within
-/// this tolerance of the bound ends the search for better ones.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). If a chain is
+/// within this tolerance of the bound, the search for better chains ends.
 pub(super) const CEILING: f32 = 5e-5;
 
 /// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.

@@ -129,7 +129,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// True unless the current chain's improvement was stopped early. It is stopped if the chain would not become the
     /// best chain.
     is_whole: bool,
-    /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
+    /// True in the last phase. It searches the best chain's target more finely, and moves single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
@@ -425,8 +425,8 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is
-    /// the target, the others are each relay's lateral offset and altitude. If `once_more`, the best chain is
+    /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is the
+    /// target, the others are each relay's lateral offset and altitude. If `once_more` is true, the best chain is
     /// computed again instead of stored.
     fn solved(
         mission: &Mission,
