@@ -182,7 +182,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if a relay with these settings may fly a mission with the time slots of `config`.
+    /// Returns true if a relay with these settings can fly a mission with the time slots of `config`.
     ///
     /// This is so if the slots are equal. It is also so for fitted slots (as long as each hop needs), with the method
     /// `Joint` and a known interferer.
@@ -299,9 +299,9 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` cannot be used. Either the mission gives the interference as a distribution along x, and the method
-    /// is not [`Method::Align`]. Or the joint method has more than 100 relays. Or the method needs a feature that the
-    /// crate was built without.
+    /// `method` cannot be used. Either the mission gives the interference as a distribution along x, and the method is
+    /// not [`Method::Align`]. Or the method is [`Method::Joint`], and the chain has more than 100 relays. Or the method
+    /// needs a feature that the crate was built without.
     Method,
     /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
     /// traffic in both directions this method needs a known interferer.

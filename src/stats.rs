@@ -13,7 +13,7 @@ pub struct Stats {
     /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
     /// example as stale.
     pub received: u32,
-    /// Received duplicates of view proposals and of messages along the chain. This relay has answered them again.
+    /// Received duplicates of view proposals and of messages along the chain. This relay has repeated its replies.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, received on a shared channel.
     pub overheard: u32,

@@ -103,7 +103,7 @@ const DISORDER: Duration = Duration::from_millis(100);
 /// taking internal time to its maximum, at which no timer would expire.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time may step in
+/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time can step in
 /// either direction.
 ///
 /// | caller's time | internal time |

@@ -293,7 +293,7 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that the motion ends in time although new agreements arrive faster than its duration.
+    /// Checks that the motion ends in time even if new agreements arrive before its end.
     #[test]
     fn frequent_agreements_do_not_put_off_the_arrival() {
         let span = Duration::from_millis(20_000);

@@ -29,8 +29,8 @@ pub struct Ladder {
     /// Code of the growth of the gaps between targets from the middle of the list to its ends. Each gap is 1 +
     /// `growth` / 16 times the next one toward the middle.
     growth: u8,
-    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of that x for the sake of the next relay on the pass.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
+    /// stay short of that x to help the next relay on the pass.
     plain: bool,
 }
 
@@ -53,7 +53,7 @@ impl Ladder {
     }
 
     /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In any other
-    /// pass a relay may stay short of this x to help the next relay.
+    /// pass a relay is allowed to stay short of this x to help the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }

@@ -364,9 +364,9 @@ impl LocalSearch {
 
     /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
     ///
-    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where
-    /// the SIRs of both hops are equal may be narrower than the spacing, so the first two x with equal SIRs are
-    /// searched by bisection.
+    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where the
+    /// SIRs of both hops are equal can be narrower than the spacing, so the first two x with equal SIRs are searched by
+    /// bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {

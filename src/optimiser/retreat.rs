@@ -74,7 +74,7 @@ pub struct Retreat<'a> {
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x that the sender of this hop may take, m from Tx.
+    /// Smallest permitted x of this hop's sender, m from Tx.
     end_m: f32,
     to_rx: bool,
     /// Backward hop from the receiver to the sender: its gain, and the interference at the sender. `None` for data in
@@ -135,8 +135,8 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender that may be at any x down to Tx. No separation is reserved for the relays
-    /// between `index` and Tx.
+    /// Returns this hop with a sender at any x down to Tx. No separation is reserved for the relays between `index` and
+    /// Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -485,7 +485,7 @@ struct Piece {
 ///
 /// `value` returns the sender's x for the receiver's x, y, and for `quiet`, which is Upsilon = E[1/I] at y divided by
 /// the field's largest Upsilon. This sender's x is y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the
-/// target, and s is the first of `squares`. It is `None` if the square under the root is below the second of
+/// target, and s is the first of `squares`. `value` returns `None` if the square under the root is below the second of
 /// `squares` minus the first. Work: at most three values for each field point from `low` to `high` that a hop could
 /// reach.
 pub(super) fn least(

@@ -40,9 +40,10 @@ use crate::wire::upload::{Upload, UploadError};
 ///   this wait early: until the leases have expired, two chains can then fly.
 /// - *Getters* take constant time and return values of the last agreement. Positions are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
-/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store
-///   what [`unpersisted`](Self::unpersisted) returns, call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then [`poll_event`](Self::poll_event) until `None`,
-///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
+/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store the record that
+///   [`unpersisted`](Self::unpersisted) returns, call [`poll_transmit`](Self::poll_transmit) until it returns `None`,
+///   then [`poll_event`](Self::poll_event) until it returns `None`, then sleep until
+///   [`poll_timeout`](Self::poll_timeout) or the next byte.
 /// - After that, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
 /// - *Setpoints* are finite, within [0, D] along the line, at the relay's altitude or at an altitude in the mission's
 ///   band, and at least the mission's separation from the neighbours' setpoints of the same pass. There is no setpoint
@@ -119,7 +120,7 @@ impl Relay {
         Ok(relay)
     }
 
-    /// Creates a relay directly in `slot`, as [`new`](Self::new) does, but without space on the stack.
+    /// Creates a relay as [`new`](Self::new) does, but directly in `slot`, without use of the stack.
     ///
     /// # Errors
     /// Returns the errors of [`new`](Self::new); `slot` is then unchanged.
@@ -356,8 +357,7 @@ impl Relay {
 
     /// Returns the current votes on views (acceptor state), whether they are stored or not.
     ///
-    /// A firmware may store them at the start, so that a fault of the storage shows before flight. Takes constant
-    /// time.
+    /// A firmware can store them at the start, so that a fault of the storage shows before flight. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
         self.node.view_record()
     }
@@ -384,7 +384,7 @@ impl Relay {
 
     /// Restores the votes on views that were stored before the relay was switched off in flight.
     ///
-    /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
+    /// Call it right after the relay was created; only `Relay::resume` is allowed before. Takes constant time.
     ///
     /// # Errors
     /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and
@@ -637,7 +637,7 @@ impl Relay {
         self.node.round().rounds()
     }
 
-    /// Returns the relay's transmit power, and the altitude that was agreed on for it last.
+    /// Returns the relay's transmit power, and its last agreed altitude.
     pub fn profile(&self) -> Profile {
         self.node.round().profile()
     }

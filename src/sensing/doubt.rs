@@ -101,7 +101,7 @@ enum Stage {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
     stage: Stage,
-    /// Number of sensing passes (collections of measurements) until the next search may start.
+    /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
     /// Node whose exclusion has given the fit with the smallest variance so far.
     best: u16,

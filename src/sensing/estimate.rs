@@ -103,7 +103,7 @@ pub struct NumberedEstimate {
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
-/// may mean that the interference itself has changed.
+/// can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
 /// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a stationary source.

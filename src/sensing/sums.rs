@@ -71,7 +71,7 @@ pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Terms of a position, of which the inverse interference of a source is a linear combination. They are 1, u, u^2 -
+/// Four terms of a position. The inverse interference of a source is a linear combination of them. They are 1, u, u^2 -
 /// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
@@ -290,9 +290,9 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units
-    /// of [`UNIT_W`]. `expected` returns the inverse power, 1e-12 W / I, that the current estimate predicts for the
-    /// terms of a position. It is needed for the weights of the measurements.
+    /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units of
+    /// [`UNIT_W`]. `expected` returns the inverse power, 1e-12 W / I, that the current estimate predicts for the terms
+    /// of a position. This prediction is needed for the weights of the measurements.
     pub(crate) fn add(
         &mut self,
         now: Instant,

@@ -68,7 +68,7 @@ pub struct SerialLink<P, D = NoPin> {
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
-    /// True if the last poll stopped reading at its limit, so that the port may have more bytes.
+    /// True if the last poll stopped reading at its limit. The port can then have more bytes.
     unread: bool,
     stats: SerialStats,
 }

@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant};
 pub(crate) enum Sender {
     /// The relay itself: the received frame is an echo of a frame that this relay has sent.
     Itself,
-    /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
+    /// Another node, whose claim to the node number is not known. With signed frames it can be a forger.
     Unknown,
     /// Another node that claims this relay's node number, with its claim.
     Rival(Rival),
@@ -168,8 +168,8 @@ pub(crate) enum Checked {
     /// New handshake that contains this relay's current nonce, which proves that its sender is present. `first` is
     /// true if the sender had not proved this before in the present session.
     Handshake { first: bool },
-    /// Handshake with the right tag but without this relay's current nonce. It may have been recorded earlier, so it
-    /// does not prove that its sender is present.
+    /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
+    /// not prove that its sender is present.
     Unproven,
     /// Received frame without an authentication tag.
     Unsigned,
@@ -183,8 +183,8 @@ pub(crate) enum Checked {
 }
 
 impl Session {
-    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. A node that is
-    /// silent for `gone_after` may be replaced by another node with its number.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. If a node is silent
+    /// for `gone_after`, another node with its number can replace it.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {

@@ -28,7 +28,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum amount by which one message may raise the latest known view number. One message thus cannot use up all
+/// Maximum amount by which one message can raise the latest known view number. So one message cannot use up all
 /// numbers.
 const MAX_ADVANCE: u32 = 4096;
 
@@ -103,8 +103,8 @@ impl ViewChange {
     }
 
     /// Records that another relay knows `view`. The latest known view advances by at most [`MAX_ADVANCE`] numbers,
-    /// because one message could otherwise use up all of them. A relay that was away for long catches up, because it
-    /// receives `view` repeatedly.
+    /// because one message could otherwise use up all of them. A relay that was away for long receives `view`
+    /// repeatedly, and so catches up.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
@@ -130,8 +130,8 @@ impl ViewChange {
         self.proposed
     }
 
-    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` without a proposal.
-    /// Ranks count from 1 at the leader.
+    /// Returns this relay's rank in the last view proposal, and the number of relays of the proposal. Ranks count from
+    /// 1 at the leader. `None` without a proposal.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
@@ -291,7 +291,7 @@ impl ViewChange {
         self.apply_view_verdict(context, verdict)
     }
 
-    /// Schedules another view proposal after a refusal, because more relays may be reachable then.
+    /// Schedules another view proposal after a refusal, because more relays can be reachable by then.
     pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.request.request_after_refusal(context.now, wait);
@@ -573,8 +573,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is decided. If a request waits after a refusal, this
-    /// call shortens the wait, because something has changed.
+    /// Requests a view, and repeats the request until a view is decided. If a request waits after a refusal, this call
+    /// shortens the wait, because there is a new reason for a view.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);

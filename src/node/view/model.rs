@@ -213,7 +213,7 @@ pub(super) struct Chain {
     pub(super) relays: Vec<RelayState>,
     /// Part number of each relay while links are cut. Relays with equal numbers reach each other.
     pub(super) parts: Vec<u8>,
-    /// Frames that were sent and may still arrive, sorted and without duplicates.
+    /// Frames that were sent and can still arrive, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
     /// Views that the relays of the model have ever decided on.
     pub(super) decided: Vec<DecidedView>,
@@ -225,7 +225,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
     /// Bit mask of the relays outside of the chain; bit 0 is the first relay.
     pub(super) outside: u8,
-    /// Number of departures and joins that may still happen in this run of the model.
+    /// Number of departures and joins that can still happen in this run of the model.
     pub(super) moves: u8,
 }
 
@@ -632,7 +632,7 @@ impl Check {
     }
 }
 
-/// Maximum number of proposals that a chain may need to agree on a view once its links are restored.
+/// Maximum number of proposals that a chain is allowed to need for a view once its links are restored.
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {

@@ -88,8 +88,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude at which relay `index` is held, m. `None` if the relay may choose its altitude. Also
-    /// `None` if the mission allows one altitude only.
+    /// Returns the altitude at which relay `index` is held, m. `None` if the relay is free to choose its altitude, or
+    /// if the mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -163,7 +163,7 @@ impl<'a, F: SeatOf> Chain<'a, F> {
 /// the receiver, divided by the squared length of the hop. For the receivers Rx and Tx, the gain already includes the
 /// interference.
 ///
-/// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as logarithms.
+/// Lengths are in units of the distance D from Tx to Rx. The gains can also be stored as logarithms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
     /// Position (x, y, h) of the interferer, in units of the distance from Tx to Rx.
@@ -318,7 +318,7 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
-    /// Lateral offsets and altitudes that the relay may choose from.
+    /// Permitted lateral offsets and altitudes of the relay.
     pub room: Room,
     /// Transmit power of the relay, W.
     pub power_w: f32,
@@ -334,7 +334,7 @@ impl Seat {
     }
 
     /// Returns the profile of a relay with the altitude and power `own`. If `holds` is true, the relay keeps this
-    /// altitude; otherwise it may choose another altitude.
+    /// altitude. If it is false, the relay is free to choose another altitude.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

@@ -76,9 +76,9 @@ const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 ///
 /// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
-/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio
-/// the length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about
-/// 6e-8, so a shorter slot may be empty.
+/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio the
+/// length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about 6e-8,
+/// so a shorter slot can become empty.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
@@ -516,7 +516,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains. More chains are tried if relays may choose lateral offsets or altitudes.
+/// Returns the number of initial chains. More chains are tried if several lateral offsets or altitudes are allowed.
 fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {

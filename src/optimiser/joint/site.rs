@@ -41,7 +41,7 @@ pub(crate) struct Site<'a> {
 
 impl<'a> Site<'a> {
     /// Creates the relay to be placed, which receives from `sender`; `first` is true if the sender is Tx. `room` has
-    /// the lateral offsets and altitudes that the relay may choose from.
+    /// the permitted lateral offsets and altitudes of the relay.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -115,9 +115,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the
-    /// centre and the squared radius, m^2. `None` if c = target / gain is at most 1, where the reach has no such
-    /// limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the centre
+    /// and the squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -267,8 +266,8 @@ impl<'a> Site<'a> {
 }
 
 /// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
-/// first; `a` and `b` are the other two coordinates of the end. There may be two solutions: `rising` selects the
-/// larger one. `None` without a solution.
+/// first; `a` and `b` are the other two coordinates of the end. If there are two solutions, `rising` selects the larger
+/// solution. `None` without a solution.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -386,13 +385,13 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
     band.nearest(band.least_m + code * (band.span_m() / LAST))
 }
 
-/// Lateral offsets and altitudes that a relay may choose from.
+/// Permitted lateral offsets and altitudes of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Range of the lateral offsets that the relay may choose from, m.
+    /// Range of the permitted lateral offsets, m.
     pub lateral: Band,
-    /// Range of the altitudes that the relay may choose from, m.
+    /// Range of the permitted altitudes, m.
     pub band: Band,
 }
 
@@ -472,8 +471,8 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the lateral
-/// offsets and altitudes that the relay may choose from.
+/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the permitted
+/// lateral offsets and altitudes of the relay.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -485,8 +484,8 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
 /// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from a limit of its allowed range at which a relay counts as at that limit. It is a fraction of the
-/// distance from Tx to Rx.
+/// Tolerance within which a relay counts as at a limit of its allowed range. It is a fraction of the distance from Tx
+/// to Rx.
 const EDGE: f32 = 2e-6;
 
 /// Relative tolerance up to which the squared length of a hop counts as its maximum. The tolerance applies to hops that

@@ -20,8 +20,8 @@
 use super::super::chain::{Chain, Gains, SeatOf};
 use super::super::hop::{Triple, minus};
 
-/// Amount added to each squared hop length, so that its logarithm is finite. In units of the squared distance Tx to
-/// Rx.
+/// Amount added to each squared hop length, so that its logarithm is finite. The unit is the squared distance from Tx
+/// to Rx.
 const SHORTEST: f32 = 1e-8;
 
 /// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).

@@ -37,9 +37,9 @@ use core::task::Poll;
 use hop::{Derivatives, Levels, LogGains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight for a start far from the result.
+/// First barrier weight of the interior-point method, for a start far from the result.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight for a start near the result.
+/// First barrier weight of the interior-point method, for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
 /// Last barrier weight. The result differs from a local optimum by at most this value, in ln(SIR), if the problem is
 /// concave around the optimum.

@@ -529,5 +529,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// First target to try minus the interior-point method's result, in ln(SIR). It is the possible error of this method.
+/// Difference of the first target to try and the result of the interior-point method, in ln(SIR). The first target is
+/// higher by this difference, which is the possible error of this method.
 const ABOVE: f32 = 1e-4;

@@ -98,7 +98,7 @@ enum Purpose {
 impl Purpose {
     /// Returns true for the sweep's rules: hops are computed as the relays compute them from messages.
     ///
-    /// Some relays may then stay short of their farthest position.
+    /// By these rules a relay is allowed to stay short of its farthest position.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -126,8 +126,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, and if
     /// it was stopped early.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was stopped early. It is stopped if the chain would not become the
-    /// best chain.
+    /// True if the current chain's improvement has not been stopped early. It is stopped if the chain would not become
+    /// the best chain.
     is_whole: bool,
     /// True in the last phase. It searches the best chain's target more finely, and moves single relays.
     again: bool,
