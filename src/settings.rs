@@ -69,7 +69,7 @@ pub struct Adjust {
     pub rounds: u16,
     /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
-    /// Method by which a relay searches a better position when it moves.
+    /// Method by which a relay searches for a better position when it moves.
     pub local: Local,
 }
 
@@ -306,8 +306,8 @@ pub enum SetupError {
     /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
     /// traffic in both directions this method needs a known interferer.
     Reverse,
-    /// The mission has fitted slots (`fitted_gap` above 0). The method must then be Joint, `listen` `None`, and the
-    /// interferer known.
+    /// The mission has fitted slots (`fitted_gap` above 0), but the method is not Joint. Or `listen` is set, or the
+    /// interferer is unknown.
     Fitted,
     /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,

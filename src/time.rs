@@ -116,9 +116,9 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// Timers continue after a backward step. The step extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Time of the caller's clock up to which this clock has advanced.
+    /// Latest time of the caller's clock to which this clock has advanced.
     latest: Instant,
-    /// Internal time, which never runs backward, when the caller's clock showed `latest`.
+    /// Internal time at which the caller's clock showed `latest`. The internal time never runs backward.
     internal: Instant,
 }
 

@@ -35,7 +35,7 @@ const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
 
-/// Method by which one relay searches its best position between its neighbours (Algorithm 2).
+/// Method by which one relay searches for its best position between its neighbours (Algorithm 2).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
@@ -52,7 +52,7 @@ pub enum Local {
     },
 }
 
-/// Neighbour of the relay that searches its best position, as an end of one of the relay's two hops.
+/// Neighbour of the relay that searches for its best position: an end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
@@ -63,8 +63,8 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Hops of a relay: from the node toward Tx to the relay, and from the relay to the node toward Rx. The relay may be
-/// anywhere.
+/// Hops of a relay: from the node toward Tx to the relay, and from the relay to the node toward Rx. The relay can be at
+/// any position.
 ///
 /// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from
 /// the node toward Tx are A q / l, with the gain A, and backward `returned` / l. The SIRs of the hop to the node

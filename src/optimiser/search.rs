@@ -101,8 +101,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates a search by the leader of `mission` with the profile `leader`. Other relays may have profiles of their
-    /// own.
+    /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
     ///
     /// # Errors
     /// [`Infeasible`] if a relay right above the receiver gives the receiver an SIR of 0, because the interferer is

@@ -69,8 +69,8 @@ const CONSISTENT: f64 = 0.1;
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay's measurement fits the others, so that it is used again. The first is a
-/// multiple of the variance, the second a squared relative difference; the larger one counts.
+/// Limits within which an excluded relay's measurement fits the other measurements, and is used again. The first limit
+/// is a multiple of the variance, the second a squared relative difference. The larger of the two limits counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty relay. With four relays, an exclusion leaves three measurements, and
@@ -315,8 +315,9 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple
-/// of the variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first limit is a
+/// multiple of the variance, the second a squared relative difference, here a factor of 1.5. The larger of the two
+/// limits counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is

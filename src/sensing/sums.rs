@@ -25,7 +25,7 @@ pub struct Level {
     pub count: f32,
 }
 
-/// Check of the levels measured at Tx and Rx: true for each that does not fit the relays' measurements.
+/// Flags of the levels measured at Tx and Rx: true if a level does not fit the relays' measurements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
@@ -211,7 +211,7 @@ impl Sums {
         }
     }
 
-    /// Returns the number of measured positions in the sums; older ones count less.
+    /// Returns the number of measured positions in the sums. Older positions count less.
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count

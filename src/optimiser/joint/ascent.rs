@@ -25,8 +25,8 @@ const LEAST_TRUST: f32 = 1e-4;
 /// from Tx to Rx. The minimum is needed because the rate is a divisor; the rate is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of the target is raised, in ln(SIR). The limit is raised if the chain meets it,
-/// but does not meet the upper bound of all chains.
+/// First increase of the limit of the target, in ln(SIR). The limit is raised if the chain meets it, but does not meet
+/// the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
 /// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
@@ -81,7 +81,7 @@ pub(crate) struct Ascent {
     /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If the chain misses
     /// the bound, this limit is raised.
     pub(crate) limit: f32,
-    /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
+    /// Next increase of `limit`, the target at which the chain is checked, in ln(SIR).
     excess: f32,
     /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. The limit is lowered if relays
     /// are too near the interferer, because a large slack would outweigh the penalty for their positions.
