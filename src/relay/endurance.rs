@@ -289,8 +289,8 @@ impl Relay {
 
     /// Returns true if the pilot has to fly the drone home now.
     ///
-    /// This is so if the relay has requested to leave, and either the chain no longer needs the drone, or only the way home and the reserve
-    /// are left. Takes constant time.
+    /// This is so if the relay has requested to leave, and either the chain allows the drone to leave ([`Event::MayLeave`]), or only the
+    /// way home and the reserve are left. Takes constant time.
     pub fn must_leave(&self) -> bool {
         let leaves = self.node.leaves();
         leaves.is_some_and(|is_free| is_free || self.is_at_reserve())

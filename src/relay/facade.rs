@@ -693,8 +693,8 @@ impl Relay {
     /// Records that the drone flies to the setpoints from now on (`flown`) or not; initially true. Takes constant time.
     ///
     /// Pass false while a pilot controls the drone or it is on the ground. With `Settings::guard`, the relay then has
-    /// no setpoint, and its neighbours are informed that it may be anywhere: they keep their positions toward it. Once
-    /// `flown` is true again, the relay starts as after power-up, with the next position from
+    /// no setpoint, and its neighbours are informed that the drone can be anywhere: they keep their positions toward
+    /// it. Once `flown` is true again, the relay starts as after power-up, with the next position from
     /// [`handle_position`](Self::handle_position). A repeated call with the same value has no effect.
     ///
     /// ```
@@ -755,8 +755,8 @@ impl Relay {
     /// drone, s; `None` if it is unknown. Call it again when the endurance changes.
     ///
     /// The relay holds its place until [`Event::MayLeave`]. A departure needs a guard, or
-    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). If it is called right after a start,
-    /// the relay joins the chain only if the chain turns out to need this relay. See
+    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). If `leave` is called right after a
+    /// start, the relay joins the chain only if the chain turns out to need this relay. See
     /// [`docs::batteries`](crate::docs::batteries). Takes constant time.
     ///
     /// ```
