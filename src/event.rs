@@ -139,7 +139,7 @@ pub enum Event {
     MayLeaveTold {
         /// Side of this relay on which the node is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the node whose drone may fly away.
+        /// Index of the node whose drone is permitted to leave.
         node: u16,
     },
 }

@@ -725,8 +725,10 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, if relays computed after it need no separation. Farthest
-    /// means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, without the separation of the relays after it.
+    ///
+    /// The relays after it are those whose positions are computed later. Farthest means toward Rx, or toward Tx in an
+    /// interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }

@@ -284,8 +284,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the longest hop for data
-    /// toward Rx only.
+    /// Returns the longest hop, as [`Retreat::longest`] does, but for data in both directions. `there` is the longest
+    /// hop for data toward Rx only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,

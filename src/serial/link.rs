@@ -155,7 +155,7 @@ impl<P, D> SerialLink<P, D> {
         &mut self.port
     }
 
-    /// Returns the port and the pin. The transmit queue is discarded, and the pin keeps its level.
+    /// Returns the port and the direction pin. The transmit queue is discarded, and the pin keeps its level.
     pub fn release(self) -> (P, Option<D>) {
         (self.port, self.pin)
     }

@@ -79,7 +79,7 @@ impl Page {
         }
     }
 
-    /// Returns the next snapshot of the page, and the time of its arrival, s.
+    /// Returns the next snapshot (state of the chain) that the page receives, and its time of arrival, s.
     pub(crate) fn next(&mut self) -> (f64, Value) {
         let next = self.arriving.recv_timeout(LIMIT).unwrap();
         self.last = next.1.clone();

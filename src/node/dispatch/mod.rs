@@ -392,7 +392,7 @@ pub(super) struct Telemetry {
 /// their neighbours.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time from one drop of the links to the next while there is no quorum, in units of `dead_after`.
+/// Time until relays without a quorum drop their links once more, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which relays without a quorum drop the links to their neighbours and search for others.

@@ -163,7 +163,9 @@ impl Liveness {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence that lost frames alone can explain, if a request is sent every `tick`.
+    /// Returns the longest silence of a live neighbour, caused only by lost frames.
+    ///
+    /// The silence is counted as lost requests, one every `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }

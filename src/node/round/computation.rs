@@ -457,7 +457,7 @@ impl LeaderTask {
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true if the configured altitudes are used because the altitudes of the joint method failed.
+    /// true if the relays keep the configured altitudes, because the joint method found no altitudes.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,

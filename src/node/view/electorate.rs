@@ -53,7 +53,7 @@ pub(crate) struct Electorate {
     /// True if this relay is a member of the view `agreed`, so that its vote counts.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted but does not know to be agreed on; `None` if there is none.
+    /// View that this relay has accepted, without knowing if a quorum has; `None` if there is none.
     pub(super) accepted: Option<Successor>,
     /// View proposals that this relay has voted on and that can still become views, latest first.
     pub(super) voted: [ViewId; VOTES],

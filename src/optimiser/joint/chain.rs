@@ -54,8 +54,9 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, that leaves the relays after it room for their separation. `end_m` is the
-    /// largest x of the relay before it, m. `step` is the minimum step in x between these two relays, m.
+    /// Returns the largest x of a relay, m, at which the minimum separation of later relays is possible.
+    ///
+    /// `end_m` is the largest x of the previous relay, m. `step` is the minimum step in x from the previous relay, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }

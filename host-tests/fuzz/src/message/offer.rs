@@ -44,7 +44,7 @@ impl Body<'_, '_> {
         self.answer(choice);
     }
 
-    /// Appends to the offer the number of the hello that it answers.
+    /// Appends a hello number to the offer: the number of the hello message that the offer answers.
     ///
     /// If `choice` is below 240, the number is that of the relay's last hello, otherwise a number from the fuzzer's
     /// input.

@@ -54,7 +54,7 @@ impl Style {
         relays: 1..=50,
         chain: Chain::Alike,
     };
-    /// Links with 1 to 50 relays, whose altitudes and powers may differ.
+    /// Chains of 1 to 50 relays; altitudes and powers of the relays can differ.
     pub const ANY: Self = Self {
         relays: 1..=50,
         chain: Chain::Any,

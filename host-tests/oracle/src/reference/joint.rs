@@ -53,7 +53,9 @@ pub struct FixedCrossSection {
 }
 
 impl FixedCrossSection {
-    /// Returns the corridor of one relay: a single point if `held` fixes its lateral position and altitude.
+    /// Returns the range of lateral positions and altitudes of one relay, called its corridor.
+    ///
+    /// The range is a single point if `held` fixes the lateral position and altitude of the relay.
     pub(crate) fn corridor_of(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
         let own = held.iter().find(|hold| hold.relay == relay);
         own.map_or(corridor, |hold| Corridor {

@@ -40,7 +40,7 @@ const FLOAT: u8 = 9;
 /// Flight for which a bundle is made.
 #[derive(Debug)]
 pub struct Bundle<'a> {
-    /// Scenario file, with its plan if the positions are known.
+    /// Text of the scenario file, with a plan if the positions of the relays are known.
     pub text: String,
     /// Sections of the scenario file that set up the programs on the computers.
     pub deployment: &'a Deployment,

@@ -208,8 +208,8 @@ pub enum AltitudeCase {
     /// Optimum at the altitude where the first hop's SIR equals the second hop's SIR. The first hop's SIR rises with
     /// altitude.
     Crossing = 2,
-    /// Optimum at the lowest altitude, or at the highest altitude up to which the first hop's SIR rises. The two
-    /// hops' SIRs are equal at no altitude in between.
+    /// Optimum at the lowest altitude, or at the altitude of the first hop's largest SIR. The two hops' SIRs are
+    /// equal at no altitude in between.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,

@@ -103,7 +103,8 @@ struct Node {
     hop: Hop,
 }
 
-/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32: three digits.
+/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32, which
+/// keeps two to three significant decimal digits.
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]

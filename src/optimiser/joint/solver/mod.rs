@@ -115,8 +115,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the improvement of the best chain reached, in ln(SIR). The improvement of another chain stops if
-    /// it is predicted to end below this target.
+    /// Highest target reached by the improvement of a chain, ln(SIR). The improvement of a chain stops if it is
+    /// predicted to end below this target.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,

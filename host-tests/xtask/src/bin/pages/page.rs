@@ -49,7 +49,7 @@ impl Block {
         commands.join("\n")
     }
 
-    /// Returns the lines of output that the block expects, without commands.
+    /// Returns the expected lines of output in a code block of a page, without the lines of commands.
     pub(crate) fn printed(&self) -> Vec<&str> {
         let lines = self.lines.iter().map(String::as_str);
         match self.kind {
