@@ -44,7 +44,7 @@ use super::reverse::{Back, zone};
 use crate::features::{NOISE, REVERSE};
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
-use crate::root::{sqrt, sqrt_in_place};
+use crate::root::{bisected, sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
 /// Position of the previous relay that lets this relay's hop meet the target SIR.
@@ -289,7 +289,6 @@ impl Hop {
         // A sender beyond its receiver is no hop.
         let nearest = |x: f32| from_m.min(self.before(x));
         let is_met = |x: f32| self.sender(back, target, nearest(x), x).is_some();
-        let (mut low, mut high) = (place, end_m);
         if place >= end_m || place < limit.next_down().next_down() || !is_met(place + 1e-5 * end_m)
         {
             return place;
@@ -297,18 +296,7 @@ impl Hop {
         if is_met(end_m) {
             return end_m;
         }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if !(middle > low && middle < high) {
-                break;
-            }
-            if is_met(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        bisected(place, end_m, HALVINGS, is_met).0
     }
 
     /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. The receiver is at
