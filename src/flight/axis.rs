@@ -539,8 +539,6 @@ const COSINE: [f64; 6] = [
     4.166_666_666_666_66e-2,
 ];
 
-/// Tests of special lines on earth: the ends, a pole, the antimeridian, and a line of changing azimuth.
-
 #[cfg(test)]
 mod angle_tests {
     use super::{UNIT, sine_and_cosine};
