@@ -7,7 +7,7 @@ use uav_relay::optimiser::pass::Walk;
 use uav_relay::{Mission, Placement, Profile, SlotShares};
 pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 
-/// Returns the position of relay `index` for the target SIR `target`, linear, computed without messages.
+/// Returns the position of relay `index` for the target SIR `target`, linear.
 ///
 /// A relay stays short of the farthest x that meets the target if that lets other relays meet it. `None` if the chain
 /// cannot meet the target. `profile_of` returns the profile of relay 1..=N.

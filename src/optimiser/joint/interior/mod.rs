@@ -104,7 +104,7 @@ pub(super) struct Node {
     hop: Hop,
 }
 
-/// Algorithm 1 stores its lengths in place of the levels, which the interior-point method later computes.
+/// Memory of Algorithm 1 in place of the levels, which the interior-point method computes later.
 impl Noted for Node {
     fn lengths_m(&mut self) -> &mut [f32; 2] {
         &mut self.hop.level
