@@ -133,32 +133,3 @@ error_texts!(LineError {
     Length => "the mission's distance must be within this relay's geofence",
     Slots => "the mission's fitted slots (fitted_gap above 0) need the method joint and a known interferer, without listen",
 });
-
-#[cfg(test)]
-mod tests {
-    use super::Geodetic;
-
-    #[test]
-    fn degrees_become_the_nearest_units() {
-        let point = Geodetic::from_degrees(47.400_000_04, -8.540_000_06, 420.000_4);
-        let nearest = Geodetic {
-            lat_e7: 474_000_000,
-            lon_e7: -85_400_001,
-            amsl_mm: 420_000,
-        };
-        assert_eq!(point, Some(nearest));
-    }
-
-    #[test]
-    fn invalid_coordinates_give_none() {
-        for (lat, lon, amsl) in [
-            (90.1, 0.0, 0.0),
-            (0.0, -180.1, 0.0),
-            (f64::NAN, 0.0, 0.0),
-            (0.0, f64::INFINITY, 0.0),
-            (0.0, 0.0, f64::NAN),
-        ] {
-            assert_eq!(Geodetic::from_degrees(lat, lon, amsl), None);
-        }
-    }
-}

@@ -4,8 +4,6 @@
 //! instructions, more than the rest of a reach. This one derives a first estimate from the exponent and improves it by Heron's
 //! rule on the FPU. It uses additions, multiplications and divisions only, so every target gives the same bits.
 
-use core::ops::{Add, Div, Mul, Sub};
-
 /// Returns the square root of `x`, within one unit in the last place of an f32. 0 for `x` below the smallest normal f32. 18
 /// instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa: a factor of
 /// 4 changes only the exponent of the result, so two octaves cover all exponents.
@@ -32,28 +30,13 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
     0.5 * (y + x / y)
 }
 
-/// Number type in which a root is searched: f32 on board, f64 in formulas for the ground.
-pub trait Real:
-    Copy
-    + PartialOrd
-    + From<f32>
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-{
-}
-
-impl Real for f32 {}
-impl Real for f64 {}
-
-/// Halves the interval from `low` to `high` `steps` times, and returns the ends of the last interval.
+/// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// `holds` must be true from `low` to some value, and false from this value to `high`. The last interval contains this value.
-pub fn bisected<T: Real>(low: T, high: T, steps: u8, mut holds: impl FnMut(T) -> bool) -> (T, T) {
+/// The value searched is the one up to which `holds` returns true. It is assumed to be true at `low` and false at `high`.
+pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bool) -> (f32, f32) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {
-        let middle = T::from(0.5) * (low + high);
+        let middle = 0.5 * (low + high);
         if holds(middle) {
             low = middle;
         } else {

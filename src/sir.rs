@@ -7,31 +7,10 @@
 //! The SIR of a chain is that of its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
 //! `host-tests/tests/placement/main.rs`.
-//!
-//! # Extrema of SIR_1
-//!
-//! [`first_hop_turn`] returns those along x >= 0 at one altitude: the paper's Lemma 2, for any interferer position and with noise.
-//!
-//! With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of SIR_1 = A s / ((x^2 + h^2)(1 + nu s)) has the sign of
-//!
-//! ```text
-//! X x^2 - q x - X h^2 - nu x s^2
-//! ```
-//!
-//! Without noise this is a quadratic with the roots (q +- sqrt(q^2 + 4 X^2 h^2)) / 2X, one of which is beyond Tx. With noise:
-//!
-//! - X < 0: the expression falls with x from -X h^2 > 0 at Tx, so SIR_1 still has a single maximum, closer to Tx.
-//! - X = 0: the expression is negative.
-//! - X > 0: divided by x it is phi = X x - q - X h^2 / x - nu s^2, which is concave because s is convex and not negative, and so
-//!   is s^2. So SIR_1 falls to a minimum, rises to a maximum and then falls, or it only falls. No root is before the noise-free
-//!   minimum, where the sum of the first three terms is negative.
-//!
-//! For X >= 0 the largest SIR_1 in [0, D] is at x = 0, as without noise: anywhere else s / (x^2 + h^2) is smaller. Where s is
-//! larger, 1 / (1 + nu s) is smaller too; where s is smaller, s / (1 + nu s) is smaller and x^2 + h^2 is larger.
 
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
-use crate::root::{PowerRatio, Real, bisected, sqrt};
+use crate::root::{PowerRatio, bisected, sqrt};
 
 /// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
 ///
@@ -157,142 +136,36 @@ pub const fn square(x: f32) -> f32 {
     x * x
 }
 
-/// Number of bisection steps for the x at which the first hop's SIR has an extremum.
+/// Number of bisection steps for the x at which the first hop's SIR is largest.
 const HALVINGS: u8 = 32;
 
-/// Maximum number of doublings of x in the search for an x beyond an extremum of the first hop's SIR.
-const DOUBLINGS: u8 = 64;
-
-/// Shape of SIR_1, the SIR of the first hop, along x >= 0 at one altitude.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Extremum {
-    /// First hop's SIR along x falls up to this x, m (the paper's Psi^x), and rises beyond. The interferer is ahead
-    /// of Tx (X > 0).
-    Valley(f32),
-    /// First hop's SIR falls up to the first x, m, rises up to the second x, and falls beyond. The interferer is
-    /// ahead of Tx (X > 0), with noise.
-    ValleyAndHill(f32, f32),
-    /// The first hop's SIR rises along x up to this x, m, and falls beyond it. The interferer is behind Tx (X < 0).
-    Hill(f32),
-    /// First hop's SIR falls with x. The interferer is at X = 0, or the interferer is ahead of Tx and the noise
-    /// exceeds the interference.
-    Falls,
-    /// First hop's SIR is the same at every x: the interferer is at Tx, and there is no noise.
-    Level,
-}
-
-/// Returns the extrema of SIR_1, the first hop's SIR, along x for a relay at `altitude_m`.
+/// Returns the x, m, at which the first hop's SIR is largest, for an interferer behind Tx (X < 0).
 ///
-/// Without noise they are roots of a quadratic, written without cancellation for X < 0; with noise they take at most 190
-/// evaluations of the slope. Accuracy: `turns_agree_with_a_scan` in `host-tests/tests/theorems/`.
-pub fn first_hop_turn(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> Extremum {
-    let x = interferer.x_m;
-    let q = square(x) + square(interferer.y_m);
-    let root = sqrt(square(q) + square(2.0 * x * altitude_m));
+/// With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of that SIR has the sign of X x - q - X h^2 / x - nu s^2,
+/// which falls with x. So there is a single maximum: without noise a root of a quadratic, with noise an x closer to
+/// Tx, found by bisection.
+fn first_hop_peak(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> f32 {
+    let Interferer { x_m, y_m, .. } = *interferer;
+    let (q, b) = (square(x_m) + square(y_m), square(altitude_m));
+    let root = sqrt(square(q) + square(2.0 * x_m * altitude_m));
+    let peak = -2.0 * x_m * b / (q + root);
     let noise = mission.noise_at_a_metre();
-    let slope = Slope {
-        p: x,
-        q,
-        a: square(interferer.y_m) + square(altitude_m),
-        b: square(altitude_m),
-        noise,
-        halvings: HALVINGS,
+    if !(noise > 0.0) {
+        return peak;
+    }
+    let rises = |x: f32| {
+        let s = square(x - x_m) + (square(y_m) + b);
+        x_m * x - q - x_m * (b / x) - noise * s * s > 0.0
     };
-    if x > 0.0 {
-        let bottom = (q + root) / (2.0 * x);
-        if !(noise > 0.0) {
-            return Extremum::Valley(bottom);
-        }
-        slope
-            .valley_and_hill(bottom)
-            .map_or(Extremum::Falls, |[valley, hill]| {
-                Extremum::ValleyAndHill(valley, hill)
-            })
-    } else if x < 0.0 {
-        let peak = -2.0 * x * square(altitude_m) / (q + root);
-        Extremum::Hill(if noise > 0.0 { slope.hill(peak) } else { peak })
-    } else if q > 0.0 || noise > 0.0 {
-        Extremum::Falls
-    } else {
-        Extremum::Level
-    }
-}
-
-/// Function phi(t) with the sign of the slope of the first hop's SIR at t, a position on a line.
-///
-/// phi(t) = p t - q - p b / t - nu ((t - p)^2 + a)^2. On a line along x p is the X of the interferer.
-#[derive(Debug)]
-pub struct Slope<T> {
-    /// t of the point closest to the interferer, m; 0 is the t of the point closest to Tx.
-    pub p: T,
-    /// Difference p^2 + a - b, m^2.
-    pub q: T,
-    /// Squared distance of the line from the interferer, m^2.
-    pub a: T,
-    /// Squared distance of the line from Tx, m^2.
-    pub b: T,
-    /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2.
-    pub noise: T,
-    /// Number of bisection steps for each extremum.
-    pub halvings: u8,
-}
-
-impl<T: Real> Slope<T> {
-    fn rises(&self, t: T) -> bool {
-        let Self { p, q, a, b, .. } = *self;
-        let s = (t - p) * (t - p) + a;
-        p * t - q - p * (b / t) - self.noise * s * s > T::from(0.0)
-    }
-
-    /// Returns true if phi rises at `t`, m, for p > 0. Beyond p the derivative of phi falls with t, so phi has at
-    /// most one maximum there.
-    fn bends_up(&self, t: T) -> bool {
-        let Self { p, a, b, .. } = *self;
-        let s = (t - p) * (t - p) + a;
-        let half = T::from(0.5) * (p + p * (b / (t * t)));
-        half - T::from(2.0) * self.noise * s * (t - p) > T::from(0.0)
-    }
-
-    /// Returns the t of the SIR's only maximum for p < 0, m. `peak` is the t of the maximum without noise.
-    pub fn hill(&self, peak: T) -> T {
-        bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
-    }
-
-    /// Returns the t of the SIR's minimum and of its maximum for p > 0, m. `bottom` is the t of the minimum without
-    /// noise. `None` if the SIR only falls.
-    pub fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
-        let bends_up = |t: T| self.bends_up(t);
-        if !bends_up(bottom) {
-            return None;
-        }
-        let (top, _) = bisected(bottom, beyond(bottom, bends_up), self.halvings, bends_up);
-        let rises = |t: T| self.rises(t);
-        if !rises(top) {
-            return None;
-        }
-        let (valley, _) = bisected(bottom, top, self.halvings, |t| !rises(t));
-        let (hill, _) = bisected(top, beyond(top, rises), self.halvings, rises);
-        Some([valley, hill])
-    }
-}
-
-fn beyond<T: Real>(from: T, holds: impl Fn(T) -> bool) -> T {
-    let mut at = T::from(2.0) * from;
-    for _ in 0..DOUBLINGS {
-        if !holds(at) {
-            break;
-        }
-        at = T::from(2.0) * at;
-    }
-    at
+    bisected(0.0, peak, HALVINGS, rises).0
 }
 
 /// Returns the largest SIR of the first hop to a relay at `altitude_m`, for any x from Tx to Rx.
 ///
-/// For an interferer at X >= 0, the SIR is largest at x = 0, right above Tx (the paper's Lemma 2 and `gamma_0`). For
-/// X < 0 the SIR has a single maximum along x, at the x that [`first_hop_turn`] returns; if that is beyond Rx, the
-/// SIR is largest at Rx. Both hold with noise as well.
+/// For an interferer at X >= 0, the SIR is largest at x = 0, right above Tx (the paper's Lemma 2 and `gamma_0`):
+/// anywhere else s / (x^2 + h^2) is smaller. Where s is larger, 1 / (1 + nu s) is smaller too; where s is smaller,
+/// s / (1 + nu s) is smaller and x^2 + h^2 is larger. For X < 0 the SIR has a single maximum along x; if that is
+/// beyond Rx, the SIR is largest at Rx.
 ///
 /// If the mission gives the interference as a distribution along x, the result is an upper bound. It is the SIR of a
 /// relay right above Tx with the largest Upsilon of all x. The result is larger at lower altitudes.
@@ -300,62 +173,10 @@ pub fn first_hop_ceiling(mission: &Mission, altitude_m: f32) -> f32 {
     let Some(interferer) = mission.interferer() else {
         return mission.tx_gain().value() / square(altitude_m);
     };
-    let x_m = match first_hop_turn(mission, interferer, altitude_m) {
-        Extremum::Hill(peak) => peak.min(mission.config().distance_m),
-        _ => 0.0,
+    let x_m = if interferer.x_m < 0.0 {
+        first_hop_peak(mission, interferer, altitude_m).min(mission.config().distance_m)
+    } else {
+        0.0
     };
     Sender::transmitter(mission).sir_at(mission, 0.0, Placement::on_line(x_m, altitude_m))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Placement, Sender, first_hop_ceiling};
-    use crate::features::NOISE;
-    use crate::mission::tests::paper;
-    use crate::mission::{Interference, Interferer, Mission, MissionConfig};
-
-    #[test]
-    fn the_ceiling_of_the_first_hop_is_never_below_what_a_scan_finds() {
-        for (x_m, y_m, altitude_m, noise_w) in [
-            (500.0, 400.0, 20.0, 0.0),
-            (-10.0, 0.0, 50.0, 0.0),
-            (-300.0, 200.0, 80.0, 0.0),
-            (-1e5, 3.0, 900.0, 0.0),
-            (500.0, 400.0, 20.0, 1e-8),
-            (0.0, 0.0, 20.0, 1e-5),
-            (-10.0, 0.0, 50.0, 1e-6),
-            (-10.0, 0.0, 50.0, 1e-1),
-            (-300.0, 200.0, 80.0, 1e-7),
-            (-1e5, 3.0, 900.0, 1e-12),
-        ] {
-            let interferer = Interferer {
-                power_w: 80.0,
-                x_m,
-                y_m,
-            };
-            let noise_w = if NOISE { noise_w } else { 0.0 };
-            let mission = Mission::try_new(MissionConfig {
-                interference: Interference::Source(interferer),
-                noise_w,
-                ..paper(1)
-            })
-            .unwrap();
-            let tx = Sender::transmitter(&mission);
-            let best = (0..=10_000_u16)
-                .map(|i| {
-                    tx.sir_at(
-                        &mission,
-                        0.0,
-                        Placement::on_line(f32::from(i) * 0.1, altitude_m),
-                    )
-                })
-                .fold(0.0, f32::max);
-            let ceiling = first_hop_ceiling(&mission, altitude_m);
-            assert!(
-                (ceiling / best - 1.0).abs() < 1e-4,
-                "{x_m} {y_m} {altitude_m} {noise_w}: {ceiling} against {best}"
-            );
-            assert!(ceiling >= best * (1.0 - 1e-6));
-        }
-    }
 }

@@ -10,7 +10,7 @@ use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, in_noise};
 use uav_relay_oracle::reference::Link;
 use uav_relay_oracle::reference::joint::Place;
-use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::report::{hop_sirs, place};
 use uav_relay_sim::simulator::outcome::Outcome;
 
 /// Relative spacing of f32 numbers: the machine epsilon, 2^-23.
@@ -35,7 +35,7 @@ pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
 pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Placement> {
     let of = |index| profile_of(mission, own, index);
     (1..=mission.relays())
-        .map(|index| plan::place(mission, target, index, of).unwrap())
+        .map(|index| place(mission, target, index, of).unwrap())
         .collect()
 }
 

@@ -126,7 +126,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// If some relays have to stay short of their farthest position, the positions are checked as in [`place`].
+/// Some relays may have to stay short of their farthest position; their positions are then checked, too.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -162,37 +162,6 @@ pub fn solve(
     }
 }
 
-/// Returns the position of relay `index` for the target SIR `target`. `None` if some relay has no position. `plain`
-/// is true if every relay must take the farthest x that meets the target.
-fn placed(
-    mission: &Mission,
-    target: f32,
-    plain: bool,
-    index: u16,
-    profile_of: impl Fn(u16) -> Profile,
-) -> Option<Placement> {
-    let chain = Walk::new(mission, target, plain, &profile_of);
-    // Every relay must have a position, not only those on the way back to this one.
-    chain.place(0)?;
-    chain
-        .place(index)
-        .map(|x_m| profile_of(index).on_line().cross_section.at(x_m))
-}
-
-/// Returns the position of relay `index` for `target`; `None` if the chain cannot meet it.
-///
-/// A relay stays short of the farthest x that meets the target if that lets other relays meet it. At most N^2
-/// computations of such an x.
-pub fn place(
-    mission: &Mission,
-    target: f32,
-    index: u16,
-    profile_of: impl Fn(u16) -> Profile,
-) -> Option<Placement> {
-    placed(mission, target, false, index, &profile_of)
-        .or_else(|| placed(mission, target, true, index, &profile_of))
-}
-
 impl Mission {
     /// Returns the position that relay `index` computes without messages. Every relay must have the mission's common
     /// profile.
@@ -202,6 +171,8 @@ impl Mission {
     pub fn silent_place(&self, index: u16) -> Option<Placement> {
         let common = |_| self.config().common;
         let agreed = solve(self, Schedule::Bracketed, common).ok()?;
-        placed(self, agreed.target, agreed.ladder.is_plain(), index, common)
+        let chain = Walk::new(self, agreed.target, agreed.ladder.is_plain(), &common);
+        let x_m = chain.place(index)?;
+        Some(common(index).on_line().cross_section.at(x_m))
     }
 }

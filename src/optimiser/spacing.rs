@@ -44,7 +44,7 @@ use super::reverse::{Back, zone};
 use crate::features::{NOISE, REVERSE};
 use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Station};
-use crate::root::{sqrt, sqrt_in_place};
+use crate::root::{bisected, sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
 /// Position of the previous relay that lets this relay's hop meet the target SIR.
@@ -289,7 +289,6 @@ impl Hop {
         // A sender beyond its receiver is no hop.
         let nearest = |x: f32| from_m.min(self.before(x));
         let is_met = |x: f32| self.sender(back, target, nearest(x), x).is_some();
-        let (mut low, mut high) = (place, end_m);
         if place >= end_m || place < limit.next_down().next_down() || !is_met(place + 1e-5 * end_m)
         {
             return place;
@@ -297,18 +296,7 @@ impl Hop {
         if is_met(end_m) {
             return end_m;
         }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if !(middle > low && middle < high) {
-                break;
-            }
-            if is_met(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        bisected(place, end_m, HALVINGS, is_met).0
     }
 
     /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. The receiver is at
@@ -546,67 +534,5 @@ impl Hop {
             base: self.base,
             noise: self.nu(),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Hop;
-    use crate::mission::tests::paper;
-    use crate::mission::{Interference, Interferer, Mission, MissionConfig};
-    use crate::place::CrossSection;
-    use crate::sir::Sender;
-
-    fn first_hop(x_m: f32, distance_m: f32, altitude_m: f32) -> Hop {
-        let interferer = Interferer {
-            power_w: 80.0,
-            x_m,
-            y_m: 0.0,
-        };
-        let config = MissionConfig {
-            distance_m,
-            interference: Interference::Source(interferer),
-            ..paper(1)
-        };
-        let mission = Mission::try_new(config).unwrap();
-        let sender = Sender::transmitter(&mission);
-        Hop::new(
-            &mission,
-            &interferer,
-            sender,
-            1,
-            CrossSection::on_line(altitude_m),
-            0.0,
-        )
-    }
-
-    /// Checks the maximum length of a first hop whose SIR rises up to a length of 45 m, and then falls. The interferer
-    /// is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22. The target is met only in an interval of
-    /// lengths. In some of the cases this interval is beyond the end of the hop's range.
-    #[test]
-    fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
-        // SIR_1 is at least 1.22 from 40.9 m to 50 m.
-        assert_eq!(
-            first_hop(-10.0, 35.0, 50.0).reach(1.22, 0.0),
-            None,
-            "it lies beyond the end"
-        );
-        assert_eq!(
-            first_hop(-10.0, 45.0, 50.0).reach(1.22, 0.0),
-            Some(45.0),
-            "the end lies in it"
-        );
-        let inside = first_hop(-10.0, 60.0, 50.0).reach(1.22, 0.0).unwrap();
-        assert!((inside - 50.0).abs() < 1e-3, "it ends at 50 m: {inside}");
-        assert_eq!(
-            first_hop(-10.0, 60.0, 50.0).reach(1.23, 0.0),
-            None,
-            "nothing meets that much"
-        );
-    }
-
-    #[test]
-    fn there_is_no_way_back() {
-        assert_eq!(first_hop(500.0, 1000.0, 20.0).reach(1.0, 1000.5), None);
     }
 }

@@ -5,7 +5,6 @@ use embedded_hal_nb::serial::{Error as _, ErrorKind};
 
 /// Error that this relay's serial port reports, in most cases for a received byte.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
     /// Overrun: a byte was received before the previous byte was read.
@@ -20,19 +19,13 @@ pub enum Fault {
     Other,
 }
 
-impl core::fmt::Display for Fault {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Overrun => "receive overrun: a byte was lost because it was read too late",
-            Self::Framing => "framing error: a received byte had no stop bit",
-            Self::Parity => "parity error in a received byte",
-            Self::Noise => "noise error: a byte was received with noise on the line",
-            Self::Other => "unknown error of the serial port",
-        })
-    }
-}
-
-impl core::error::Error for Fault {}
+error_texts!(Fault {
+    Overrun => "receive overrun: a byte was lost because it was read too late",
+    Framing => "framing error: a received byte had no stop bit",
+    Parity => "parity error in a received byte",
+    Noise => "noise error: a byte was received with noise on the line",
+    Other => "unknown error of the serial port",
+});
 
 /// Serial port whose calls never block.
 ///

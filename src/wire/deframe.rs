@@ -10,7 +10,6 @@ use super::frame::MAX_DECODED;
 
 /// Reason why the bytes between two delimiters are no frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DeframeError {
     /// The received frame is longer than the maximum.
@@ -19,16 +18,10 @@ pub enum DeframeError {
     Truncated,
 }
 
-impl core::fmt::Display for DeframeError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Oversized => "the frame is longer than any frame of the format",
-            Self::Truncated => "the frame ended inside a COBS block",
-        })
-    }
-}
-
-impl core::error::Error for DeframeError {}
+error_texts!(DeframeError {
+    Oversized => "the frame is longer than any frame of the format",
+    Truncated => "the frame ended inside a COBS block",
+});
 
 /// Decoder that splits a byte stream into frames and undoes their COBS encoding.
 #[derive(Clone, Debug)]

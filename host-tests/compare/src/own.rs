@@ -4,10 +4,10 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use uav_relay::optimiser::joint::Seat;
-use uav_relay::optimiser::plan::{place, solve};
+use uav_relay::optimiser::plan::solve;
 use uav_relay::{Method, Mission, Placement, Profile, Schedule};
 use uav_relay_scenario::mission;
-use uav_relay_sim::report::hop_sirs;
+use uav_relay_sim::report::{hop_sirs, place};
 use uav_relay_sim::simulator::chain;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
 use uav_relay_sim::simulator::setup::Setup;

@@ -1,5 +1,7 @@
 //! Coordinates along a line on earth, compared with geodesics.
 
+mod line;
+
 use chacha20::ChaCha8Rng;
 use geographiclib_rs::{DirectGeodesic, Geodesic, InverseGeodesic};
 use rand::{RngExt, SeedableRng};

@@ -13,7 +13,7 @@ use std::path::Path;
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use uav_relay::flight::mavlink::frame::Address;
-use uav_relay::flight::mavlink::incoming::{Parser, Received};
+use uav_relay::flight::mavlink::incoming::{Parser, Received, noise_w};
 
 const COMPANION: Address = Address {
     system: 7,

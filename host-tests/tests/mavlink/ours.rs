@@ -291,3 +291,15 @@ fn the_mavlink_crate_reads_every_field_of_our_messages() {
         }
     }
 }
+
+/// Checks the noise of a radio in RADIO_STATUS against the formula in the documentation of SiK radios.
+#[test]
+fn noise_follows_the_documented_formula() {
+    for noise in 1..=254_u8 {
+        let dbm = f64::from(noise) / 1.9 - 127.0;
+        let expected = 10_f64.powf((dbm - 30.0) / 10.0);
+        let heard = noise_w(noise).map(f64::from);
+        assert!(heard.is_some_and(|heard| (heard / expected - 1.0).abs() < 1e-5));
+    }
+    assert_eq!((noise_w(0), noise_w(255)), (None, None));
+}

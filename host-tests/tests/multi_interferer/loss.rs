@@ -4,12 +4,13 @@ use chacha20::ChaCha8Rng;
 use host_tests::placing::profile_of;
 use rand::SeedableRng;
 use uav_relay::Schedule;
-use uav_relay::optimiser::plan::{place, solve};
+use uav_relay::optimiser::plan::solve;
 use uav_relay_oracle::random::{count, seed};
 use uav_relay_scenario::hypothetical::hypothetical;
 use uav_relay_scenario::mission;
 use uav_relay_scenario::scene::Scene;
 use uav_relay_scenario::{Interference, Scenario};
+use uav_relay_sim::report::place;
 use uav_relay_tools::multi_interferer::optimum;
 
 use super::scenes::{Sources, scenario};

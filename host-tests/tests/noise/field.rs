@@ -6,6 +6,7 @@ use uav_relay::mission::MissionError;
 use uav_relay::optimiser::plan;
 use uav_relay::{Field, FieldPoint, Interference, Mission, MissionConfig, Schedule, sir};
 use uav_relay_oracle::random::{self, log_uniform};
+use uav_relay_sim::report::place;
 
 /// Returns E[f(u)], where u = I / I_max has a Beta distribution, by its density on a grid.
 fn mean(alpha: f64, beta: f64, f: impl Fn(f64) -> f64) -> f64 {
@@ -100,7 +101,7 @@ fn a_chain_in_a_noisy_field_follows_its_table() {
         assert!(apart < 2e-4, "{round}: {of_noise:?} {of_table:?}");
         let places = |mission: &Mission, target: f32| -> Vec<f32> {
             (1..=relays)
-                .map(|index| plan::place(mission, target, index, |_| common).unwrap().x_m)
+                .map(|index| place(mission, target, index, |_| common).unwrap().x_m)
                 .collect()
         };
         let first = places(&noisy, of_noise.target);

@@ -11,6 +11,7 @@ use uav_relay_oracle::mission::{as_relays_know_it, of_link};
 use uav_relay_oracle::random::{self, Chain, Style, log_uniform};
 use uav_relay_oracle::reference::Link;
 
+mod first_hop;
 mod published;
 
 fn random_links(

@@ -2,8 +2,8 @@
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use uav_relay::sir::{Extremum, first_hop_turn};
 use uav_relay_oracle::random;
+use uav_relay_tools::single::extrema::{Extremum, first_hop_turn};
 use uav_relay_tools::single::theorems;
 
 use super::scene::Scene;

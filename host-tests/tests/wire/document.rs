@@ -108,6 +108,17 @@ fn digest_by_the_rules(mission: &Mission, interference: &[f32]) -> u16 {
         bytes.extend(band.least_m.to_le_bytes());
         bytes.extend(band.most_m.to_le_bytes());
     }
+    let fits = config.fitted_gap > 0.0;
+    if config.noise_w > 0.0 || fits {
+        bytes.extend(config.noise_w.to_le_bytes());
+    }
+    if config.reverse > 0.0 || fits {
+        bytes.extend(config.reverse.to_le_bytes());
+        bytes.extend(config.rx_power_w.to_le_bytes());
+    }
+    if fits {
+        bytes.extend(config.fitted_gap.to_le_bytes());
+    }
     low_half(&bytes)
 }
 
@@ -124,6 +135,19 @@ fn the_digest_follows_the_document() {
         .collect();
     assert!(field.len() > 4);
     let wide = source();
+    // Noise, power of Rx, required ratio of the SIRs, and gap of fitted slots. The power of Rx counts only with a way back.
+    let optional = [
+        (0.0, 80.0, 0.0, 0.0),
+        (0.0, 5.0, 0.0, 0.0),
+        (1e-13, 80.0, 0.0, 0.0),
+        (0.0, 80.0, 1.0, 0.0),
+        (0.0, 80.0, 0.5, 0.0),
+        (0.0, 5.0, 0.5, 0.0),
+        (1e-13, 5.0, 0.5, 0.0),
+        (0.0, 80.0, 0.0, 1.0),
+        (0.0, 80.0, 0.0, 2.0),
+        (1e-13, 80.0, 1.0, 2.0),
+    ];
     let mut seen = Vec::new();
     for (interference, numbers) in [
         (base.interference, &source_numbers[..]),
@@ -134,18 +158,25 @@ fn the_digest_follows_the_document() {
             (wide.band, base.lateral),
             (wide.band, wide.lateral),
         ] {
-            let config = MissionConfig {
-                band,
-                lateral,
-                ..mission(interference)
-            };
-            let mission = Mission::try_new(config).unwrap();
-            let by_the_rules = digest_by_the_rules(&mission, numbers);
-            assert_eq!(digest(&mission), by_the_rules);
-            seen.push(by_the_rules);
+            for (noise_w, rx_power_w, reverse, fitted_gap) in optional {
+                let config = MissionConfig {
+                    band,
+                    lateral,
+                    noise_w,
+                    rx_power_w,
+                    reverse,
+                    fitted_gap,
+                    ..mission(interference)
+                };
+                let mission = Mission::try_new(config).unwrap();
+                let by_the_rules = digest_by_the_rules(&mission, numbers);
+                assert_eq!(digest(&mission), by_the_rules);
+                seen.push(by_the_rules);
+            }
         }
     }
     seen.sort_unstable();
     seen.dedup();
-    assert_eq!(seen.len(), 6);
+    // Of the ten missions of each kind, two differ in nothing that counts.
+    assert_eq!(seen.len(), 2 * 3 * 9);
 }

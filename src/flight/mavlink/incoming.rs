@@ -413,19 +413,3 @@ fn holds(bytes: &[u8], end: usize, known: Known) -> bool {
         .get(1..end)
         .is_some_and(|covered| said == Some(&checksum(covered, known).to_le_bytes()))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::noise_w;
-
-    #[test]
-    fn the_documented_formula() {
-        for noise in 1..=254_u8 {
-            let dbm = f64::from(noise) / 1.9 - 127.0;
-            let expected = libm::pow(10.0, (dbm - 30.0) / 10.0);
-            let heard = noise_w(noise).map(f64::from);
-            assert!(heard.is_some_and(|heard| (heard / expected - 1.0).abs() < 1e-5));
-        }
-        assert_eq!((noise_w(0), noise_w(255)), (None, None));
-    }
-}

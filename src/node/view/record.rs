@@ -307,12 +307,13 @@ mod tests {
     }
 
     fn relay(relays: u16) -> Relay {
+        relay_with(relays, 2, Settings::default())
+    }
+
+    fn relay_with(relays: u16, index: u16, settings: Settings) -> Relay {
         let mission = Mission::try_new(paper(relays)).unwrap();
-        let identity = Identity {
-            network: 1,
-            index: 2,
-        };
-        Relay::new(mission, identity, Settings::default(), 1, Instant::ZERO).unwrap()
+        let identity = Identity { network: 1, index };
+        Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap()
     }
 
     #[test]
@@ -333,16 +334,11 @@ mod tests {
     /// silent neighbours.
     #[test]
     fn nothing_is_sent_before_the_record_is_stored() {
-        let mission = Mission::try_new(paper(3)).unwrap();
-        let identity = Identity {
-            network: 1,
-            index: 2,
-        };
         let settings = Settings {
             wiring: Wiring::Shared,
             ..Settings::default()
         };
-        let mut relay = Relay::new(mission, identity, settings, 1, Instant::ZERO).unwrap();
+        let mut relay = relay_with(3, 2, settings);
         let other = ViewRecord::new(digest(relay.mission()), busy());
         relay.persisted(&other);
         let mut frame = [0; crate::wire::frame::MAX_FRAME];
@@ -381,18 +377,10 @@ mod tests {
             Err(RecordError::Begun)
         );
         // A leader starts by itself.
-        let mission = *relay(3).mission();
-        let identity = Identity {
-            network: 1,
-            index: 1,
-        };
-        let now = Instant::ZERO;
-        let mut leader = Relay::new(mission, identity, Settings::default(), 1, now).unwrap();
-        while leader
-            .poll_timeout()
-            .is_some_and(|at| at < Instant::from_millis(1))
-        {
-            leader.handle_timeout(leader.poll_timeout().unwrap_or(now));
+        let mut leader = relay_with(3, 1, Settings::default());
+        let soon = Instant::from_millis(1);
+        while let Some(at) = leader.poll_timeout().filter(|at| *at < soon) {
+            leader.handle_timeout(at);
         }
         assert_eq!(
             leader.resume_view(Instant::ZERO, &record),

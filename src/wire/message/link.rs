@@ -5,7 +5,7 @@ use crate::mission::MAX_RELAYS;
 use crate::place::CrossSection;
 use crate::view::ViewId;
 use crate::wire::digest::MissionId;
-use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, write};
+use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, write};
 
 /// Hello message: the sender's neighbour, the nodes that it receives, its view and its mission.
 #[expect(
@@ -103,9 +103,7 @@ impl Hello {
         let neighbour = neighbour.number();
         let behind = behind.number();
         let known = neighbour <= MAX_RELAYS && (1..=MAX_RELAYS).contains(&behind);
-        if !known || hears > 0x0F {
-            return Err(MessageError::Value);
-        }
+        require(known && hears <= 0x0F)?;
         Ok(Self {
             mission: mission.number(),
             latest_view: ViewId::from_bits(u32::from_le_bytes(newest)),
@@ -157,9 +155,7 @@ impl Claim {
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
         let ([number, heard], flags): ([[u8; 4]; 2], u8) = read(body)?;
-        if flags > 3 {
-            return Err(MessageError::Value);
-        }
+        require(flags <= 3)?;
         Ok(Self {
             number: u32::from_le_bytes(number),
             other_number: u32::from_le_bytes(heard),
@@ -193,9 +189,6 @@ pub(super) fn decode_fence(body: &[u8]) -> Result<(u16, Fence), MessageError> {
         apart_m,
         flags,
     };
-    if fence.is_valid() {
-        Ok((pass.digest(), fence))
-    } else {
-        Err(MessageError::Value)
-    }
+    require(fence.is_valid())?;
+    Ok((pass.digest(), fence))
 }

@@ -116,28 +116,33 @@ impl PassId {
     }
 }
 
-#[derive(Clone, Copy, Serialize, Deserialize)]
-pub(super) struct PlaceBody {
-    x_m: f32,
-    altitude_m: f32,
-}
-
-impl PlaceBody {
-    pub(super) const fn of(place: Placement) -> Self {
-        Self {
-            x_m: place.x_m,
-            altitude_m: place.altitude_m,
-        }
-    }
-
-    pub(super) fn checked(self) -> Option<Placement> {
-        let place = Placement::on_line(self.x_m, self.altitude_m);
-        is_place(place).then_some(place)
-    }
-}
-
 pub(super) fn is_place(at: Placement) -> bool {
     (0.0..=1e6).contains(&at.x_m) && is_beside(at.y_m) && (0.1..=1e5).contains(&at.altitude_m)
+}
+
+/// Returns the position above the line at `x_m` and `altitude_m`, m, of a relay of `power_w` watts.
+///
+/// # Errors
+/// [`MessageError::Value`] if one of the three numbers is out of range.
+pub(super) fn checked_place(
+    [x_m, altitude_m]: [f32; 2],
+    power_w: f32,
+) -> Result<Placement, MessageError> {
+    let place = Placement::on_line(x_m, altitude_m);
+    require(is_place(place) && profile(altitude_m, power_w).is_some())?;
+    Ok(place)
+}
+
+/// Checks a condition on the numbers of a message.
+///
+/// # Errors
+/// [`MessageError::Value`] if the condition is false.
+pub(super) const fn require(is_valid: bool) -> Result<(), MessageError> {
+    if is_valid {
+        Ok(())
+    } else {
+        Err(MessageError::Value)
+    }
 }
 
 /// Returns true if the lateral offset `y_m` is within -1e5 to 1e5 m.
@@ -161,7 +166,6 @@ pub(super) fn in_range(numbers: &[f32], least: f32) -> bool {
 
 /// Reason why the body of a message is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MessageError {
     /// The encoding is invalid or not the shortest, or bytes are left over.
@@ -170,15 +174,7 @@ pub enum MessageError {
     Value,
 }
 
-impl core::fmt::Display for MessageError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Encoding => {
-                "the message body is not in the canonical encoding, or has extra bytes"
-            }
-            Self::Value => "a number in the message is not finite or outside its range",
-        })
-    }
-}
-
-impl core::error::Error for MessageError {}
+error_texts!(MessageError {
+    Encoding => "the message body is not in the canonical encoding, or has extra bytes",
+    Value => "a number in the message is not finite or outside its range",
+});

@@ -14,8 +14,8 @@ use crate::sensing::estimate::{InterferenceEstimate, NumberedEstimate, Spread};
 use crate::sensing::sums::{Level, SUMS, Sums, is_level, is_power};
 use crate::wire::MAX_NODE;
 use crate::wire::message::parts::{
-    FARTHEST_M, MessageError, PassId, PlaceBody, Word, in_range, is_beside, profile, read, tag,
-    take, take_targets, write,
+    FARTHEST_M, MessageError, PassId, Word, checked_place, in_range, is_beside, profile, read,
+    require, tag, take, take_targets, write,
 };
 
 /// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target. The sender
@@ -97,40 +97,37 @@ impl Sweep {
             return Err(MessageError::Encoding);
         };
         let measured_per_w = (tag == tag::MEASURED).then_some(between);
-        let y_m = (tag == tag::ASIDE).then_some(between);
-        checked(head, y_m, measured_per_w, reaches).ok_or(MessageError::Value)
-    }
-}
-
-/// Returns the decoded sweep; `None` if a value is out of range. With a lateral offset `y_m` the sweep belongs to the
-/// joint method.
-fn checked(
-    head: SweepHead,
-    y_m: Option<f32>,
-    measured_per_w: Option<f32>,
-    reaches: PerTarget,
-) -> Option<Sweep> {
-    let ladder =
-        Ladder::from_parts(head.anchor.abs(), head.gap, head.growth)?.plainly(head.anchor < 0.0);
-    let fits = reaches.len() <= ladder.len() && in_range(&reaches, 0.0);
-    let measured = measured_per_w.is_none_or(is_upsilon);
-    let beside = y_m.is_none_or(is_beside);
-    let own = profile(head.altitude_m, head.power_w)?;
-    (fits && measured && beside).then_some(Sweep {
-        number: head.pass.number(),
-        view_digest: head.pass.digest(),
-        ladder,
-        relay: Station {
-            cross_section: CrossSection {
-                y_m: y_m.unwrap_or(0.0),
-                altitude_m: own.altitude_m,
+        let chosen = tag == tag::ASIDE;
+        let y_m = if chosen { between } else { 0.0 };
+        let SweepHead {
+            anchor,
+            gap,
+            growth,
+            altitude_m,
+            power_w,
+            pass,
+        } = head;
+        let ladder = Ladder::from_parts(anchor.abs(), gap, growth).ok_or(MessageError::Value)?;
+        require(
+            reaches.len() <= ladder.len()
+                && in_range(&reaches, 0.0)
+                && measured_per_w.is_none_or(is_upsilon)
+                && is_beside(y_m)
+                && profile(altitude_m, power_w).is_some(),
+        )?;
+        Ok(Self {
+            number: pass.number(),
+            view_digest: pass.digest(),
+            ladder: ladder.plainly(anchor < 0.0),
+            relay: Station {
+                cross_section: CrossSection { y_m, altitude_m },
+                power_w,
             },
-            power_w: own.power_w,
-        },
-        chosen: y_m.is_some(),
-        measured_per_w,
-        reaches,
-    })
+            chosen,
+            measured_per_w,
+            reaches,
+        })
+    }
 }
 
 /// Reply to a sweep message: result for each target, and the position that the destination must take.
@@ -171,9 +168,7 @@ impl SweepVerdict {
         let required_x_m: Option<f32> = read(rest)?;
         let known = commit.is_none_or(|target| usize::from(target) < TARGETS);
         let placed = required_x_m.is_none_or(|x_m| (0.0..=1e6).contains(&x_m));
-        if !(in_range(&slacks, -FARTHEST_M) && known && placed) {
-            return Err(MessageError::Value);
-        }
+        require(in_range(&slacks, -FARTHEST_M) && known && placed)?;
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
@@ -247,9 +242,7 @@ impl Roster {
             let index = index.number();
             let chooses = held_m.to_bits() == 0;
             let sound = profile(if chooses { 1.0 } else { held_m }, power_w).is_some();
-            if !(sound && index > last && index <= MAX_RELAYS) {
-                return Err(MessageError::Value);
-            }
+            require(sound && index > last && index <= MAX_RELAYS)?;
             _ = roster.seats.push(OwnSeat {
                 index,
                 held_m,
@@ -281,7 +274,7 @@ pub struct Token {
 impl Token {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
-        let at = PlaceBody::of(self.place);
+        let at = [self.place.x_m, self.place.altitude_m];
         let turn = StepBody::of(self.turn);
         write(
             &(tag::TOKEN, pass, at, self.power_w, turn, self.sir),
@@ -290,25 +283,15 @@ impl Token {
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, at, power_w, turn, sir) = read(body)?;
-        Self::checked(pass, at, power_w, turn, sir).ok_or(MessageError::Value)
-    }
-
-    fn checked(
-        pass: PassId,
-        at: PlaceBody,
-        power_w: f32,
-        turn: StepBody,
-        sir: f32,
-    ) -> Option<Self> {
-        let place = at.checked()?;
-        Some(Self {
+        let (pass, at, power_w, turn, sir): (PassId, _, _, StepBody, _) = read(body)?;
+        require(is_sir(sir))?;
+        Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
-            place,
-            power_w: profile(place.altitude_m, power_w)?.power_w,
-            turn: turn.checked()?,
-            sir: sir_in_range(sir)?,
+            place: checked_place(at, power_w)?,
+            power_w,
+            turn: turn.checked().ok_or(MessageError::Value)?,
+            sir,
         })
     }
 }
@@ -407,37 +390,27 @@ pub struct Moved {
 impl Moved {
     pub(super) fn encode(&self, buffer: &mut [u8]) -> Option<usize> {
         let pass = PassId::new(self.number, self.view_digest);
-        let at = PlaceBody::of(self.place);
+        let at = [self.place.x_m, self.place.altitude_m];
         let (any, worst) = (self.position_changed, self.worst_sir);
         write(&(tag::MOVED, pass, at, any, worst, self.power_w), buffer)
     }
 
     pub(super) fn decode(body: &[u8]) -> Result<Self, MessageError> {
-        let (pass, at, any, worst, power_w) = read(body)?;
-        Self::checked(pass, at, any, worst, power_w).ok_or(MessageError::Value)
-    }
-
-    fn checked(
-        pass: PassId,
-        at: PlaceBody,
-        position_changed: bool,
-        worst: f32,
-        power_w: f32,
-    ) -> Option<Self> {
-        let place = at.checked()?;
-        Some(Self {
+        let (pass, at, position_changed, worst_sir, power_w): (PassId, _, _, _, _) = read(body)?;
+        require(is_sir(worst_sir))?;
+        Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
-            place,
+            place: checked_place(at, power_w)?,
             position_changed,
-            worst_sir: sir_in_range(worst)?,
-            power_w: profile(place.altitude_m, power_w)?.power_w,
+            worst_sir,
+            power_w,
         })
     }
 }
 
-fn sir_in_range(sir: f32) -> Option<f32> {
-    (0.0..=f32::MAX).contains(&sir).then_some(sir)
+fn is_sir(sir: f32) -> bool {
+    (0.0..=f32::MAX).contains(&sir)
 }
 
 /// Length of a sensing message's body, bytes: the sum of the lengths of its fields. The fields are the tag, the pass,
@@ -561,9 +534,7 @@ impl Heard {
         let estimate = estimate.checked().ok_or(MessageError::Value)?;
         let off = off.number();
         let receiver = Level { power_w, count };
-        if !(sums.is_sound() && receiver.is_sound() && off <= MAX_NODE) {
-            return Err(MessageError::Value);
-        }
+        require(sums.is_sound() && receiver.is_sound() && off <= MAX_NODE)?;
         Ok(Self {
             number: pass.number(),
             view_digest: pass.digest(),
@@ -581,8 +552,6 @@ pub(super) fn encode_level(mission: u16, power_w: f32, buffer: &mut [u8]) -> Opt
 
 pub(super) fn decode_level(body: &[u8]) -> Result<(u16, f32), MessageError> {
     let (mission, power_w): (Word, f32) = read(body)?;
-    if !is_level(power_w) {
-        return Err(MessageError::Value);
-    }
+    require(is_level(power_w))?;
     Ok((mission.number(), power_w))
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::mission::MAX_RELAYS;
 use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
-use crate::wire::message::parts::{MessageError, PassId, Word, read, tag, take, write};
+use crate::wire::message::parts::{MessageError, PassId, Word, read, require, tag, take, write};
 
 /// Proposal of a new view, an agreement on the chain's members. The message travels from relay to relay and collects
 /// votes.
@@ -384,9 +384,7 @@ impl RenewalBody {
             return Ok([0; 2]);
         };
         let nodes = [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
-        if nodes == [0; 2] || nodes.iter().any(|node| *node > MAX_RELAYS) {
-            return Err(MessageError::Value);
-        }
+        require(nodes != [0; 2] && nodes.iter().all(|node| *node <= MAX_RELAYS))?;
         Ok(nodes)
     }
 }
@@ -409,9 +407,7 @@ impl Pulse {
         };
         let [leaver, joiner] = common.nodes()?;
         let lease = common.number.number();
-        if lease == 0 {
-            return Err(MessageError::Value);
-        }
+        require(lease != 0)?;
         Ok(Self {
             number: common.pass.number(),
             view_digest: common.pass.digest(),

@@ -3,8 +3,28 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use uav_relay::optimiser::pass::Walk;
 use uav_relay::{Mission, Placement, Profile, SlotShares};
 pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
+
+/// Returns the position of relay `index` for the target SIR `target`, linear.
+///
+/// A relay stays short of the farthest x that meets the target if that lets other relays meet it. `None` if the chain
+/// cannot meet the target. `profile_of` returns the profile of relay 1..=N.
+pub fn place(
+    mission: &Mission,
+    target: f32,
+    index: u16,
+    profile_of: impl Fn(u16) -> Profile,
+) -> Option<Placement> {
+    [false, true].into_iter().find_map(|plain| {
+        let chain = Walk::new(mission, target, plain, &profile_of);
+        // Every relay must have a position, not only those on the way back to this one.
+        chain.place(0)?;
+        let x_m = chain.place(index)?;
+        Some(profile_of(index).on_line().cross_section.at(x_m))
+    })
+}
 
 /// Position of a relay at the end of a run, and the SIR at which it receives.
 #[derive(Clone, PartialEq, Debug, Serialize)]

@@ -70,11 +70,11 @@
 //!
 //! Accuracy: `a_relay_aside_is_no_worse_than_brute_force` in `host-tests/tests/theorems/`: within 1e-4 relative of the best SIR.
 
-use uav_relay::root::bisected;
 use uav_relay::{Band, Interferer, Mission, Placement, Profile};
 use uav_relay_scenario::number::narrow;
 
 use super::edge::{Edge, best_in_corridor, squared, touching_inside};
+use super::extrema::bisected;
 use super::{Found, TwoHops};
 
 pub use super::edge::EdgeCoordinate;

@@ -65,11 +65,10 @@
 //! SIR_2 does. They are equal at one r, found by bisection. A position inside the box that cannot be improved must be this one:
 //! both slopes are opposite there, so SIR_1 is stationary along the circle, and the SIRs are equal.
 
-use uav_relay::root::bisected;
-use uav_relay::sir::Slope;
 use uav_relay::{Band, Interferer, Mission, Placement};
 use uav_relay_scenario::number::narrow;
 
+use super::extrema::{Slope, bisected};
 use super::{Found, HALVINGS, TwoHops};
 
 /// Coordinate that varies along an edge of the box in which a relay may be.

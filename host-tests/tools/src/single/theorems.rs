@@ -74,11 +74,12 @@
 //! `host-tests/tests/theorems/`.
 
 use uav_relay::root::sqrt;
-use uav_relay::sir::{Extremum, first_hop_turn, square};
+use uav_relay::sir::square;
 use uav_relay::{Band, Interferer, Mission, Profile};
 use uav_relay_scenario::number::narrow;
 
 use super::edge::{squared, touching_inside};
+use super::extrema::{Extremum, first_hop_turn};
 use super::{Found, Two, TwoHops};
 
 /// Case of the optimal x at a given altitude. The first five cases are the cases of the paper's Corollary 1, for an

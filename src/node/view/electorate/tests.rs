@@ -76,7 +76,9 @@ impl Chain {
     }
 }
 
-const fn granted(id: ViewId, relays: u16) -> View {
+/// Returns the view of `relays` relays on proposal `number` of node `node`.
+fn view(number: u32, node: u32, relays: u16) -> View {
+    let id = id(number, node);
     View { id, relays }
 }
 
@@ -94,7 +96,7 @@ fn more_than_half_or_half_with_the_initial_leader_decide() {
             let most = 2 * there > relays || 2 * there == relays && nodes[0] == 1;
             assert_eq!(outcome.is_some(), most, "{nodes:?} of {relays}");
             if most {
-                assert_eq!(outcome, Some(granted(id(1, 1), there)));
+                assert_eq!(outcome, Some(view(1, 1, there)));
             }
             // Two parts of one chain never decide both.
             let rest = ((1 << relays) - 1) & !part;
@@ -113,10 +115,10 @@ fn more_than_half_or_half_with_the_initial_leader_decide() {
 fn only_members_of_the_view_decide() {
     let mut chain = Chain::of(5);
     let first = chain.propose(&[1, 2, 3], id(1, 1), 3);
-    assert_eq!(first, Some(granted(id(1, 1), 3)));
+    assert_eq!(first, Some(view(1, 1, 3)));
     // Three of the five relays are polled, but only one of the three members of the view.
     let others = chain.propose(&[3, 4, 5], id(2, 3), 3);
-    assert_eq!(others, Some(granted(id(1, 1), 3)), "it may be agreed on");
+    assert_eq!(others, Some(view(1, 1, 3)), "it may be agreed on");
     let next = chain.propose(&[3, 4, 5], id(3, 3), 3);
     assert_eq!(next, None);
     assert_eq!(
@@ -125,7 +127,7 @@ fn only_members_of_the_view_decide() {
     );
     // Two of the three members are polled.
     let members = chain.propose(&[1, 2], id(4, 1), 2);
-    assert_eq!(members, Some(granted(id(4, 1), 2)));
+    assert_eq!(members, Some(view(4, 1, 2)));
 }
 
 #[test]
@@ -133,10 +135,7 @@ fn of_a_split_view_the_half_with_its_proposer_decides() {
     for (part, goes_on) in [(&[3, 4][..], true), (&[1, 2], false), (&[2, 3], true)] {
         let mut chain = Chain::of(4);
         // Node 3 proposes, and the other nodes receive the decision in two ways.
-        let view = View {
-            id: id(1, 3),
-            relays: 4,
-        };
+        let view = view(1, 3, 4);
         for (electorate, node) in chain.0.iter_mut().zip(1..) {
             electorate.vote(node, view.id, None, left(0)).unwrap();
             assert!(electorate.accept(view.id, electorate.agreed(), Some(view)));
@@ -151,24 +150,15 @@ fn of_a_split_view_the_half_with_its_proposer_decides() {
 fn a_view_that_may_be_agreed_on_is_decided_again() {
     let mut chain = Chain::of(3);
     // Only the last relay has received the decision.
-    assert_eq!(
-        chain.propose(&[1, 2, 3], id(1, 1), 1),
-        Some(granted(id(1, 1), 3))
-    );
-    assert_eq!(
-        chain.propose(&[2, 3], id(2, 2), 2),
-        Some(granted(id(1, 1), 3))
-    );
+    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), Some(view(1, 1, 3)));
+    assert_eq!(chain.propose(&[2, 3], id(2, 2), 2), Some(view(1, 1, 3)));
     assert_eq!(
         chain.knows(2).0.id,
         id(1, 1),
         "all there have accepted it now"
     );
     // A relay that has voted for the view is a member, whether or not it has received the decision.
-    assert_eq!(
-        chain.propose(&[2, 3], id(3, 2), 2),
-        Some(granted(id(3, 2), 2))
-    );
+    assert_eq!(chain.propose(&[2, 3], id(3, 2), 2), Some(view(3, 2, 2)));
 }
 
 /// Checks that a proposal that reaches all relays is accepted even if most have lost their votes. Otherwise a chain
@@ -176,21 +166,12 @@ fn a_view_that_may_be_agreed_on_is_decided_again() {
 #[test]
 fn all_relays_of_the_mission_are_always_a_view() {
     let mut chain = Chain::of(3);
-    assert_eq!(
-        chain.propose(&[1, 2, 3], id(1, 1), 1),
-        Some(granted(id(1, 1), 3))
-    );
+    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 1), Some(view(1, 1, 3)));
     for at in [0, 1] {
         chain.0[at] = Electorate::new(3, 1);
     }
-    assert_eq!(
-        chain.propose(&[1, 2, 3], id(2, 1), 3),
-        Some(granted(id(2, 1), 3))
-    );
-    assert_eq!(
-        chain.propose(&[1, 2], id(3, 1), 2),
-        Some(granted(id(3, 1), 2))
-    );
+    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), Some(view(2, 1, 3)));
+    assert_eq!(chain.propose(&[1, 2], id(3, 1), 2), Some(view(3, 1, 2)));
 }
 
 #[test]
@@ -199,17 +180,11 @@ fn of_two_accepted_proposals_the_later_is_decided_again() {
         let mut chain = Chain::of(4);
         let early = Successor {
             proposal: id(1, 1),
-            view: View {
-                id: id(1, 1),
-                relays: 3,
-            },
+            view: view(1, 1, 3),
         };
         let late = Successor {
             proposal: id(2, 2),
-            view: View {
-                id: id(2, 2),
-                relays: 2,
-            },
+            view: view(2, 2, 2),
         };
         chain.0[0].promised = late.proposal;
         let (first, last) = if accepted_first == 1 {
@@ -226,16 +201,10 @@ fn of_two_accepted_proposals_the_later_is_decided_again() {
 #[test]
 fn a_promise_excludes_earlier_decisions() {
     let mut chain = Chain::of(3);
-    assert_eq!(
-        chain.propose(&[1, 2, 3], id(2, 1), 0),
-        Some(granted(id(2, 1), 3))
-    );
+    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 0), Some(view(2, 1, 3)));
     // The second relay has promised a later proposal and ignores earlier ones.
     chain.poll(&[2], id(3, 2));
-    let view = View {
-        id: id(2, 1),
-        relays: 3,
-    };
+    let view = view(2, 1, 3);
     assert!(!chain.accept(1, view));
     assert!(chain.accept(2, view));
     for old in [id(1, 3), id(2, 1), id(3, 1), id(3, 2)] {
@@ -275,10 +244,7 @@ fn a_relay_that_does_not_know_the_view_has_no_vote() {
 #[test]
 fn commit_applies_to_the_last_accepted_view() {
     let mut chain = Chain::of(3);
-    assert_eq!(
-        chain.propose(&[1, 2, 3], id(1, 1), 2),
-        Some(granted(id(1, 1), 3))
-    );
+    assert_eq!(chain.propose(&[1, 2, 3], id(1, 1), 2), Some(view(1, 1, 3)));
     assert!(chain.0[1].awaits(id(1, 1)) && !chain.0[0].awaits(id(1, 1)));
     chain.0[0].commit();
     assert_eq!(
@@ -307,10 +273,7 @@ fn only_members_may_be_relied_on() {
 #[test]
 fn votes_are_kept_until_their_result_is_known() {
     let mut relay = Electorate::new(3, 1);
-    let view = View {
-        id: id(1, 1),
-        relays: 3,
-    };
+    let view = view(1, 1, 3);
     relay.vote(2, view.id, None, left(0)).unwrap();
     for number in 2..100 {
         relay.vote(2, id(number, 2), None, left(0)).unwrap();
@@ -347,26 +310,14 @@ fn votes_are_kept_until_their_result_is_known() {
 #[test]
 fn a_relay_without_its_record_may_decide_a_second_view() {
     let mut chain = Chain::of(5);
-    assert_eq!(
-        chain.propose(&[3, 4, 5], id(1, 3), 3),
-        Some(granted(id(1, 3), 3))
-    );
+    assert_eq!(chain.propose(&[3, 4, 5], id(1, 3), 3), Some(view(1, 3, 3)));
     chain.0[2] = Electorate::new(5, 1);
-    assert_eq!(
-        chain.propose(&[1, 2, 3], id(2, 1), 3),
-        Some(granted(id(2, 1), 3))
-    );
+    assert_eq!(chain.propose(&[1, 2, 3], id(2, 1), 3), Some(view(2, 1, 3)));
     // The other two nodes are two of its three members.
     chain.0[3].commit();
-    assert_eq!(
-        chain.propose(&[4, 5], id(3, 4), 2),
-        Some(granted(id(3, 4), 2))
-    );
+    assert_eq!(chain.propose(&[4, 5], id(3, 4), 2), Some(view(3, 4, 2)));
     // With its record the node would have reported that view.
     let mut kept = Chain::of(5);
-    assert_eq!(
-        kept.propose(&[3, 4, 5], id(1, 3), 3),
-        Some(granted(id(1, 3), 3))
-    );
+    assert_eq!(kept.propose(&[3, 4, 5], id(1, 3), 3), Some(view(1, 3, 3)));
     assert_eq!(kept.propose(&[1, 2, 3], id(2, 1), 3), None);
 }

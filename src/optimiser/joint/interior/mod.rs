@@ -32,6 +32,7 @@ use super::chain::{Chain, SeatOf};
 use super::hop::{Triple, minus};
 use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
+use super::solver::Noted;
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
 use hop::{Derivatives, Levels, LogGains, add_scaled, dot};
@@ -98,13 +99,19 @@ impl Hop {
 
 /// x of a relay, in units of the distance from Tx to Rx, and the hop that ends at the relay.
 #[derive(Clone, Copy, Debug)]
-struct Node {
+pub(super) struct Node {
     x: f32,
     hop: Hop,
 }
 
-/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32, which
-/// keeps two to three significant decimal digits.
+/// Memory of Algorithm 1 in place of the levels, which the interior-point method computes later.
+impl Noted for Node {
+    fn lengths_m(&mut self) -> &mut [f32; 2] {
+        &mut self.hop.level
+    }
+}
+
+/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32: three digits.
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
@@ -181,7 +188,7 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     /// relay not in the part next to Tx. The values are the lengths of the parts, divided by the distance from Tx to
     /// Rx.
     pub(super) closed: [f32; 2],
-    nodes: [Node; RELAYS],
+    pub(super) nodes: [Node; RELAYS],
     last: Hop,
     segments: [Segment; SEGMENTS],
     /// Newton steps of the current segment's second part, kept until its first part is computed.
@@ -276,18 +283,10 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Stores two lengths for relay `index` during Algorithm 1, m: its x, and the upper limit of its x. The interior-point method later
-    /// overwrites these lengths.
-    pub(super) fn note(&mut self, index: u16, lengths_m: [f32; 2]) {
-        if let Some(node) = self.node(index) {
-            node.hop.level = lengths_m;
-        }
-    }
-
-    /// Returns the two values, m, that [`Interior::note`] has stored for relay `index`; 0 for Tx.
-    pub(super) fn noted(&self, index: u16) -> [f32; 2] {
+    /// Returns the x, m, that Algorithm 1 has stored for relay `index`.
+    pub(super) fn noted_x_m(&self, index: u16) -> f32 {
         let node = self.nodes.get(usize::from(index).wrapping_sub(1));
-        node.map_or([0.0; 2], |node| node.hop.level)
+        node.map_or(0.0, |node| node.hop.level[0])
     }
 
     fn node(&mut self, index: u16) -> Option<&mut Node> {

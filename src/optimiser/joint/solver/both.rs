@@ -13,20 +13,17 @@
 //! mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
+use super::line::Line;
 use crate::optimiser::joint::chain::{Chain, SeatOf};
 use crate::optimiser::joint::interior::Interior;
 use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;
-use crate::optimiser::pass::{Behind, Link};
 use crate::optimiser::search::Infeasible;
-use crate::place::{CrossSection, Placement, Station};
+use crate::place::{CrossSection, Placement};
 use crate::root::sqrt;
 use crate::sir::square;
 use core::task::Poll;
 
-/// Number of relays for which one call of the solver continues Algorithm 1. The algorithm computes the x of all
-/// relays for one target.
-const LINE: u16 = 2;
 /// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
@@ -59,39 +56,19 @@ enum Along {
 }
 
 const STARTS: [Start; 6] = [
-    Start {
-        aside: [1.0, 1.0, 1.0],
-        up: [1.0, 1.0],
-        along: Along::Line,
-    },
-    Start {
-        aside: [0.9, 0.45, 0.0],
-        up: [0.96, 0.04],
-        along: Along::Line,
-    },
-    Start {
-        aside: [0.96, 0.96, 0.96],
-        up: [0.96, 0.04],
-        along: Along::Even([0.5, 1.0]),
-    },
-    Start {
-        aside: [0.0, 0.9, 0.0],
-        up: [0.96, 0.04],
-        along: Along::Even([0.0, 1.0]),
-    },
-    Start {
-        aside: [0.9, 0.45, 0.0],
-        up: [0.04, 0.96],
-        along: Along::Even([0.0, 0.5]),
-    },
-    Start {
-        aside: [1.0, 1.0, 1.0],
-        up: [1.0, 1.0],
-        along: Along::Arc,
-    },
+    Start::new([1.0, 1.0, 1.0], [1.0, 1.0], Along::Line),
+    Start::new([0.9, 0.45, 0.0], [0.96, 0.04], Along::Line),
+    Start::new([0.96, 0.96, 0.96], [0.96, 0.04], Along::Even([0.5, 1.0])),
+    Start::new([0.0, 0.9, 0.0], [0.96, 0.04], Along::Even([0.0, 1.0])),
+    Start::new([0.9, 0.45, 0.0], [0.04, 0.96], Along::Even([0.0, 0.5])),
+    Start::new([1.0, 1.0, 1.0], [1.0, 1.0], Along::Arc),
 ];
 
 impl Start {
+    const fn new(aside: [f32; 3], up: [f32; 2], along: Along) -> Self {
+        Self { aside, up, along }
+    }
+
     /// Returns the lateral offset and altitude in `room` of relay `index` of this initial chain.
     fn cross_section(self, chain: &Chain<'_, impl SeatOf>, index: u16, room: Room) -> CrossSection {
         let (relays, before) = (chain.relays(), before(chain, index));
@@ -148,30 +125,6 @@ enum Work {
     Interior,
 }
 
-/// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
-#[derive(Clone, Copy, Debug)]
-struct Pass {
-    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
-    /// back.
-    index: u16,
-    /// True while the solver passes along the chain from Rx back to Tx.
-    is_back: bool,
-    /// x of relay `index`, m. In the pass to Rx it is the farthest x that meets the target; in the pass back it is
-    /// the final x.
-    x_m: f32,
-    /// Upper limit of the x of relay `index`, m, which leaves the relays after it their separation.
-    end_m: f32,
-}
-
-impl Pass {
-    const NONE: Self = Self {
-        index: 0,
-        is_back: false,
-        x_m: 0.0,
-        end_m: 0.0,
-    };
-}
-
 /// Joint solver of a chain that carries data in both directions.
 #[derive(Clone, Debug)]
 pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
@@ -181,7 +134,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     /// Lateral offsets and altitudes of the chain that meets the best target.
     best_cells: Cells<RELAYS>,
     work: Work,
-    pass: Pass,
+    line: Line,
     /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
     /// Number of repeated runs, so far, of the interior-point method for the current initial chain.
@@ -197,7 +150,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         best: None,
         best_cells: Cells::NEW,
         work: Work::Begin(0),
-        pass: Pass::NONE,
+        line: Line::NEW,
         reached: 0.0,
         again: 0,
         number: 0,
@@ -213,7 +166,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
                 let Poll::Ready(met) = self.line(chain, seek.sigma) else {
                     return Poll::Pending;
                 };
-                if seek.tried(met.map(|()| true)) {
+                if seek.tried(met) {
                     Work::Seek(seek, purpose)
                 } else {
                     match (seek.found(), purpose) {
@@ -230,7 +183,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
                     return Poll::Pending;
                 };
                 match met {
-                    Some(()) => Work::Put(0),
+                    Some(_) => Work::Put(0),
                     None => self.next_start(),
                 }
             }
@@ -380,7 +333,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
             let turned = |x: f32| if is_turned(chain) { 1.0 - x } else { x };
             let x_m = match along {
                 Along::Line | Along::Arc => {
-                    let [x_m, _] = self.interior.noted(index);
+                    let x_m = self.interior.noted_x_m(index);
                     x_m + off * (share * distance_m - x_m)
                 }
                 Along::Even([first, last]) => {
@@ -397,104 +350,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Interior
     }
 
-    /// Continues Algorithm 1 by two relays, for the target `sigma`, in ln(SIR). Ready with `Some` once all relays
-    /// have an x, which is stored; ready with `None` if the target cannot be met.
-    fn line(&mut self, chain: &Chain<'_, impl SeatOf>, sigma: f32) -> Poll<Option<()>> {
-        let mut pass = self.pass;
-        let target = libm::expf(sigma);
-        if pass.index == 0 && !pass.is_back {
-            pass.end_m = self.interior.cells.end_m(chain, 0);
-        }
-        for _ in 0..LINE {
-            let met = if pass.is_back {
-                self.line_back(chain, target, &mut pass)
-            } else {
-                self.line_there(chain, target, &mut pass)
-            };
-            let over = pass.is_back && pass.index == 0;
-            if over || met.is_none() {
-                self.pass = Pass::NONE;
-                return Poll::Ready(met);
-            }
-        }
-        self.pass = pass;
-        Poll::Pending
-    }
-
-    /// Computes the farthest x at which the next relay toward Rx meets `target`. For the last relay the result is its
-    /// final x. `None` if the target cannot be met.
-    fn line_there(
-        &mut self,
-        chain: &Chain<'_, impl SeatOf>,
-        target: f32,
-        pass: &mut Pass,
-    ) -> Option<()> {
-        let index = pass.index + 1;
-        let step = self.interior.cells.least_step(chain, index);
-        pass.end_m = chain.end_after(pass.end_m, step);
-        let end_m = if index == 1 {
-            let [far, _] = self.interior.closed;
-            pass.end_m.min((1.0 - far) * chain.distance_m())
-        } else {
-            pass.end_m
-        };
-        let link = self.line_link(chain, index, end_m);
-        let mut x_m = link.reach(target, pass.x_m)?;
-        if index >= chain.relays() {
-            let (slack, place) = link.ending(target, pass.x_m, x_m)?;
-            let [_, near] = self.interior.closed;
-            if !(slack >= 0.0 && place >= near * chain.distance_m()) {
-                return None;
-            }
-            x_m = place;
-            pass.is_back = true;
-        }
-        self.interior.note(index, [x_m, end_m]);
-        (pass.index, pass.x_m) = (index, x_m);
-        Some(())
-    }
-
-    /// Computes the final x of the relay before relay `pass.index`, which is at `pass.x_m`. `None` if `target` cannot
-    /// be met.
-    fn line_back(
-        &mut self,
-        chain: &Chain<'_, impl SeatOf>,
-        target: f32,
-        pass: &mut Pass,
-    ) -> Option<()> {
-        let [_, end_m] = self.interior.noted(pass.index);
-        let before = pass.index.saturating_sub(1);
-        let [reach, before_m] = self.interior.noted(before);
-        let link = self.line_link(chain, pass.index, end_m);
-        let required = link.required_position(target, reach, pass.x_m)?;
-        pass.x_m = required.or_reach(reach);
-        pass.index = before;
-        self.interior.note(before, [pass.x_m, before_m]);
-        Some(())
-    }
-
-    /// Returns relay `index` and its hop for Algorithm 1, computed exactly as the relay will compute them.
-    fn line_link<'a>(&self, chain: &Chain<'a, impl SeatOf>, index: u16, end_m: f32) -> Link<'a> {
-        let station = |index: u16| {
-            let seat = chain.seat(index);
-            Station {
-                cross_section: self.interior.cells.get(index).place(seat.room),
-                power_w: seat.power_w,
-            }
-        };
-        Link {
-            mission: chain.mission,
-            behind: (index > 1).then(|| Behind {
-                relay: station(index - 1),
-                measured_per_w: None,
-            }),
-            index,
-            own: station(index),
-            measured_per_w: None,
-            plain: false,
-            end_m: Some(end_m),
-            fixed_m: None,
-        }
+    /// Continues Algorithm 1 for the target `sigma`, in ln(SIR). Ready with `None` if the target cannot be met.
+    fn line(&mut self, chain: &Chain<'_, impl SeatOf>, sigma: f32) -> Poll<Option<bool>> {
+        let Interior {
+            cells,
+            nodes,
+            closed,
+            ..
+        } = &mut self.interior;
+        self.line.step(chain, cells, nodes, *closed, sigma)
     }
 }
 

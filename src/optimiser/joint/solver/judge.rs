@@ -6,7 +6,7 @@
 use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
 use crate::optimiser::joint::ascent::{Ascent, AscentStep};
-use crate::optimiser::joint::chain::{Chain, SeatOf, far_off, last_of};
+use crate::optimiser::joint::chain::{Chain, SeatOf, far_off};
 use crate::optimiser::joint::site::{Cell, MARGIN, Room};
 use crate::optimiser::joint::starts::{Seek, Start};
 use crate::optimiser::search::Infeasible;
@@ -32,40 +32,16 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         seek: Seek,
         purpose: Purpose,
     ) -> Poll<Result<f32, Infeasible>> {
-        let Poll::Ready(slack) = self.plain(chain, seek.sigma, purpose, false) else {
-            return Poll::Pending;
+        let met = if purpose.is_sweep() {
+            let (cells, notes) = (&self.cells, &mut self.notes);
+            self.line.step(chain, cells, notes, [0.0; 2], seek.sigma)
+        } else {
+            let slack = self.plain(chain, seek.sigma, purpose, false);
+            slack.map(|slack| slack.is_some_and(|slack| slack >= 0.0).then_some(false))
         };
-        let met = slack.is_some_and(|slack| slack >= 0.0);
-        if met && self.pass.holds_back {
-            let place_m = self.pass.from.x_m;
-            self.work = Work::HoldBack(last_of(chain.mission), place_m, seek, purpose);
-            return Poll::Pending;
-        }
-        self.tried(chain, seek, purpose, met.then_some(false))
-    }
-
-    /// Checks in one more segment (ten relays) that each relay has a position that meets the target.
-    ///
-    /// Some relays have to stay short of their farthest position, so that the next relay meets the target, too. The
-    /// segments are checked from the last to the first; `place_m` is the x that the last relay of the segment has to
-    /// take, m. Bounded by twenty relays.
-    pub(super) fn try_hold_back(
-        &mut self,
-        chain: &Chain<'_, impl SeatOf>,
-        segment: u8,
-        place_m: f32,
-        seek: Seek,
-        purpose: Purpose,
-    ) -> Poll<Result<f32, Infeasible>> {
-        match (
-            self.held_back_x_m(chain, segment, place_m, libm::expf(seek.sigma)),
-            segment.checked_sub(1),
-        ) {
-            (Some(place_m), Some(before)) => {
-                self.work = Work::HoldBack(before, place_m, seek, purpose);
-                Poll::Pending
-            }
-            (place_m, _) => self.tried(chain, seek, purpose, place_m.map(|_| true)),
+        match met {
+            Poll::Ready(met) => self.tried(chain, seek, purpose, met),
+            Poll::Pending => Poll::Pending,
         }
     }
 

@@ -9,7 +9,8 @@
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `passes` | the backward and the forward pass of an ascent, a pass without changes, and the sweep's rules |
+//! | `passes` | the backward and the forward pass of an ascent, and a pass without changes |
+//! | `line` | the sweep's rules: Algorithm 1 for the stored lateral offsets and altitudes |
 //! | `judge` | the steps after a target is found: the next start, or the polish |
 //! | `both` | the solver for both directions |
 //!
@@ -17,6 +18,7 @@
 
 mod both;
 mod judge;
+mod line;
 mod passes;
 
 use crate::features::{ALTITUDE, REVERSE};
@@ -31,6 +33,8 @@ use crate::place::{CrossSection, Placement};
 use core::task::Poll;
 
 use both::Both;
+use line::Line;
+pub(super) use line::Noted;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {
@@ -41,8 +45,6 @@ struct ForwardPass {
     /// Position of the last completed relay before the forward pass moved it.
     old: Placement,
     penalty: f32,
-    end_m: f32,
-    holds_back: bool,
 }
 
 impl ForwardPass {
@@ -51,8 +53,6 @@ impl ForwardPass {
         from: Placement::on_line(0.0, 0.0),
         old: Placement::on_line(0.0, 0.0),
         penalty: 0.0,
-        end_m: 0.0,
-        holds_back: false,
     };
 }
 
@@ -65,9 +65,6 @@ enum Work {
     Seek(Seek, Purpose),
     /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Check that every relay has a position if some relays must stay short of their farthest position. The fields
-    /// are the segment, the required x of its last relay, m, and the search with its purpose.
-    HoldBack(u8, f32, Seek, Purpose),
     /// Try the next move of one relay. The field is the target that the chain meets, as ln(SIR).
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for the segment with this number.
@@ -134,6 +131,9 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
+    line: Line,
+    /// x of each relay and its upper limit, m, during a search by the sweep's rules.
+    notes: [[f32; 2]; RELAYS],
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
     /// True if the minimum separation of relays has restricted the improvement of any chain.
@@ -170,6 +170,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         ascent: Ascent::NONE,
         work: Work::Begin,
         pass: ForwardPass::NONE,
+        line: Line::NEW,
+        notes: [[0.0; 2]; RELAYS],
         holds_back: false,
         walled: false,
         moving: 0,
@@ -186,9 +188,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             Work::Begin => self.begin(chain),
             Work::Seek(seek, purpose) => self.seek(chain, seek, purpose),
             Work::Settle(sigma, purpose) => self.settle(chain, sigma, purpose),
-            Work::HoldBack(segment, place_m, seek, purpose) => {
-                self.try_hold_back(chain, segment, place_m, seek, purpose)
-            }
             Work::Polish(sigma) => self.polish(chain, sigma),
             Work::Back(segment) => {
                 self.back(chain, segment);

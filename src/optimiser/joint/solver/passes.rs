@@ -1,7 +1,6 @@
 //! Backward pass, which computes the policies, and forward pass, which tries them.
 //!
-//! A plain pass changes nothing, or gives a chain its initial shape. A pass with the sweep's rules finds the relays' positions,
-//! and whether they have to hold back.
+//! A plain pass changes nothing, or gives a chain its initial shape.
 
 use super::{ForwardPass, OneWay, Purpose, Work};
 use crate::mission::Mission;
@@ -13,9 +12,7 @@ use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
 use crate::optimiser::joint::site::{Cell, Cells, Room, Site};
 use crate::optimiser::joint::starts::Start;
-use crate::optimiser::spacing::Hop;
-use crate::place::{CrossSection, Placement};
-use crate::root::sqrt;
+use crate::place::Placement;
 use core::task::Poll;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -179,7 +176,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
                 from: place,
                 old: nominal,
                 penalty: self.pass.penalty + link.penalty(target, place),
-                ..self.pass
             };
         }
         Some(())
@@ -206,18 +202,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     ) -> Poll<Option<f32>> {
         let target = libm::expf(sigma);
         let relays = chain.relays();
-        if purpose.is_sweep() && self.pass.done == 0 {
-            self.pass.end_m = self.cells.end_m(chain, 0);
-        }
         for _ in 0..PLAIN {
             let index = self.pass.done + 1;
             if index > relays {
-                if purpose.is_sweep() {
-                    let power_w = chain.seat(relays).power_w;
-                    let reach_m = sqrt(chain.mission.receiver_gain(power_w) / target);
-                    let (slack, _) = Outlook::tail(reach_m, chain.distance_m(), self.pass.from);
-                    return Poll::Ready(Some(slack));
-                }
                 let (slack, _) = chain.tail(target, self.pass.from);
                 let penalty = self.pass.penalty;
                 if purpose == Purpose::Judge && penalty > FORGIVEN * chain.distance_m() {
@@ -228,28 +215,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             let room = chain.room(index);
             let wanted = self.shaped(chain, index, room, target, purpose);
             let from = self.pass.from;
-            let place = if purpose.is_sweep() {
-                let step = self.cells.least_step(chain, index);
-                self.pass.end_m = chain.end_after(self.pass.end_m, step);
-                if let Some(mark) = self.mark(index) {
-                    // The slope is unused between two backward passes, so it stores x.
-                    mark.slope = [from.x_m, 0.0, 0.0];
-                }
-                let hop = self.hop(chain, index, self.pass.end_m);
-                let reach = hop.reach(target, from.x_m);
-                self.pass.holds_back |= reach.is_none();
-                reach
-                    .or_else(|| hop.outermost(target, from.x_m))
-                    .map(|x_m| wanted.at(x_m))
-            } else {
-                let link = self.link(chain, index, from, room);
-                link.at(target, from.x_m, wanted).inspect(|at| {
-                    self.pass.penalty += link.penalty(target, *at);
-                })
-            };
-            let Some(place) = place else {
+            let link = self.link(chain, index, from, room);
+            let Some(place) = link.at(target, from.x_m, wanted) else {
                 return Poll::Ready(None);
             };
+            self.pass.penalty += link.penalty(target, place);
             if kept {
                 self.keep(index, from.x_m, Cell::of(place.cross_section(), room));
             }
@@ -273,60 +243,6 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             link.apart_m = 0.0;
         }
         link
-    }
-}
-
-impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the hop to relay `index` of the current chain. It is computed as the relay computes it from its
-    /// messages. The x of the hop's end is at most `end_m`, m.
-    pub(super) fn hop(&self, chain: &Chain<'_, impl SeatOf>, index: u16, end_m: f32) -> Hop {
-        let at = |index| (self.cells.get(index)).place(chain.room(index));
-        let before = if index > 1 {
-            at(index - 1)
-        } else {
-            CrossSection::default()
-        };
-        let sender = chain.sender(index, before.at(0.0));
-        Hop::new(
-            chain.mission,
-            chain.interferer,
-            sender,
-            index,
-            at(index),
-            0.0,
-        )
-        .ending(end_m)
-    }
-
-    /// Returns the x, m, that the relay before `segment` must take to meet the target. The segment's last relay is at
-    /// x = `place_m`.
-    ///
-    /// `None` if a relay of the segment cannot take the position that the next one requires.
-    pub(super) fn held_back_x_m(
-        &self,
-        chain: &Chain<'_, impl SeatOf>,
-        segment: u8,
-        mut place_m: f32,
-        target: f32,
-    ) -> Option<f32> {
-        let relays = chain.relays();
-        let [mut x_m, ..] = self.marks.get(usize::from(segment))?.slope;
-        let mut end_m = self.cells.end_m(chain, u16::from(segment) * SEGMENT_RELAYS);
-        let mut before = [(0.0, 0.0); SEGMENT];
-        for (k, index) in relays_of(segment, relays) {
-            let step = self.cells.least_step(chain, index);
-            end_m = chain.end_after(end_m, step);
-            *before.get_mut(k)? = (x_m, end_m);
-            x_m = self.hop(chain, index, end_m).outermost(target, x_m)?;
-        }
-        for (k, index) in relays_of(segment, relays).rev() {
-            let (from_m, end_m) = *before.get(k)?;
-            let hop = self.hop(chain, index, end_m);
-            place_m = hop
-                .required_position(target, from_m, place_m)?
-                .or_reach(from_m);
-        }
-        Some(place_m)
     }
 }
 

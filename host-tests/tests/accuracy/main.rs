@@ -2,6 +2,8 @@
 //!
 //! `cargo test --test accuracy -- --nocapture` prints the table, with `--release` and `--include-ignored` also the times.
 
+mod bearings;
+
 use std::hint::black_box;
 use std::time::Instant;
 
