@@ -33,7 +33,7 @@ function values() {
 }
 
 /** Returns the text about a task that has failed. */
-const failure = (error) => (error.name === "TimeoutError" ? `No answer for ${ANSWER / 1000} s: see below whether the station has started the task.` : `Refused: ${error.message}.`);
+const failure = (error) => (error.name === "TimeoutError" ? `No answer for ${ANSWER / 1000} s: the state after this text shows whether the station has started the task.` : `Refused: ${error.message}.`);
 
 async function preview() {
   edited();

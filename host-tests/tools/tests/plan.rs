@@ -221,7 +221,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     let (status, line) = refusal("--target-rate-bps 2e7 --bandwidth-hz 1e7");
     assert_eq!(status, 1, "{line}");
     for part in [
-        "--target-rate-bps 20000000.0: no number of relays carries it: all hops share one frequency in equal time slots",
+        "--target-rate-bps 20000000.0: no number of relays carries this rate: all hops share one frequency in equal time slots",
         "1 relay carries 6.58",
         "a larger bandwidth than 10000000.0 Hz",
     ] {

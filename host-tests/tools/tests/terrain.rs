@@ -241,7 +241,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
         losses.push(flight.loss_db.unwrap());
         warned += flight.warnings().count();
         for relay in &flight.relays {
-            let part = format!("relay {} has no room: ", relay.index);
+            let part = format!("relay {} has no room to drift: ", relay.index);
             let is_warned = flight.warnings().any(|line| line.starts_with(&part));
             assert_eq!(is_warned, relay.room_m.is_none(), "seed {seed}: {relay:?}");
             confined += u32::from(is_warned);
@@ -1034,7 +1034,7 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
     let (status, _, line) = run(&narrow);
     for part in [
         "no positions of 3 relays over this terrain meet all limits: at least 30 m (terrain.above_ground_m)",
-        " and at most 30.1 m (terrain.above_ground_max_m), and 5 m apart (geometry.min_separation_m). The lowest ground is at x = ",
+        " and at most 30.1 m (terrain.above_ground_max_m), relays at least 5 m apart (geometry.min_separation_m). The lowest ground is at x = ",
         "above the line from Tx to Rx; this includes terrain.error_m = 50",
     ] {
         assert!(status == Some(1) && line.contains(part), "{line}");
@@ -1049,7 +1049,7 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         of("banded.toml")
     );
     let (status, _, line) = run(&banded);
-    let part = "above the highest ground, and at an altitude of 20 to 21 m (geometry.altitude_min_m and altitude_max_m), 5 m apart";
+    let part = "above the highest ground, and at an altitude of 20 to 21 m (geometry.altitude_min_m and altitude_max_m), relays at least 5 m apart";
     assert!(status == Some(1) && line.contains(part), "{line}");
     let (status, _, line) = run(&format!("--target-sir 3 {scenario} --altitude terrain"));
     assert!(

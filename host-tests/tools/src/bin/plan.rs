@@ -1040,7 +1040,7 @@ fn next(file: &str, sections: &Deployment) -> String {
             )
         }
         (Err(why), _) => format!(
-            "next, on the Linux computer of every drone:\n{companions}The firmware cannot use this file: {why}\n"
+            "the firmware cannot use this file ({why}); next, on the Linux computer of every drone:\n{companions}"
         ),
     }
 }
