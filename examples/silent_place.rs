@@ -55,7 +55,7 @@ use panic_halt as _;
 #[cfg(target_os = "none")]
 use stm32f4xx_hal as _;
 
-/// Computes the position of relay 3 on the target, where a debugger can read it.
+/// Computes the position of relay 3 on the target chip, where a debugger can read the result.
 #[cfg(target_os = "none")]
 #[cortex_m_rt::entry]
 fn main() -> ! {

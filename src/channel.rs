@@ -8,7 +8,7 @@ use core::f64::consts::PI;
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Kind of path loss between drones and the ground, from which their path-loss factor eta is computed.
+/// Kind of path loss between drones and the ground. It selects the path-loss factor eta of these links.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {

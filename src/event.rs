@@ -6,14 +6,14 @@
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event of the relay that a firmware may react to. The firmware reads the changed state from the relay.
+/// Event of the relay, to which a firmware can react. The firmware reads the changed state from the relay.
 ///
 /// A field `node` is a relay's index in the chain as configured before flight, as in
 /// [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Event {
-    /// `Relay::setpoint` has changed: fly to it, or without a setpoint hold the position.
+    /// `Relay::setpoint` has changed: fly to the new setpoint; if there is none, hold the position.
     SetpointChanged,
     /// The chain has agreed on positions. If the interference is known, the chain has also agreed on a target SIR
     /// (`Relay::target`).
@@ -24,11 +24,11 @@ pub enum Event {
     Infeasible,
     /// The neighbour at `side` is lost.
     ///
-    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and at least 16 requests. On a
-    /// channel that loses frames both take longer, at most eight times `dead_after`.
-    /// With two links the relay keeps sending heartbeat requests to it; on a shared channel it searches for another
-    /// node at that side. An operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space
-    /// around its last position.
+    /// It has answered nothing for at least `Settings::dead_after` (15 s by default), and has left at least 16 requests
+    /// unanswered. On a channel that loses frames this takes longer, at most eight times `dead_after`. With two links
+    /// the relay keeps sending heartbeat requests to the neighbour; on a shared channel it searches for another node at
+    /// that side. An operator looks for that drone. Once it has landed, `Relay::clear_lost` frees the space around its
+    /// last position.
     NeighbourLost {
         /// Side of this relay on which the neighbour is: toward Tx or toward Rx.
         side: Side,
@@ -64,20 +64,21 @@ pub enum Event {
         /// Index of the node that signs with another key.
         node: u16,
     },
-    /// Five handshakes in a row from a node have an epoch not newer than the node's last known one. The key is right,
-    /// but the node did not increase its epoch (start counter) at its last start, so its frames are rejected. The
-    /// epoch is older, or the same with the same seed, and none in between is newer. An operator increases that
-    /// node's epoch and restarts it, or restarts this relay and its other neighbours. A replay of one recorded frame
-    /// does not raise it, but a replay in order of five handshakes of one start does. If `node` is this relay, its
-    /// neighbours know a newer epoch, and it becomes passive ([`Event::DuplicateIndex`]).
+    /// Five handshakes in a row from a node have an epoch that is not newer than the node's last known one. The key is
+    /// right, but the node did not increase its epoch (start counter) at its last start, so its frames are rejected.
+    /// The epoch is older, or the same with the same seed. A handshake with a newer epoch starts the count again. An
+    /// operator increases the node's epoch and restarts it, or restarts this relay and its other neighbours. A replay
+    /// of one recorded frame does not raise the event, but a replay in order of five handshakes of one start does. If
+    /// `node` is this relay, its neighbours know a newer epoch, and this relay becomes passive
+    /// ([`Event::DuplicateIndex`]).
     EpochWentBack {
         /// Index of the node whose epoch went back.
         node: u16,
     },
     /// Two nodes use the same index. If it is this relay's index, at most one of the two has a setpoint (see
-    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of
-    /// the two nodes and gives it the right index. Not raised again before the other node has been silent for twice
-    /// `dead_after`. With signed frames, an attacker without the key can raise it, but cause nothing else.
+    /// `Relay::is_passive`). If it is a neighbour's, that index is received at both ports. An operator lands one of the
+    /// two nodes and gives it the right index. Not raised again before the other node has been silent for twice
+    /// `dead_after`. With signed frames, an attacker without the key can raise this event, but cannot do more.
     DuplicateIndex {
         /// Index that two nodes use.
         node: u16,
@@ -94,24 +95,24 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was rejected, and this relay keeps its present one. The new mission's distance does not fit its
-    /// Tx and Rx positions on earth, or the mission exceeds this relay's own geofence, or it has fitted slots (as long
-    /// as each hop needs) that the settings do not allow. The ground station is informed. Raised once for each such
-    /// mission. Upload one whose Tx and Rx positions are as far apart as its distance, within the geofence, and with
-    /// slots for the relays' method.
+    /// A newer mission was rejected, and this relay keeps its present mission. The new mission's distance does not fit
+    /// its Tx and Rx positions on earth, or the mission exceeds this relay's own geofence, or it has fitted slots (as
+    /// long as each hop needs) that the settings do not allow. The ground station is informed. Raised once for each
+    /// such mission. Upload a mission whose Tx and Rx positions are as far apart as its distance, within the geofence,
+    /// and with slots for the relays' method.
     UploadRefused {
         /// Reason for which the mission was rejected.
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
     NewEstimate,
-    /// The measurements do not fit a single source on the ground (raised at the leader). They may also be too few, or
-    /// contradictory. `Relay::unfit` gives the reason.
+    /// The measurements do not fit a single source on the ground, are too few or contradict each other. Raised at the
+    /// leader. `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit again. An operator
-    /// should check the receiver of this node. Only the leader reports the transmitter and the receiver. A relay that
-    /// measures nothing at all is reported only by itself. With four relays or fewer the faulty relay cannot be
-    /// identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit. An operator should
+    /// check the receiver of this node. For the transmitter and the receiver only the leader raises this event. For a
+    /// relay that measures nothing at all only this relay itself raises it. With four relays or fewer the faulty relay
+    /// cannot be identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,
@@ -122,27 +123,29 @@ pub enum Event {
     /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap: the
     /// drone of this relay may fly away.
     MayLeave,
-    /// The drone's endurance is unknown; raised only with a reserve (`Relay::set_reserve`).
+    /// The drone's remaining time of flight is unknown; raised only with a reserve (`Relay::set_reserve`).
     ///
-    /// A value was invalid, none came for 10 s, or there was none while the relay controls the drone. The last one that agreed with
-    /// another counts down, or a single one. Without any the relay does not leave by itself. Raised at most once a minute, and again while that lasts.
+    /// Raised if a value of `Relay::handle_endurance` was invalid, if none came for 10 s, or if none is known while the
+    /// relay controls the drone. The relay then counts down from the last value that agreed with the value before it,
+    /// or else from the last value. Without any valid value the relay does not leave the chain by itself. Raised at
+    /// most once a minute, and again while the time is unknown.
     EnduranceUnknown,
     /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
     AtReserve,
-    /// A node outside of the chain at `side` was told by this relay that its drone may fly away.
+    /// A node outside of the chain at `side` was told by this relay that the node's drone may fly away.
     ///
-    /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event may
-    /// be repeated.
+    /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
+    /// may be repeated.
     MayLeaveTold {
         /// Side of this relay on which the node is: toward Tx or toward Rx.
         side: Side,
-        /// Index of the node whose drone may fly away.
+        /// Index of the node whose drone is permitted to leave.
         node: u16,
     },
 }
 
-/// Events without a node that the firmware polls first. Then come the events that concern a node, and at the end the
-/// events in `POLLED_LAST`.
+/// Events without a node that the firmware polls first. After them it polls the events that concern a node, and at the
+/// end the events in `POLLED_LAST`.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,

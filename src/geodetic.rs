@@ -121,7 +121,7 @@ pub enum LineError {
     Length,
     /// The mission has fitted slots (`fitted_gap` above 0), which this relay cannot fly.
     ///
-    /// They need the method `Joint`, no `Settings::listen`, and a known interferer.
+    /// Fitted slots need the method `Joint`, no `Settings::listen`, and a known interferer.
     Slots,
 }
 

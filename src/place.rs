@@ -16,7 +16,7 @@
 pub struct Placement {
     /// Distance from the transmitter along the ground, m: 0 to D, the distance from Tx to Rx.
     pub x_m: f32,
-    /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
+    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
     pub y_m: f32,
     /// Height of the position above the ground, m.
     pub altitude_m: f32,
@@ -42,7 +42,7 @@ impl Placement {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
-    /// Lateral offset from the line Tx to Rx, m: to its right above 0, to its left below.
+    /// Lateral offset from the line Tx to Rx, m: positive to the right of the line, negative to the left.
     pub y_m: f32,
     /// Height of the relay above the ground, m.
     pub altitude_m: f32,

@@ -47,9 +47,9 @@ pub trait Real:
 impl Real for f32 {}
 impl Real for f64 {}
 
-/// Halves the interval from `low` to `high` `steps` times, and returns its ends.
+/// Halves the interval from `low` to `high` `steps` times, and returns the ends of the last interval.
 ///
-/// The value searched is the one up to which `holds` returns true. It is assumed to be true at `low` and false at `high`.
+/// `holds` must be true from `low` to some value, and false from this value to `high`. The last interval contains this value.
 pub fn bisected<T: Real>(low: T, high: T, steps: u8, mut holds: impl FnMut(T) -> bool) -> (T, T) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {
@@ -65,8 +65,8 @@ pub fn bisected<T: Real>(low: T, high: T, steps: u8, mut holds: impl FnMut(T) ->
 
 /// Power or path-loss ratio as the sum of two f32, so that its difference to a nearby target is exact.
 ///
-/// A target gamma is compared with a gain A through gamma - A. With A rounded to one f32 this difference has an error of up to
-/// 6e-8 A, which is why the closed forms as printed lose digits near gamma = A.
+/// A target gamma is compared with a gain A through gamma - A. With A rounded to one f32 this difference has an error of up to 6e-8 A, so
+/// the closed forms as printed in the paper lose digits near gamma = A.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PowerRatio {

@@ -69,7 +69,7 @@ pub struct Adjust {
     pub rounds: u16,
     /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
-    /// Method by which a relay searches a better position when it moves.
+    /// Method by which a relay searches for a better position when it moves.
     pub local: Local,
 }
 
@@ -95,7 +95,7 @@ pub struct Measure {
     pub samples: u32,
 }
 
-/// Settings that a firmware may choose.
+/// Options of a relay, which its firmware chooses.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -126,8 +126,8 @@ pub struct Settings {
     pub listen: Option<Listen>,
     /// Schedule of target SIRs that the leader tries; the other relays follow.
     pub schedule: Schedule,
-    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one
-    /// round trip of messages along the chain is enough. For the bracketed schedule only.
+    /// True if the leader first predicts the chain's target SIR from the mission. If the prediction is right, one round
+    /// trip of messages along the chain is enough. It has an effect only with the bracketed schedule.
     pub predict: bool,
     /// Connection to the neighbours: two links or one shared channel.
     pub wiring: Wiring,
@@ -155,13 +155,13 @@ pub struct Settings {
     /// position in 32 equal steps. With 0 it moves in one step.
     ///
     /// If all drones arrive together, no hop is worse on the way than before or after
-    /// ([`docs::batteries`](crate::docs::batteries)). Choose it so that the longest way, about a spacing of the
-    /// chain, takes no more than the drones' usual speed. Use the same value for all relays of a chain. At most four
-    /// times `dead_after`.
+    /// ([`docs::batteries`](crate::docs::batteries)). Choose the duration so that the drones fly the longest way, about
+    /// a spacing of the chain, at their usual speed or slower. Use the same value for all relays of a chain. At most
+    /// four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
-    /// True if a relay without a guard may leave the chain (`Relay::leave`). Its neighbours then fly close to the drone
-    /// that still holds its place: beside the end of a chain to within a few metres.
+    /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
+    /// the drone that still holds its place. At an end of the chain they come as close as a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
     /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
@@ -182,7 +182,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns true if a relay with these settings may fly a mission with the time slots of `config`.
+    /// Returns true if a relay with these settings can fly a mission with the time slots of `config`.
     ///
     /// This is so if the slots are equal. It is also so for fitted slots (as long as each hop needs), with the method
     /// `Joint` and a known interferer.
@@ -240,8 +240,8 @@ impl Settings {
     /// relays in range of each other, with the overhead of a frame.
     ///
     /// `probe_after` is 5 s, or longer if the channel would be overloaded with 5 s ([`ChannelLoad::carried`]).
-    /// `dead_after` is three times `probe_after`. `hop_time` is that of [`ChannelLoad::hop_time`] with a latency of
-    /// 10 ms, but at least 30 ms. Set a longer `hop_time` for a radio that buffers frames longer. All relays of a
+    /// `dead_after` is three times `probe_after`. `hop_time` is the value of [`ChannelLoad::hop_time`] with a latency
+    /// of 10 ms, but at least 30 ms. Set a longer `hop_time` for a radio that buffers frames longer. All relays of a
     /// chain need the same settings.
     ///
     /// ```
@@ -299,15 +299,15 @@ pub enum SetupError {
     Profile,
     /// The step of the fixed-step schedule is not a number above 0.
     Step,
-    /// `method` cannot be used. Either the mission gives the interference as a distribution along x, and the method
-    /// is not [`Method::Align`]. Or the joint method has more than 100 relays. Or the method needs a feature that the
-    /// crate was built without.
+    /// `method` cannot be used. Either the mission gives the interference as a distribution along x, and the method is
+    /// not [`Method::Align`]. Or the method is [`Method::Joint`], and the chain has more than 100 relays. Or the method
+    /// needs a feature that the crate was built without.
     Method,
     /// The method Joint is used with `listen`, although the mission has traffic from Rx to Tx (`reverse`). For
     /// traffic in both directions this method needs a known interferer.
     Reverse,
-    /// The mission has fitted slots (`fitted_gap` above 0). The method must then be Joint, `listen` `None`, and the
-    /// interferer known.
+    /// The mission has fitted slots (`fitted_gap` above 0), but the method is not Joint. Or `listen` is set, or the
+    /// interferer is unknown.
     Fitted,
     /// `method.explore_m` is not within 0 to 1e5, or its search grid has fewer than 2 columns or rows.
     Adjust,

@@ -12,8 +12,8 @@ pub enum Heading {
     TowardTx,
 }
 
-/// Side of a relay along the chain, toward Tx or toward Rx. It also stands for the neighbour on that side, or for the
-/// link to it.
+/// Side of a relay along the chain, toward Tx or toward Rx. Also used for the neighbour on that side, and for the link
+/// to this neighbour.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Side {

@@ -254,13 +254,13 @@ impl<T: Real> Slope<T> {
         half - T::from(2.0) * self.noise * s * (t - p) > T::from(0.0)
     }
 
-    /// Returns the only maximum of the SIR for p < 0, m. `peak` is its t without noise.
+    /// Returns the t of the SIR's only maximum for p < 0, m. `peak` is the t of the maximum without noise.
     pub fn hill(&self, peak: T) -> T {
         bisected(T::from(0.0), peak, self.halvings, |t| self.rises(t)).0
     }
 
-    /// Returns the minimum and the maximum of the SIR for p > 0, m. `bottom` is the minimum without noise. `None` if
-    /// the SIR only falls.
+    /// Returns the t of the SIR's minimum and of its maximum for p > 0, m. `bottom` is the t of the minimum without
+    /// noise. `None` if the SIR only falls.
     pub fn valley_and_hill(&self, bottom: T) -> Option<[T; 2]> {
         let bends_up = |t: T| self.bends_up(t);
         if !bends_up(bottom) {

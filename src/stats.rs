@@ -13,7 +13,7 @@ pub struct Stats {
     /// Messages received from a neighbour with all values in range. Some are also counted by another counter, for
     /// example as stale.
     pub received: u32,
-    /// Received duplicates of view proposals and of messages along the chain. This relay has answered them again.
+    /// Received duplicates of view proposals and of messages along the chain. This relay has repeated its replies.
     pub repeated: u32,
     /// Intact frames between other nodes of the network, received on a shared channel.
     pub overheard: u32,
@@ -25,7 +25,7 @@ pub struct Stats {
     pub crc: u32,
     /// Received intact frames of another version of the frame format.
     pub version: u32,
-    /// Received handshake frames with the right authentication tag, which only establish sessions.
+    /// Received handshake frames with the right authentication tag. Handshakes only establish sessions.
     pub handshakes: u32,
     /// Intact frames without an authentication tag, received by a relay with a key. A relay without a key counts
     /// mission offers here, because it accepts offers only with a key.

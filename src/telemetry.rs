@@ -35,7 +35,7 @@ pub struct Report {
     pub neighbours: [Option<u16>; 2],
     /// True for each neighbour, toward Tx and toward Rx, that the relay does not receive now.
     pub silent: [bool; 2],
-    /// True if the relay has received another node with its own number within the last three `dead_after`.
+    /// True if the relay has received another node with its own number within three times `dead_after`.
     pub is_duplicated: bool,
     /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,

@@ -103,7 +103,7 @@ const DISORDER: Duration = Duration::from_millis(100);
 /// taking internal time to its maximum, at which no timer would expire.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
-/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time may step in
+/// Clock that converts the caller's time to internal time, which never runs backward. The caller's time can step in
 /// either direction.
 ///
 /// | caller's time | internal time |
@@ -113,12 +113,12 @@ const LONGEST: Duration = Duration::from_micros(1 << 52);
 /// | up to 100 ms before the latest | stands still until the caller's time has caught up |
 /// | earlier than that | goes on from the latest, in step with the caller's time from now on |
 ///
-/// Timers continue after a backward step, which extends a lease at most by the time between two calls.
+/// Timers continue after a backward step. The step extends a lease at most by the time between two calls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MonotonicClock {
-    /// Time of the caller's clock up to which this clock has advanced.
+    /// Latest time of the caller's clock to which this clock has advanced.
     latest: Instant,
-    /// Internal time, which never runs backward, when the caller's clock showed `latest`.
+    /// Internal time at which the caller's clock showed `latest`. The internal time never runs backward.
     internal: Instant,
 }
 

@@ -14,7 +14,7 @@ pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
 }
 
 /// Returns the number of instructions that `work` takes. The instructions of the measurement itself are not counted.
-/// The counter wraps after 780 000.
+/// Above 780 000 instructions the result is wrong, because the counter wraps.
 pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
     let empty = ticks(|| ());
     // 128 ns at 168 MHz are 21.504 ticks, 2 688 / 125: the largest count of ticks times 125 is still a u32.

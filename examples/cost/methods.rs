@@ -6,7 +6,8 @@ use uav_relay::{Adjust, Instant, MAX_FRAME, Method, Mission, Phase, Port, Relay,
 use super::counter::{instructions, relay};
 use super::missions::{HIGH, UNEVEN};
 
-/// Simulated chain of three relays that records the highest cost of a call of a relay's functions.
+/// Simulated chain of three relays that records the cost of the most expensive call. The cost of a call of a relay's
+/// functions is its number of instructions.
 pub(crate) struct Flight {
     relays: heapless::Vec<Relay, 3>,
     /// Number of instructions of the most expensive call of a relay's function so far.
@@ -52,8 +53,8 @@ impl Flight {
         }
     }
 
-    /// Runs the chain until all relays hold their agreed positions, for at most `turns` rounds of timers. Returns
-    /// true if all relays then hold them.
+    /// Runs the chain until all relays hold their agreed positions, for at most `turns` rounds. A round delivers the
+    /// pending frames, then handles the next timers. Returns true if all relays hold their positions.
     fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {

@@ -7,7 +7,7 @@ use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 use super::counter::relay;
 use super::missions::mission;
 
-/// Measures the maximum stack use of a relay's calls, bytes, by a pattern that they overwrite.
+/// Measures the maximum stack use of a relay's calls, bytes. The calls overwrite a pattern on the stack.
 #[inline(never)] // its relays are not on the stack of the others
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);

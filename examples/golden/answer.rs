@@ -8,11 +8,11 @@ use uav_relay::wire::message::{Message, MessageError, SweepVerdict};
 /// First bytes that the test firmware sends. They tell the test that the firmware is ready to receive frames.
 pub const READY: &[u8] = b"ready\0";
 
-/// Generator of the answers to received frames, by which a test compares the results of target and PC.
+/// Generator of the answers to received frames. A test compares the answers of the target with the answers of a PC.
 ///
-/// A valid frame is answered with itself, decoded and encoded again. A sweep message is also answered with a verdict
-/// message that contains values of the sweep. An invalid frame is answered with a digit for the error, and a
-/// delimiter.
+/// The answer to a valid frame is the same frame, decoded and encoded once more. After a sweep message a second answer
+/// follows: a verdict message that contains values of the sweep. The answer to an invalid frame is a digit for the
+/// error, and a delimiter.
 pub struct Answerer {
     deframer: Deframer,
 }

@@ -24,19 +24,20 @@ pub fn verdict(red: usize, all: usize, items: &str) -> Finding {
     }
 }
 
-/// End of a check: all items have been green for a time, or its limit is over.
+/// Condition for the end of a check. The check ends when all items have been green for `green_for`, or at the time
+/// `limit`.
 #[derive(Debug)]
 pub struct End {
-    /// Latest end.
+    /// Time at which the check ends even if an item is red.
     pub limit: Instant,
     /// Time for which all items have to be green.
     pub green_for: Duration,
-    /// Time since which all items have been green.
+    /// Time since which all items have been green; `None` if an item is red.
     pub green_since: Option<Instant>,
 }
 
 impl End {
-    /// Takes the present state of all items. Returns true at the end of the check.
+    /// Updates the state with `are_green`, true if all items are green now. Returns true at the end of the check.
     pub fn is_reached(&mut self, now: Instant, are_green: bool) -> bool {
         let since = self.green_since.filter(|_| are_green);
         self.green_since = are_green.then(|| since.unwrap_or(now));

@@ -23,7 +23,7 @@ pub struct FileOnlySettings {
     /// Path-loss parameters of the channel in the file. `None` for the default channel, which is the channel of the
     /// paper.
     pub channel: Option<Channel>,
-    /// Distribution of the interference along x given by the file, if any.
+    /// Distribution of the interference along x given by the file; `None` if the file has none.
     pub field: Option<Interference>,
     /// Profiles (altitude and power) of single relays, each with the index of its relay.
     pub profiles: Vec<(u16, Profile)>,
@@ -135,7 +135,7 @@ impl FileOptions {
         }
     }
 
-    /// Checks that an autopilot is named if the file has settings for one. The file or the command line may name it.
+    /// Checks that the file or the command line names an autopilot if the file has settings for one.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {
@@ -152,7 +152,8 @@ impl FileOptions {
         })
     }
 
-    /// Removes the options of the file that the command line also gives or excludes by another option.
+    /// Removes the options of the file that the command line overrides. They are also on the command line, or excluded
+    /// by another option there.
     ///
     /// Returns the remaining options, and the overrides. An override is a removed option whose value differs from the
     /// value on the command line.
@@ -225,7 +226,7 @@ const NEEDS_AUTOPILOT: [(&str, &str); 6] = [
     ("--descent", "descent_m_s"),
 ];
 
-/// Command-line options, each with the options of the file that it makes void.
+/// Command-line options, each with the options that are removed from the file when it is given.
 const EXCLUDES: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
@@ -417,7 +418,7 @@ fn place(planned: &PlannedPlace) -> Placement {
     }
 }
 
-/// Returns the scenario without a minimum separation, so that any number of relays fits.
+/// Returns the scenario without a minimum separation: with 0 m, any number of relays fits on the line.
 fn without_separation(scenario: &Scenario) -> Scenario {
     Scenario {
         min_separation_m: 0.0,

@@ -40,12 +40,12 @@ const EVERY: Duration = Duration::from_millis(2_000);
 /// Minimum number of frames rejected for a reason between two checks before the reason is reported.
 const MANY: u32 = 3;
 
-/// Number of damaged frames between two checks from which on the log suggests a wrong baud rate. It does so only if
-/// no intact frame was received between the two checks.
+/// Minimum number of damaged frames between two checks for the log to suggest a wrong baud rate. The log suggests this
+/// only if no intact frame was received between the two checks.
 const DAMAGED: u32 = 10;
 
-/// Detects reasons why frames are rejected, from the growth of counters. It has the counters at the last check, and
-/// the reasons already reported.
+/// Detector of reasons why frames are rejected. It compares the counters with the counters at the last check, and
+/// remembers the reasons that it has reported.
 #[derive(Debug, Default)]
 pub struct RejectionReasons {
     last: Stats,
@@ -54,8 +54,8 @@ pub struct RejectionReasons {
 }
 
 impl RejectionReasons {
-    /// Returns a text about a reason why frames are rejected; `None` if there is no new reason. Each reason is
-    /// returned once. `signs` is true if this relay signs.
+    /// Returns a text about a reason why frames are rejected; `None` if there is no new reason. Each reason is returned
+    /// once. `signs` is true if this relay signs its frames.
     pub fn next_reason(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.check_at {
             return None;

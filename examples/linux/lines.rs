@@ -17,7 +17,7 @@ pub const LONGEST: usize = 200;
 /// Description of the permitted powers, for error messages.
 const POWER: &str = "a power within 1e-30 to 1e6 W, or in dBm with the unit, as -95 dBm";
 
-/// Parses a power from the words of a line: a number in W, or a number in dBm followed by that unit. Returns it in W.
+/// Parses a power from the words of a line: a number in W, or a number followed by `dBm`. Returns the power in W.
 ///
 /// # Errors
 /// A text that names the words and the permitted range.
@@ -93,14 +93,14 @@ pub struct Fifo {
     partial_line: PartialLine,
 }
 
-/// Incomplete line, as received so far. A line longer than [`LONGEST`] is cut to one byte more, which marks it as too
-/// long.
+/// Incomplete line, as received so far. A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes, which marks it as
+/// too long.
 #[derive(Debug, Default)]
 pub struct PartialLine(Vec<u8>);
 
 impl PartialLine {
-    /// Appends received bytes, and passes each completed line to `line` without its line feed. Cuts a line to one
-    /// byte more than [`LONGEST`].
+    /// Appends received bytes, and passes each completed line to `line` without its line feed. Cuts a line to `LONGEST
+    /// + 1` bytes.
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {

@@ -50,7 +50,8 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Requests that the writer thread confirms that all earlier lines are written or dropped.
+    /// Request for a confirmation. The writer thread confirms through the channel once all earlier lines are written or
+    /// dropped.
     Flush(SyncSender<()>),
 }
 
@@ -73,7 +74,7 @@ impl Log {
     /// Starts the writer thread; each line names `source`.
     ///
     /// # Errors
-    /// One line that names the file that can not be opened.
+    /// One line that names the file that cannot be opened.
     pub fn open(options: &LogOptions, source: Source) -> Result<Self, String> {
         let path = options.log_file.clone();
         let file = match &path {

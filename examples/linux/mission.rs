@@ -27,10 +27,12 @@ pub const POWER_W: [f32; 2] = [1e-6, 1e6];
 /// Permitted range of a noise power, W.
 pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--reverse`: SIR needed toward the transmitter / SIR needed toward the receiver.
+/// Permitted range of `--reverse`, a ratio of two SIRs. It is the SIR that a hop needs toward the transmitter, divided
+/// by the SIR that it needs toward the receiver.
 pub const REVERSE: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--fitted-gap` above 0: linear SNR gap, for time slots as long as each hop needs.
+/// Permitted range of `--fitted-gap` above 0. The value is the SNR gap, a power ratio, for time slots as long as each
+/// hop needs.
 pub const FITTED_GAP: [f32; 2] = [1.0, 1e3];
 
 fn fitted_gap(text: &str) -> Result<f32, String> {
@@ -119,8 +121,8 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the interference of the mission. It is the interferer of the command line, or else `field`, the
-    /// interference that the file gives along x, or else the paper's interferer.
+    /// Returns the interference of the mission: the interferer of the command line. Without one, `field` is returned,
+    /// the interference that the file gives along x. Without both, the interferer of the paper is returned.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }

@@ -16,8 +16,8 @@ pub struct Notify {
 }
 
 impl Notify {
-    /// Opens the socket that `NOTIFY_SOCKET` names. Returns `None` without this variable, or if the socket can not be
-    /// reached. The program then runs all the same.
+    /// Opens the socket that `NOTIFY_SOCKET` names. Returns `None` without this variable, or if the socket cannot be
+    /// reached. With `None` the program runs without notifications.
     pub fn open() -> Option<Self> {
         let to = address(&std::env::var_os("NOTIFY_SOCKET")?)?;
         let socket = UnixDatagram::unbound().ok()?;
@@ -35,8 +35,8 @@ impl Notify {
         self.send("READY=1");
     }
 
-    /// Reports to systemd's watchdog that the program is alive, if it is time. Returns the time of the next report;
-    /// `None` without a watchdog.
+    /// Reports to systemd's watchdog that the program is alive, if the report is due. Returns the time of the next
+    /// report; `None` without a watchdog.
     pub fn tend(&mut self, now: Instant) -> Option<Instant> {
         let every = self.every?;
         if self.due <= now {

@@ -32,7 +32,8 @@ pub struct Replug {
     tap: Option<Tap>,
 }
 
-/// Traffic counters of a serial port (tty): bytes, and the number of times that it was missing.
+/// Traffic counters of a serial port (tty): bytes, and the number of times that the port failed. A port fails when it
+/// is unplugged, for example.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,

@@ -76,8 +76,8 @@ impl Service {
         self.notify.iter().for_each(Notify::ready);
     }
 
-    /// Handles signals and status requests, and reports to systemd's watchdog. Returns the time by which to call it
-    /// again, if any.
+    /// Handles signals and status requests, and reports to systemd's watchdog. Returns the time by which the next call
+    /// is due; `None` if no time is set.
     ///
     /// `answer` returns the answer to a request. The argument of `answer` is `None` for a status request; otherwise
     /// it is a command and its sender. `who` names the program in the log line after a SIGHUP.
@@ -110,8 +110,8 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until the time `wake`, a signal, a status request, or input on one of `ttys` or `others`. Without
-    /// `wake` there is no time limit.
+    /// Sleeps until the time `wake`, a signal, a status request, or input on one of `ttys` or `others`. If `wake` is
+    /// `None`, there is no time limit.
     ///
     /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
     ///

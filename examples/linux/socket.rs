@@ -16,8 +16,8 @@ use crate::lines::LONGEST;
 /// Maximum number of connections that one call of [`StatusSocket::questions`] accepts.
 const ANSWERS: usize = 4;
 
-/// Maximum number of clients whose request is not complete. If there are more, the oldest of them are answered at
-/// once.
+/// Maximum number of clients whose request is not complete. If there are more, the oldest requests are handled at once,
+/// as if they were complete.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -46,7 +46,7 @@ pub struct Question {
 }
 
 impl StatusSocket {
-    /// Creates the socket, and replaces a stale one of an earlier program.
+    /// Creates the socket. Replaces a socket file that an earlier program has left behind.
     ///
     /// # Errors
     /// One line that names the socket and the fault.
@@ -81,8 +81,8 @@ impl StatusSocket {
         std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Accepts connections and reads from them. Returns the complete requests, and the time by which to call it
-    /// again; `None` without clients.
+    /// Accepts connections and reads from them. Returns the complete requests, and the time by which the next call is
+    /// due; `None` without clients.
     pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());

@@ -86,10 +86,10 @@ pub struct StoredFile {
     done: Receiver<Done>,
     /// Socket that becomes readable when a write has ended, for poll(2).
     ended: UnixStream,
-    /// Newest record that must be written to the file; `None` if all are written.
+    /// Newest record for the file, written or not; `None` if there is none.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
-    /// Record whose write has ended last, successful or not.
+    /// Record of the last completed write, successful or not.
     tried: Option<Vec<u8>>,
     writes: u64,
     slowest: Span,
@@ -99,8 +99,8 @@ pub struct StoredFile {
 }
 
 impl StoredFile {
-    /// Starts the writer thread of `file`, which `option` names. `record` is the file's record from an earlier start,
-    /// if any.
+    /// Starts the writer thread of `file`, which `option` names. `record` is the record that the file has from an
+    /// earlier start; `None` without one.
     ///
     /// # Errors
     /// One line that names the file and the fault.
@@ -160,8 +160,8 @@ impl StoredFile {
         is_tried
     }
 
-    /// Handles the end of a write, and begins the next write if there is one. A failed write is retried after a
-    /// pause. Returns the time of the retry, if any.
+    /// Handles the end of a write, and begins the next write if a newer record waits. A failed write is retried after a
+    /// pause. Returns the time of the retry; `None` if no retry is needed.
     pub fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);
@@ -226,7 +226,7 @@ impl StoredFile {
         self.ended.as_fd()
     }
 
-    /// Passes the newest record of votes to the writer thread. Does nothing while that thread is writing.
+    /// Returns the number of successful writes of the record file.
     pub const fn writes(&self) -> u64 {
         self.writes
     }

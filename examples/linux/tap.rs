@@ -22,7 +22,7 @@ const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
 
-/// Bytes received or sent by one call, at the port with the number `port`.
+/// Bytes that one call has received or sent at the port with the number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -33,12 +33,12 @@ struct Piece {
 /// State of a capture of serial traffic, shared by all its ports.
 #[derive(Debug, Default)]
 struct CaptureState {
-    /// Error that ended the capture of frames early.
+    /// Error because of which the capture has ended before the program; unset without an error.
     fault: OnceLock<String>,
     is_reported: AtomicBool,
 }
 
-/// Capture of one port, which gives the port's traffic to the writer thread of the capture file.
+/// Capture of one port. It passes the port's traffic to the thread that writes the capture file.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
@@ -175,7 +175,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Splits the traffic into frames and writes them to the capture; flushes whenever the queue is empty.
+/// Splits the traffic into frames and writes them to the capture file. Flushes the file whenever the queue is empty.
 fn write(
     capture: &mut Capture<BufWriter<File>>,
     interfaces: &[Interface],

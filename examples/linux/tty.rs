@@ -56,8 +56,8 @@ impl Tty {
         }
     }
 
-    /// Marks the tty as failed if poll(2) reported a hang-up or an error. An unplugged adapter stays ready for ever
-    /// and would otherwise cause a busy loop.
+    /// Marks the tty as failed if poll(2) reported a hang-up or an error. For an unplugged adapter poll(2) returns at
+    /// once at every call; without the mark the program would never sleep.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
             self.fail("the device was disconnected");
@@ -75,7 +75,7 @@ impl Tty {
             .get_or_insert_with(|| format!("{name}: {what}"));
     }
 
-    /// Returns the number of bytes that a read or write transferred; `None` if it must be retried later.
+    /// Returns the number of bytes that a read or write transferred; `None` if it must be repeated later.
     fn done(&mut self, result: Result<usize, Errno>) -> Result<Option<usize>, Fault> {
         match result {
             Ok(count) => Ok(Some(count)),

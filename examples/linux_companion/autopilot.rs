@@ -63,12 +63,14 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Side of the neighbour that the drone's directional antenna points to. `None` without such an antenna.
+    /// Neighbour that the drone's directional antenna points to: upstream or downstream. `None` without such an
+    /// antenna.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
-    /// Time of flight with a full battery, s, NaN if unknown; speeds of the return and of the descent, m/s.
+    /// Time of flight with a full battery, s, NaN if unknown, and two speeds, m/s. The speeds are those of the return
+    /// and of the descent.
     ///
-    /// `None` if the autopilot's battery does not matter.
+    /// `None` if the relay does not use the battery messages of the autopilot.
     pub(crate) endurance: Option<[f32; 3]>,
 }
 
@@ -230,8 +232,8 @@ impl Companion {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Reports a drone far from the line between transmitter and receiver, if it is time for a report. The report
-    /// goes to the log, and may go to the operator.
+    /// Reports a drone that is far from the line between transmitter and receiver, if a report is due. The report goes
+    /// to the log; some reports also go to the operator.
     fn check_fence(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -253,7 +255,8 @@ impl Companion {
         }
     }
 
-    /// Logs that no autopilot has answered since the start, once for each kind of fault.
+    /// Logs that no autopilot has been found since the start. Each kind of fault, such as no bytes or only noise, is
+    /// logged once.
     fn log_unanswered(&mut self, now: Instant, log: &Log) {
         let received = self.received_kind();
         if let Some(missing) = self.answers.check(now, received) {
@@ -508,8 +511,8 @@ const fn mistrusted(why: Mistrust) -> &'static str {
     }
 }
 
-/// Returns this machine's time as a MAVLink timestamp for signatures. If this clock is behind the autopilot's, the
-/// link continues from the timestamps that it receives.
+/// Returns this machine's time as a MAVLink timestamp for signatures. If this clock is behind the autopilot's clock,
+/// the link counts on from the autopilot's timestamps.
 pub(crate) fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

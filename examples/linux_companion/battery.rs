@@ -16,34 +16,37 @@ use crate::autopilot::Companion;
 use crate::lost::log_command;
 use uav_relay_linux::log::Log;
 
-/// Time between two texts about a refused departure.
+/// Time between two texts to the pilot about the same refused departure.
 const AGAIN: Duration = Duration::from_millis(60_000);
 
 /// Minimum time between two log lines about a departure that is pending.
 const LOGGED: Duration = Duration::from_millis(10_000);
 
-/// Maximum time from the start for which the relay waits for the endurance of its drone.
+/// Maximum time for which a starting relay waits for the endurance of its drone. The endurance is the remaining time of
+/// flight.
 const FIRST: Duration = Duration::from_millis(10_000);
-/// Maximum time for which the relay waits for the confirmation of the first low endurance.
+/// Maximum time for which a starting relay waits after the first low endurance. In this time its departure from the
+/// chain has to be confirmed.
 const CONFIRMED: Duration = Duration::from_millis(20_000);
 
-/// State of the departure, as logged.
+/// State of the relay's departure from the chain because of its battery, as last logged.
 #[derive(Debug)]
 pub(crate) struct Battery {
     departure: Departure,
     logged_at: Instant,
     told_at: Instant,
-    /// True until the relay may take part in the chain.
+    /// True while the relay waits for its endurance, before it takes part in the chain.
     waits: bool,
     /// Time of the first low endurance during the wait.
     low_at: Option<Instant>,
     has_reserve: bool,
-    /// Last time at which the endurance was known or told to be unknown, or the drone was not in the air.
+    /// Last time at which the endurance was known, or was not needed. It is not needed while the drone is not in the
+    /// air, and once the relay is informed that the endurance is unknown.
     known_at: Instant,
 }
 
 impl Battery {
-    /// Creates the state at the start. A relay that `has_reserve` waits for its endurance.
+    /// Creates the state at the start. If `has_reserve` is true, the relay waits for its endurance.
     pub(crate) const fn new(has_reserve: bool) -> Self {
         Self {
             departure: Departure::Member,
@@ -58,7 +61,8 @@ impl Battery {
 
     /// Returns true while a relay that has just started waits for its endurance.
     ///
-    /// A relay that restarts with a low battery then leaves before it has taken part in anything, and does not join the chain.
+    /// A relay that restarts with a low battery then leaves before it takes part in any agreement, and does not join
+    /// the chain.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
         let left_s = relay.endurance_s(now);
         if left_s.is_some() && left_s < relay.endurance_limit_s() {
@@ -73,7 +77,8 @@ impl Battery {
         self.waits
     }
 
-    /// Makes an endurance unknown that has never come, in flight or without an autopilot's link. The relay reports that.
+    /// Informs the relay that its endurance is unknown, if none was received for 10 s. Does nothing while the autopilot
+    /// is silent or the drone is on the ground. The relay then reports the unknown endurance.
     pub(crate) fn tell_unknown(
         &mut self,
         now: Instant,
@@ -94,7 +99,7 @@ impl Battery {
         self.waits
     }
 
-    /// Logs changes of the relay's departure, and tells the pilot.
+    /// Logs changes of the relay's departure, and sends them to the pilot.
     pub(crate) fn tend(
         &mut self,
         now: Instant,
@@ -137,7 +142,7 @@ impl Battery {
         }
     }
 
-    /// Executes the operator's commands `leave` and `stay`; `None` for another command.
+    /// Executes the operator's commands `leave` and `stay`, and returns the answer. `None` for another command.
     pub(crate) fn command(
         now: Instant,
         log: &Log,
@@ -184,7 +189,7 @@ impl Battery {
     }
 }
 
-/// Returns true for a departure that is requested and not granted.
+/// Returns true for a departure that is requested but not yet granted.
 const fn is_pending(departure: Departure) -> bool {
     !matches!(
         departure,
@@ -192,7 +197,7 @@ const fn is_pending(departure: Departure) -> bool {
     )
 }
 
-/// Returns the reason of a refusal for the pilot, up to 37 bytes; `None` without one.
+/// Returns the reason of a refused departure for the pilot, at most 37 bytes. `None` if the departure is not refused.
 const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
         Departure::NeedsGuard => "refused: no guard",

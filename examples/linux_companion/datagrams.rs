@@ -7,7 +7,8 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 use serde_json::{Value, json};
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// Maximum number of attempts of a socket call. A call may fail because an earlier datagram was refused.
+/// Maximum number of attempts of a socket call. A call can fail because the peer has refused an earlier datagram, and
+/// is then repeated.
 const ATTEMPTS: usize = 4;
 
 #[derive(Debug)]
@@ -61,8 +62,8 @@ impl Datagrams {
         count
     }
 
-    /// Sends a frame as one datagram. If the kernel's buffer is full the frame is dropped, because the next one is
-    /// newer.
+    /// Sends a frame as one datagram. If the kernel's buffer is full, the frame is dropped, because the next frame has
+    /// newer data.
     pub(crate) fn send(&mut self, frame: &[u8]) {
         let count = self.call(|socket| socket.send(frame));
         self.written += count as u64;
@@ -136,7 +137,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that after a refused datagram neither the next sent nor the next received datagram is lost.
+    /// Checks that a refused datagram causes no loss of the next sent or received datagram.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

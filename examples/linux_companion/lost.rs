@@ -13,7 +13,7 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost since its start: it does not receive them any more.
+/// Relays that this relay has lost since its start, and does not receive at present.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,
@@ -105,8 +105,8 @@ impl Lost {
         self.nodes.retain(|node| !named.contains(node));
     }
 
-    /// Parses the number of a relay that a command reports as landed. Returns an error if the relay can not be lost:
-    /// it is this relay itself, or this relay still receives it.
+    /// Parses the number of a relay that a command reports as landed. Returns an error if the relay cannot be lost: it
+    /// is this relay itself, or this relay still receives it.
     fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {

@@ -11,12 +11,12 @@ use uav_relay_linux::log::Log;
 
 const STEP_M: f32 = 0.5;
 
-/// Maximum distance from the agreed position at which a drone has arrived, m. Autopilots hover up to 0.9 m off their
-/// target.
+/// Maximum distance of a drone from the agreed position, m, for the drone to count as arrived. Autopilots hover up to
+/// 0.9 m off their target.
 const NEAR_M: f32 = 1.0;
 
-/// Time without a change of the setpoint after which a move has ended. Also the time for which a drone must stay near
-/// its position to have arrived, because it may overshoot.
+/// Time without a change of the setpoint after which a move has ended. A drone has arrived when it has been near its
+/// position for the same time, because it may first fly past the position.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -26,10 +26,11 @@ pub(crate) enum Step {
     Arrived(Placement, f32),
 }
 
-/// State of the log of a drone's moves: logged and newest setpoint, and the lines still to log.
+/// State of the log of a drone's moves. It has the logged setpoint, the newest setpoint, and the progress of the move.
 #[derive(Debug)]
 pub(crate) struct Movement {
-    /// True if small changes of the setpoint are not logged. Those above [`STEP_M`] are, and the end of each move.
+    /// True if small changes of the setpoint are not logged. Changes above [`STEP_M`] and the end of each move are
+    /// logged.
     is_sparse: bool,
     logged: Option<Placement>,
     newest: Option<Placement>,
@@ -54,7 +55,7 @@ impl Movement {
         }
     }
 
-    /// Handles a changed setpoint of `relay`; returns the line to log, if any.
+    /// Handles a changed setpoint of `relay`; returns the line to log, or `None`.
     pub(crate) fn setpoint_changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
         if self.is_sparse {
             return self.next(now, relay.setpoint(), relay.agreed_place());
@@ -64,8 +65,8 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the setpoint or arrival to log at `now` for a drone at the position `drone`. `None` for nothing. Also
-    /// returns the time of the next call.
+    /// Returns the setpoint or arrival to log at `now`, or `None`. `drone` is the drone's position. Also returns the
+    /// time by which the next call is due.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -86,7 +87,7 @@ impl Movement {
         (step, end.into_iter().chain(near).min())
     }
 
-    /// Returns the setpoint if it has to be logged, as a line of the log.
+    /// Returns the setpoint as a log line, or `None` if the setpoint need not be logged.
     fn next(
         &mut self,
         now: Instant,
@@ -123,7 +124,7 @@ impl Movement {
 
     /// Returns the drone's arrival at `goal`, if it must be logged; `None` otherwise.
     ///
-    /// `goal` is the agreed position, and `None` while the setpoint differs from the agreed position.
+    /// `goal` is the agreed position if the setpoint has reached it, otherwise `None`.
     fn arrival(
         &mut self,
         now: Instant,

@@ -17,11 +17,11 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// Distance from the geofence up to which a drone outside of it is not reported, m.
+/// Tolerance of the geofence, m. A drone is reported only if it is farther outside of the geofence.
 const FENCE_M: f64 = 100.0;
 
-/// Ratio of a drone's distances from the given line and the line with latitude and longitude swapped. From this ratio
-/// on, the log suggests that they were swapped by mistake.
+/// Minimum ratio for the log to suggest that latitude and longitude were swapped by mistake. The ratio is the drone's
+/// distance from the given line, divided by its distance from the line with swapped coordinates.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -66,9 +66,9 @@ impl OffLineMonitor {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Returns the report of a drone outside its geofence, if it is time for a report. The drone's position is
-    /// `off_line`; if `off_line` is `None`, it is the newest measured position. The geofence is the line between the
-    /// Tx and Rx positions `sites`, with the mission's `lateral` range on either side.
+    /// Returns the report of a drone outside its geofence, if a report is due. The drone's position is `off_line`; if
+    /// `off_line` is `None`, it is the newest measured position. The geofence surrounds the line between the Tx and Rx
+    /// positions `sites`; its width is the mission's `lateral` range.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -107,7 +107,8 @@ impl OffLineMonitor {
         self.lines.as_ref()
     }
 
-    /// Returns the drone's distance from the line Tx to Rx as JSON, and the limit that it exceeds, if any.
+    /// Returns the drone's distance from the line Tx to Rx as JSON, and the limit that the drone exceeds. The limit is
+    /// `line`, `geofence` or `null`.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
@@ -120,8 +121,8 @@ impl OffLineMonitor {
     }
 }
 
-/// Line between the positions of Tx and Rx. Also the line with latitude and longitude swapped, if the swapped
-/// positions are valid.
+/// Line between the positions of Tx and Rx, and the line with latitude and longitude swapped. The swapped line is
+/// `None` if the swapped positions are invalid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
@@ -155,8 +156,8 @@ impl Lines {
         along_m.hypot(place.y_m.into())
     }
 
-    /// Returns a report if a drone at `place` is outside the geofence with the mission's `lateral` range. `None`
-    /// inside, or up to [`FENCE_M`] outside.
+    /// Returns a report if a drone at `place` is outside the geofence with the mission's `lateral` range. `None` if the
+    /// drone is inside, or at most [`FENCE_M`] outside.
     fn off_fence(&self, place: Placement, lateral: Band) -> Option<OffLineReport> {
         let along_m = beyond(place.x_m.into(), 0.0, self.axis.distance_m());
         let aside_m = beyond(

@@ -222,7 +222,8 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that the time of flight can be known, and that a full battery outlasts the reserve.
+    /// Checks that the program can know the time of flight, and that a full battery lasts long enough. A full battery
+    /// must last longer than the reserve and a replacement.
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(
@@ -458,8 +459,8 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     mission::mission(config, "--")
 }
 
-/// Parses the interference's distribution along x. Its points are leaked, because the mission refers to them until
-/// the program ends.
+/// Parses the interference's distribution along x. The memory of its points is never freed, because the mission refers
+/// to them until the program ends.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text

@@ -52,8 +52,8 @@ impl Ports {
         Ok(Self::Pair(Box::new(Pair::new(upstream, downstream))))
     }
 
-    /// Exchanges bytes between ports and relay. Passes the relay's changed votes to `store` before it sends. Returns
-    /// the time of the next call.
+    /// Exchanges bytes between ports and relay. Before the relay sends, its changed votes are passed to `store`.
+    /// Returns the time by which the next call is due.
     pub(crate) fn poll(
         &mut self,
         now: Instant,

@@ -34,10 +34,11 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the drone's newest position and times received since the last call.
+    /// Returns the newest position and the newest times of the drone since the last call. Each is `None` if none was
+    /// received.
     ///
-    /// The times are the remaining time of flight and the time of the way home, s. Invalid times are NaN. Passes measurements to `on_sample` and
-    /// logs the first invalid line. The work is the work of [`Fifo::read`].
+    /// The times are the remaining time of flight and the time of the way home, s. Invalid times are NaN. Passes
+    /// measurements to `on_sample` and logs the first invalid line. Work: that of one call of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
@@ -73,7 +74,7 @@ impl Positions {
         (newest, endurance_s)
     }
 
-    /// Returns the drone's newest position, unless it is older than 3 s.
+    /// Returns the drone's newest position; `None` if it is older than 3 s.
     pub(crate) fn place(&self, now: Instant) -> Option<Placement> {
         let fresh = self.newest.filter(|(at, _)| now.since(*at) < STALE);
         fresh.map(|(_, place)| place)
@@ -95,7 +96,7 @@ impl Positions {
     }
 }
 
-/// Logs whether the drones are kept apart while they move, which requires `positions`.
+/// Logs whether this relay keeps its drone apart from other drones in flight. This requires the drone's `positions`.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
@@ -109,7 +110,8 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parsed line: position and measurement, or remaining time of flight and way home, s.
+/// Parsed line: a position and a measurement, or the drone's remaining times, s. The times are the remaining time of
+/// flight, and the time of the way home.
 ///
 /// A time that is no number is NaN.
 enum Line {
@@ -117,9 +119,10 @@ enum Line {
     Endurance([f32; 2]),
 }
 
-/// Parses a line: position with or without power, `receiver` and a power, or `endurance` and two times.
+/// Parses a line. Three forms are valid: a position with or without a power; the word `receiver` and a power; the word
+/// `endurance` and two times.
 ///
-/// Returns the reason as an error if the line is invalid, or if it has a power without `listens`.
+/// Returns the reason as an error if the line is invalid, or if it has a power although `listens` is false.
 fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
     let words = lines::words(text)?;
     let number = |word: &str| {

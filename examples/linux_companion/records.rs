@@ -92,12 +92,13 @@ pub(crate) fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Uploa
     Ok(Some(upload))
 }
 
-/// Starts the thread that writes uploaded missions to `file`. It writes nothing yet.
+/// Starts the thread that writes uploaded missions to `file`. The thread writes nothing until [`store_upload`] is
+/// called.
 pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
     StoredFile::new(UPLOADS, file, None)
 }
 
-/// Begins to store an uploaded mission. If it can not be stored, the relay flies it all the same.
+/// Begins to store an uploaded mission. If storing fails, the relay flies the mission all the same.
 pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
     let mut bytes = [0; Upload::LENGTH];
     // The buffer has room for every upload.

@@ -45,8 +45,8 @@ struct Flight {
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) line: String,
-    /// True if the program would fail again at another start, until somebody changes something. False for a port that
-    /// may come back.
+    /// True if a restart of the program would fail for the same reason. Somebody then has to change the configuration
+    /// or the hardware. False for a port that may come back by itself.
     pub(crate) is_final: bool,
 }
 
@@ -297,7 +297,7 @@ impl Flight {
     }
 }
 
-/// Returns the key with the epoch of this start, which is used up; `None` without a key.
+/// Returns the key with a new epoch for this start; `None` without a key. The epoch is stored and never used again.
 pub(crate) fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     let (Some(SigningKey(key)), Some(file)) = (plan.key, &plan.options.epoch_file) else {
         return Ok(None);

@@ -39,7 +39,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Creates the report, which writes to `log`. `flies` is true if the companion itself sends setpoints to an
+    /// Creates the report, which writes to `log`. `flies` is true if this program itself sends setpoints to an
     /// autopilot.
     pub(crate) fn new(
         log: Log,

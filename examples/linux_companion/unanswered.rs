@@ -5,7 +5,8 @@ use uav_relay::{Duration, Instant};
 /// Time without a HEARTBEAT after which a missing autopilot is reported. An autopilot sends one every second.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
-/// Kind of the data received from the autopilot's port since the start. The most specific kind is the result.
+/// Kind of the data received from the autopilot's port since the start. The kinds are ordered from no data to MAVLink
+/// frames.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Received {
     /// No byte has been received from the autopilot's port.
@@ -18,8 +19,8 @@ pub(crate) enum Received {
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Kind of data received so far from the autopilot's port, and the time since which it is that kind. The most
-    /// specific kind counts. `None` once the autopilot is found.
+    /// Kind of data received so far from the autopilot's port, and the time since then. If several kinds were received,
+    /// it is the most advanced kind. `None` once the autopilot is found.
     newest: Option<(Received, Instant)>,
     reported: Option<Received>,
 }
@@ -32,8 +33,8 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the most specific kind of data received so far; `None` means that the autopilot was found. Returns the
-    /// kind of fault if it has to be reported, once for each kind.
+    /// Handles the kind of data received so far, `received`; `None` means that the autopilot is found. Returns the kind
+    /// of fault if it has to be reported. Each kind is reported once.
     pub(crate) fn check(&mut self, now: Instant, received: Option<Received>) -> Option<Received> {
         let (answer, since) = self.newest?;
         let Some(heard) = received else {

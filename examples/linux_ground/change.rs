@@ -25,7 +25,8 @@ pub(crate) fn log_changes(log: &Log, now: Instant, before: &Basis, after: &Basis
     }
 }
 
-/// Returns the name of each value that differs, and the value before and after, as text with its unit.
+/// Returns each value that differs between the two missions, as text with its unit. The three texts are the name, the
+/// value before, and the value after.
 pub(crate) fn changes(
     before: &Basis,
     after: &Basis,
@@ -95,7 +96,7 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Returns the move of a relay as JSON.
+/// Returns the move of one relay as JSON: its number, the distance, and the positions before and after.
 pub(crate) fn fields(moved: &Move) -> Value {
     let place = |at: Placement| json!({ "x_m": at.x_m, "y_m": at.y_m, "h_m": at.altitude_m });
     let (from, to) = (place(moved.before), place(moved.after));

@@ -8,14 +8,14 @@ use uav_relay_linux::log::Log;
 use crate::options::Plan;
 use crate::uploading::{Fault, Outcome};
 
-/// Age from which a report is too old.
+/// Age from which a relay's report counts as too old.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Time for which all relays must be green. The time has to be so long because only every eighth report of a relay
-/// has its neighbours and version.
+/// Time for which all relays must stay green. Only every eighth report of a relay has its neighbours and its version,
+/// so a shorter time could miss a fault.
 const GREEN_FOR: Duration = Duration::from_millis(2_000);
 
-/// Check of a chain in progress.
+/// Running check of a chain before flight.
 #[derive(Debug)]
 pub(crate) struct Check {
     end: End,
@@ -34,7 +34,8 @@ impl Check {
         }
     }
 
-    /// Logs the table and returns the result once all relays are green, or the time is over.
+    /// Logs the table of the relays and returns the result at the end of the check. The check ends when all relays are
+    /// green, or when its time is over. `None` before the end.
     pub(crate) fn turn(
         &mut self,
         now: Instant,
@@ -101,7 +102,7 @@ impl Check {
     }
 }
 
-/// Returns the faults of a relay before flight; an empty result for a green relay.
+/// Returns the faults of a relay before flight. An empty list means that the relay is green.
 fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'static str> {
     let Report {
         relay,

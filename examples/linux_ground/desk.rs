@@ -30,19 +30,20 @@ use crate::new::{Basis, NewOptions};
 use crate::options::Plan;
 use crate::uploading::{Form, Preview, Uploading, digest_of};
 
-/// Distance from the agreed position at which a drone has arrived, m.
+/// Maximum distance of a drone from its agreed position, m, for the drone to count as arrived.
 const ARRIVED_M: f32 = 1.0;
 
-/// Largest age of the snapshot with which a page uploads, s. A request that was held on the way is older.
+/// Maximum age of the data shown on the page when it requests an upload, s. A request with older data is refused, for
+/// example if it was delayed on the way.
 const OLDEST_S: f64 = 5.0;
 
 /// Largest number of characters of a task's answer in the log.
 const LOGGED: usize = 300;
 
-/// Time after a refused task in which further refused tasks are not logged.
+/// Time after a refused task is logged in which further refused tasks are not logged.
 const QUIET: Duration = Duration::from_millis(1_000);
 
-/// Largest number of tasks that are handled at once.
+/// Largest number of the page's tasks that one call handles.
 const AT_ONCE: usize = 4;
 
 /// Values of a preview, parsed as on the command line.
@@ -58,17 +59,17 @@ struct Words {
     site_tx: Option<Geodetic>,
 }
 
-/// Body of an upload request.
+/// Content of the page's request to upload a preview.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Confirmed {
     preview: u32,
     digest: String,
-    /// Time of the newest snapshot that the page had, s.
+    /// Time of the newest data that the page showed at the request, s since the start of the station.
     time_s: f64,
 }
 
-/// Tasks of the page and of the status socket.
+/// Handler of the tasks (previews and uploads) from the page and from the status socket.
 #[derive(Debug)]
 pub(crate) struct Desk {
     /// Tasks that the page gives to the program; `None` without a page.
@@ -79,7 +80,7 @@ pub(crate) struct Desk {
     logs_at: Instant,
 }
 
-/// Parts of a station that a task needs.
+/// Parts of the station that a task reads or changes.
 pub(crate) struct Parts<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) ground: &'a mut Ground,
@@ -95,7 +96,7 @@ impl Desk {
         }
     }
 
-    /// Handles the tasks of the page that have arrived.
+    /// Handles the tasks that the page has sent, at most [`AT_ONCE`] in one call.
     pub(crate) fn turn(&mut self, now: Instant, log: &Log, mut parts: Parts<'_>) {
         let posts = self.posts.iter().flat_map(Receiver::try_iter);
         let posts: Vec<Post> = posts.take(AT_ONCE).collect();
@@ -195,8 +196,8 @@ impl Desk {
     }
 }
 
-/// Reads the form of preview `number` from `body`, a JSON object of texts. With `sited`, the receiver may have
-/// latitude and longitude.
+/// Reads the values of preview `number` from `body`, a JSON object of strings. If `sited` is given, the receiver's new
+/// position may be given as latitude and longitude.
 fn form(number: u32, sited: Option<Sites>, body: &str) -> Result<Form, String> {
     let mut given: BTreeMap<String, String> = serde_json::from_str(body).map_err(|error| {
         format!("the request must be a JSON object whose values are strings: {error}")
@@ -262,7 +263,8 @@ fn upload(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, Str
 
 /// Returns the state of previews and uploads for the page.
 ///
-/// `shown` is the mission of the page's map, as [`name_of`](crate::uploading::name_of) returns it; `None` if it is unknown.
+/// `shown` is the mission that the page's map shows, as [`name_of`](crate::uploading::name_of) returns it; `None` if
+/// the mission is unknown.
 pub(crate) fn state(
     plan: &Plan,
     shown: Option<&str>,
@@ -339,7 +341,8 @@ pub(crate) fn preview(plan: &Plan, preview: &Preview) -> Value {
     })
 }
 
-/// Returns the SIR of the worst hop toward Rx and toward Tx, dB, for relays at their agreed positions. `None` if unknown.
+/// Returns the SIRs of the worst hop toward Rx and of the worst hop toward Tx, dB. The relays are at the positions
+/// `places`. An SIR is `None` if it is unknown.
 fn worst_db(plan: &Plan, basis: &Basis, places: &[Placement]) -> [Option<f64>; 2] {
     let Ok(mission) = Mission::try_new(basis.config) else {
         return [None; 2];
@@ -396,7 +399,7 @@ mod tests {
         }
     }
 
-    /// Returns the body of a random preview request. The relays were loaded with altitudes of 20 to 60 m.
+    /// Returns the content of a random preview request. The relays were loaded with altitudes of 20 to 60 m.
     fn body(random: &mut Random, is_sited: bool) -> String {
         let mut values = json!({});
         let mut set = |name: &str, text: String| values[name] = json!(text);
@@ -451,7 +454,8 @@ mod tests {
         new.upload(version, loaded, sited, before).ok()
     }
 
-    /// Returns the setpoints of a simulated chain that has flown these uploads. Its relays have no drones, and no geofence.
+    /// Returns the final setpoints of a simulated chain that flies these uploads one after the other. The relays have
+    /// neither drones nor a geofence.
     fn flown(loaded: &Mission, method: Method, uploads: &[Upload]) -> Option<Vec<Placement>> {
         let mut setup = Setup::new(*loaded);
         setup.auth = true;
@@ -468,7 +472,8 @@ mod tests {
         ends.collect::<Option<Vec<_>>>().filter(|_| is_settled)
     }
 
-    /// Returns the limit by which a relay with a drone refuses an upload. It flies the mission `before`.
+    /// Returns the limit because of which a relay with a drone refuses the upload `new`. `None` if the relay accepts.
+    /// The relay flies the mission `before`.
     fn limit(loaded: &Mission, before: Option<&Upload>, new: &Upload) -> Option<&'static str> {
         let settings = Settings {
             guard: Some(GuardConfig::of(loaded, loaded.config().common)),

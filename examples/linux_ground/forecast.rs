@@ -15,13 +15,13 @@ const TURN_US: u64 = 1_000;
 
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
-/// Mission loaded into the relays before flight, with all data for a forecast of the relays' positions.
+/// Mission loaded into the relays before flight, and the settings for a forecast of their positions.
 #[derive(Clone, Debug)]
 pub(crate) struct Loaded {
     pub(crate) mission: Mission,
     pub(crate) method: Method,
     pub(crate) profiles: Vec<(u16, Profile)>,
-    /// Relays with a fixed altitude.
+    /// Numbers of the relays with a fixed altitude.
     pub(crate) held: Vec<u16>,
 }
 
@@ -72,8 +72,8 @@ impl Chain {
         })
     }
 
-    /// Simulates a millisecond: delivers the frames of the millisecond before, and collects new frames. Notes the
-    /// relays that have agreed on positions in mission `version`.
+    /// Simulates a millisecond: delivers the frames of the last millisecond, and collects new frames. Marks the relays
+    /// that have agreed on positions in mission `version`.
     fn turn(&mut self, version: u16) {
         self.now = Instant::from_micros(self.now.as_micros() + TURN_US);
         let now = self.now;
@@ -127,8 +127,9 @@ pub(crate) struct Move {
 /// Returns the move of each relay from the mission `flown` to `new`. `flown` is `None` if the relays fly the mission
 /// that was loaded before flight.
 ///
-/// `before` and `after` are the Tx and Rx positions of the two missions. `None` if the positions can not be
-/// predicted: the relays measure the interference, or do not agree within ten seconds of computing.
+/// `before` and `after` are the Tx and Rx positions of the two missions. The result is `None` if the positions cannot
+/// be predicted: the relays measure the interference, or the simulated relays do not agree within ten seconds of
+/// computing.
 pub(crate) fn moves(
     loaded: &Loaded,
     flown: Option<&Upload>,
@@ -163,7 +164,8 @@ pub(crate) fn moves(
 
 /// Returns the distance, m, between a relay's positions before and after an upload.
 ///
-/// `lines` are the lines on earth from Tx to Rx before and after. If one is missing, the line counts as unchanged.
+/// `lines` are the lines on earth from Tx to Rx before and after. If one of them is `None`, the line counts as
+/// unchanged.
 fn apart_m(lines: &[Option<Axis>; 2], before: Placement, after: Placement) -> f64 {
     let on_earth = |axis: &Option<Axis>, place| axis.as_ref().and_then(|axis| axis.point(place));
     let [one, other] = lines;

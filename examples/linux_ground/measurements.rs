@@ -14,7 +14,7 @@ use uav_relay_linux::log::Log;
 
 const OPTION: &str = "--measurements";
 
-/// Interval at which a file is checked for changes, because poll(2) does not report them.
+/// Interval at which a file is checked for changes. It is needed because poll(2) does not report changes of a file.
 const LOOK: Duration = Duration::from_millis(500);
 
 const READS: usize = 16;
@@ -35,8 +35,8 @@ enum Source {
     File(Watched),
 }
 
-/// Watched file with measurements. `seen` has its inode, its length, and its modification time in s and ns, by which
-/// a change since the last read is detected.
+/// Watched file with measurements. `seen` identifies the content that was read last: inode, length, and modification
+/// time in s and ns. If they differ, the file has changed.
 #[derive(Debug)]
 struct Watched {
     path: PathBuf,
@@ -61,7 +61,7 @@ pub(crate) struct Measurements {
 }
 
 impl Measurements {
-    /// Opens the FIFO, file or UDP socket `name`; `end` is the end of the chain that this station is at.
+    /// Opens the FIFO, file or UDP socket `name`. `end` is this station's end of the chain: transmitter or receiver.
     pub(crate) fn open(name: &str, end: Side) -> Result<Self, String> {
         let named = |error: &str| format!("{OPTION} {name}: {error}");
         let path = Path::new(name);
@@ -91,7 +91,8 @@ impl Measurements {
         })
     }
 
-    /// Returns the newest measured power, W, if it may be sent to the relays now. Work: at most 64 KiB of lines.
+    /// Returns the newest measured power, W. `None` if there is no new one, or the last one was sent less than 0.5 s
+    /// ago. Work: at most 64 KiB of lines.
     pub(crate) fn newest(&mut self, now: Instant, log: &Log) -> Option<f32> {
         self.read(now, log);
         let silent_at = self.last_at.map(|at| at + SILENCE);
@@ -249,8 +250,8 @@ pub(crate) const fn name(end: Side) -> &'static str {
     }
 }
 
-/// Parses a measured power in W or dBm, and returns it in W. The word `transmitter` or `receiver` for this `end` may
-/// precede it. Returns the reason as an error if the line is invalid.
+/// Parses a measured power in W or dBm, and returns it in W. The word `transmitter` or `receiver` before it is
+/// permitted if it names this `end`. Returns the reason as an error if the line is invalid.
 fn level(text: &[u8], end: Side) -> Result<f32, String> {
     let words = lines::words(text)?;
     match words.as_slice() {

@@ -62,15 +62,15 @@ pub(crate) struct NewOptions {
     new_min_separation: Option<f32>,
 }
 
-/// Minimum distance of two relays along the line Tx to Rx at which their order is certain, m. It is twice the
-/// companion's default position error.
+/// Minimum distance of two relays along the line Tx to Rx for a certain order, m. It is twice the companion's default
+/// position error.
 const ORDER_M: f32 = 2.0;
 
-/// Largest distance of a new line Tx-Rx from the present line, m, in addition to the new line's length. A new line
-/// farther away is rejected, because the drones' positions could not be converted to it.
+/// Maximum distance of a new line Tx-Rx from the present line, m, beyond the length of the new line. A new line farther
+/// away is rejected, because the drones' positions could not be converted to its coordinates.
 const FAR_M: f64 = 100_000.0;
 
-/// Mission that supplies the values which the `--new-` options do not give.
+/// Mission whose values are kept unless a `--new-` option changes them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
     pub(crate) config: MissionConfig,
@@ -80,8 +80,8 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Returns the mission loaded before flight as the basis of a new mission. `sited` are its Tx and Rx positions,
-    /// if given.
+    /// Returns the mission loaded before flight as the basis of a new mission. `sited` are its Tx and Rx positions;
+    /// `None` if they were not given.
     pub(crate) const fn loaded(loaded: &Mission, sited: Option<Sites>) -> Self {
         Self {
             config: *loaded.config(),
@@ -91,7 +91,7 @@ impl Basis {
     }
 
     /// Returns an uploaded mission as the basis of a new mission. If the upload has no Tx and Rx positions, the basis
-    /// has the positions `sited`.
+    /// has the positions `sited` of the mission loaded before flight.
     pub(crate) fn flown(upload: Upload, sited: Option<Sites>) -> Self {
         Self {
             config: *upload.config(),
@@ -102,8 +102,8 @@ impl Basis {
 }
 
 impl NewOptions {
-    /// Returns the upload that changes the mission `basis` by these options. Before flight the relays were loaded
-    /// with the mission `loaded` and, if given, with the Tx and Rx positions `sited`.
+    /// Returns the upload that changes the mission `basis` by these options. `loaded` and `sited` are the mission and
+    /// the Tx and Rx positions that were loaded into the relays before flight.
     pub(crate) fn upload(
         &self,
         version: u16,
@@ -137,10 +137,12 @@ impl NewOptions {
         }
     }
 
-    /// Returns the options with the receiver at x and y, m, of the line of the mission `basis`. It keeps its height.
+    /// Returns the options with the receiver moved to x and y, m, on the line of the mission `basis`. The receiver
+    /// keeps its height.
     ///
     /// # Errors
-    /// One line if this position is no site, or is beside a line without sites.
+    /// One line if the position is too far from the line, or if y is not 0 although the mission has no Tx and Rx
+    /// positions.
     pub(crate) fn with_receiver(
         &self,
         receiver_m: Option<[f32; 2]>,
@@ -181,7 +183,7 @@ impl NewOptions {
         })
     }
 
-    /// Returns the new mission's Tx and Rx positions and their distance, m; `None` if neither changes.
+    /// Returns the new mission's Tx and Rx positions and their distance, m. `None` if Tx and Rx stay where they are.
     fn moved(
         &self,
         line: Option<Sites>,
@@ -274,8 +276,8 @@ fn check_distance(before: &Axis, axis: &Axis, sites: Sites) -> Result<(), String
     ))
 }
 
-/// Returns the maximum turn of the line Tx to Rx, degrees, that keeps the relays' order along it. Position errors are
-/// up to 1 m.
+/// Returns the maximum angle, degrees, by which a new mission may turn the line Tx to Rx. Up to this angle the relays'
+/// order along the line stays the same, with position errors of up to 1 m.
 ///
 /// With the minimum separation s and the width w of the lateral range, the turn t solves s cos t - w sin t = a. Here a
 /// is the smaller of `ORDER_M`, two metres, and s / 2.

@@ -73,7 +73,8 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
     }
 }
 
-/// Returns the error text for an upload that is not newer than version `held`, which the relays have.
+/// Returns the error text for an upload that is not newer than the relays' mission. `version` is the upload's version,
+/// `held` that of the relays.
 pub(crate) fn outdated(version: u16, held: u16) -> String {
     match held.checked_add(1) {
         Some(next) => {
@@ -89,7 +90,7 @@ pub(crate) fn outdated(version: u16, held: u16) -> String {
     }
 }
 
-/// Logs which mission the chain flies, as reported by a relay.
+/// Logs the mission version that a relay flies or has stored, as this relay reported it.
 pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     let FlownMission {
         by, version, flies, ..
@@ -107,8 +108,8 @@ pub(crate) fn flown(log: &Log, now: Instant, flown: &FlownMission) {
     log.event(now, "current", fields, what);
 }
 
-/// Returns the error text for an upload that relay `by` refused. The text names the value that most likely caused the
-/// refusal.
+/// Returns the error text for an upload that relay `by` refused. The text names the value that has most likely caused
+/// the refusal.
 pub(crate) fn refused(plan: &Plan, upload: &Upload, by: u16) -> String {
     let version = upload.version();
     let who = format!("upload of version {version} refused by relay {by}, or by a relay beyond it");
@@ -123,14 +124,15 @@ pub(crate) struct FenceViolation {
     /// Text for the operator: the value that exceeds the geofence, and the permitted range.
     what: String,
     name: &'static str,
-    /// Function that returns the coordinate of a position that the geofence limits, m.
+    /// Function that returns the coordinate of a position to which the geofence's limit applies, m. The coordinate is
+    /// the altitude, y or x.
     coordinate: fn(&Placement) -> f32,
     range_m: [f32; 2],
 }
 
 impl FenceViolation {
-    /// Returns the first value of `upload` that exceeds the geofence, if any. The relays are assumed to have the
-    /// default geofence, which is the geofence of the loaded mission.
+    /// Returns the first value of `upload` that exceeds the geofence; `None` if no value does. The relays are assumed
+    /// to have the default geofence, computed from the loaded mission.
     pub(crate) fn of(loaded: &Mission, upload: &Upload) -> Option<Self> {
         let (loaded, new) = (loaded.config(), upload.config());
         let fence = |config: &MissionConfig| {
@@ -237,7 +239,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
     )
 }
 
-/// Returns the most likely reason why no relay has answered as needed, judged by the frame counters.
+/// Returns the most likely reason for a missing answer of the relays, judged by the frame counters.
 pub(crate) fn likely_reason(plan: &Plan, stats: &Stats) -> String {
     let faults = [
         (

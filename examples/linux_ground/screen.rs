@@ -17,26 +17,27 @@ use crate::terrain::Elevation;
 use crate::tiles;
 use crate::uploading::{Uploading, name_of};
 
-/// Time between two snapshots.
+/// Time between two updates of the page.
 const PERIOD: Duration = Duration::from_millis(200);
 
-/// Time between two questions for the mission that the chain flies, while the station does not know it.
+/// Time between two requests for the mission that the chain flies, while the station does not know it.
 const ASK_AGAIN: Duration = Duration::from_millis(10_000);
 
-/// Screen of a station, and its view of the chain.
+/// Page of the station for browsers: its server, and the state of the chain that it shows.
 pub(crate) struct Web {
     screen: Screen,
     view: StationView,
-    /// Uploaded mission that the chain flies, if known.
+    /// Uploaded mission that the chain flies; `None` if it flies the loaded mission, or an unknown one.
     flown: Option<Upload>,
-    /// Elevation model below the chain, if the configuration file has one that can be read.
+    /// Elevation model of the ground below the chain. `None` if the configuration file has none that can be read.
     elevation: Option<Elevation>,
     next_at: Instant,
     ask_at: Instant,
 }
 
 impl Web {
-    /// Starts the server of the page, logs its address, and requests the relays' reports. Also returns the page's tasks.
+    /// Starts the server of the page, logs its address, and requests the relays' reports. Also returns the receiver of
+    /// the page's tasks (previews and uploads).
     ///
     /// # Errors
     /// One line that names the option, its value and the fault.
@@ -77,8 +78,7 @@ impl Web {
         Ok((web, posts))
     }
 
-    /// Shows a snapshot if it is time for the next one. Returns the time of the next snapshot. The function does not
-    /// wait for a browser.
+    /// Updates the page if an update is due. Returns the time of the next update. Never waits for a browser.
     pub(crate) fn turn(
         &mut self,
         now: Instant,

@@ -25,7 +25,7 @@ use crate::uploading::{Fault, Outcome, Uploading, digest_of};
 
 const READS: usize = 64;
 
-/// Time between two looks at the relays' reports in a check.
+/// Time between two evaluations of the relays' reports during a check.
 const LOOK_AGAIN: Duration = Duration::from_millis(200);
 
 struct Station<'a> {
@@ -42,7 +42,7 @@ struct Station<'a> {
     check: Option<Check>,
     web: Option<Web>,
     desk: Desk,
-    /// True if the operator has answered a request for confirmation: standard input is readable.
+    /// True if the operator has answered the request for confirmation. Standard input can then be read without waiting.
     is_answered: bool,
 }
 
@@ -205,7 +205,7 @@ impl<'a> Station<'a> {
         }
     }
 
-    /// Advances the upload; returns its result if the program must end with it.
+    /// Continues the upload. Returns its result if the program must end with this result, otherwise `None`.
     fn uploading(&mut self, time: Instant) -> Outcome {
         let Self {
             plan,
@@ -270,7 +270,8 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// Sleeps until input or a timer needs work. Returns the program's result after a signal to end.
+    /// Sleeps until input or a timer needs work. Returns the program's result after SIGINT or SIGTERM, otherwise
+    /// `None`.
     fn sleep(&mut self, wake: Option<Instant>) -> Outcome {
         let measured = self.measurements.as_ref().and_then(Measurements::fd);
         let mut others: Vec<_> = measured.into_iter().map(|fd| (fd, PollFlags::IN)).collect();
@@ -300,7 +301,7 @@ impl<'a> Station<'a> {
     }
 }
 
-/// Reads the operator's answer from standard input, in which it must be available. The text is empty at the end of
+/// Reads the operator's answer from standard input. Called only if input is available. The text is empty at the end of
 /// the input.
 fn answered() -> String {
     let mut line = String::new();

@@ -7,13 +7,13 @@ use uav_relay_screen::GroundProfile;
 use uav_relay_terrain::grid::Terrain;
 use uav_relay_terrain::profile::Ground;
 
-/// Number of parts of a profile. Each has the height of its highest ground.
+/// Number of parts into which a terrain profile is divided. Each part has the height of its highest ground.
 const PARTS: u16 = 240;
 
-/// Largest number of points of the elevation model that a part has.
+/// Maximum number of points of the elevation model for one part of the profile.
 const MOST_POINTS: u16 = 32;
 
-/// Elevation model of the configuration file, and the profile of the line that is flown.
+/// Elevation model of the configuration file, and the terrain profile below the present line Tx to Rx.
 pub(crate) struct Elevation {
     terrain: Terrain,
     mast_m: f64,
@@ -36,10 +36,11 @@ impl Elevation {
         })
     }
 
-    /// Returns the profile of a line; `None` if the elevation files do not cover the whole line.
+    /// Returns the terrain profile below a line. `None` if the profile of this line has failed before.
     ///
     /// # Errors
-    /// One line with the reason, once for each line.
+    /// One line with the reason, for example that the elevation files do not cover the line. Reported once for each
+    /// line.
     pub(crate) fn along(&mut self, line: Sites) -> Result<Option<GroundProfile>, String> {
         if self.line != Some(line) {
             (self.line, self.profile) = (Some(line), None);

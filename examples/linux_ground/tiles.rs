@@ -13,10 +13,10 @@ use pmtiles::{
 };
 use uav_relay_screen::Tiles;
 
-/// Largest size of a picture or a directory, bytes.
+/// Maximum size of a map picture or of a directory of the archive, bytes.
 const MOST: usize = 4 * 1024 * 1024;
 
-/// File that is read with ordinary reads. A memory map would end this program if another program truncated the file.
+/// Archive file, read with ordinary reads. A memory map would end this program if another program truncated the file.
 struct Archive(File);
 
 impl Archive {
@@ -71,7 +71,7 @@ impl AsyncBackend for Archive {
     }
 }
 
-/// Returns the result of a future that never waits; `None` for a future that waits.
+/// Returns the result of a future that is ready at once; `None` if the future would have to wait.
 fn at_once<T>(future: impl Future<Output = PmtResult<T>>) -> PmtResult<Option<T>> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(result) => result.map(Some),
@@ -120,7 +120,7 @@ pub(crate) fn open(file: &Path) -> Result<Tiles, String> {
     })
 }
 
-/// Returns a text without the tags of HTML.
+/// Returns a text without its HTML tags.
 fn plain(html: &str) -> String {
     let mut parts = html.split('<');
     let first = parts.next().unwrap_or_default().to_owned();

@@ -27,13 +27,13 @@ use crate::options::Plan;
 use crate::report::{self, FenceViolation};
 use crate::{change, desk};
 
-/// Maximum time that a relay may take to send the values of the mission that it flies.
+/// Maximum time that a relay may take to send the values of its mission, after it has sent the version.
 const VALUES_TIMEOUT: Duration = Duration::from_millis(5_000);
 
-/// Maximum time that the chain may take to answer a question of the page.
+/// Maximum time until the chain answers a request of the page.
 const PAGE_TIMEOUT: Duration = Duration::from_millis(15_000);
 
-/// Time between two looks at a forecast that is being computed.
+/// Time between two checks whether a forecast is computed.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 #[derive(Debug)]
@@ -53,18 +53,18 @@ pub(crate) type Outcome = Option<Result<(), Fault>>;
 
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Waiting until a relay reports the mission that it flies, with its values. `Some` is the time at which a relay
-    /// first reported only the mission's version.
+    /// The station waits until a relay reports the mission that it flies, with its values. `Some` is the time at which
+    /// a relay first reported only the mission's version.
     Querying(Option<Instant>),
-    /// A thread computes the relays' new positions. The field is the time of the next check if the thread has
-    /// finished.
+    /// A thread computes the relays' new positions. The field is the time at which the station next checks whether the
+    /// thread has finished.
     Computing(Instant),
     Confirming,
     Uploading,
     Ended,
 }
 
-/// Values of the new mission that the page gives.
+/// Values of the new mission, as entered on the page.
 #[derive(Debug)]
 pub(crate) struct Form {
     /// Number of the preview, from 1.
@@ -72,9 +72,9 @@ pub(crate) struct Form {
     pub(crate) new: NewOptions,
     /// New position of the receiver in the coordinates of the present line, x and y in m.
     pub(crate) receiver_m: Option<[f32; 2]>,
-    /// Mission whose line the coordinates of the form are for, as [`name_of`] returns it.
+    /// Mission in whose coordinates the page gives positions, as [`name_of`] returns it.
     ///
-    /// `None` without coordinates or a map.
+    /// `None` if the form has no positions, or the page has no map.
     pub(crate) shown: Option<String>,
 }
 
@@ -83,38 +83,40 @@ pub(crate) struct Form {
 pub(crate) struct Preview {
     pub(crate) before: Basis,
     pub(crate) after: Basis,
-    /// `None` if the moves cannot be computed.
+    /// Moves of all relays; `None` if they cannot be computed.
     pub(crate) moves: Option<Vec<Move>>,
 }
 
 #[derive(Debug)]
 pub(crate) struct Uploading {
-    /// Values of the page; `None` for an upload of the command line.
+    /// Values entered on the page; `None` for an upload of the command line.
     form: Option<Form>,
-    /// Version of the new mission; `None` until the version of the flown mission is known. The new version is one
-    /// more.
+    /// Version of the new mission: one more than the version of the flown mission. `None` until the flown version is
+    /// known.
     version: Option<u16>,
     stage: Stage,
-    /// Mission to upload; `None` until a relay has reported the mission that it is based on.
+    /// Mission to upload; `None` until a relay has reported the mission whose values it changes.
     upload: Option<Upload>,
     /// Version and values of the mission that the chain flew when the preview was computed.
     based_on: (u16, Option<Upload>),
     forecast: Option<Receiver<Option<Vec<Move>>>>,
     preview: Option<Preview>,
-    /// Preview for the page.
+    /// Preview as JSON, for the page.
     shown: Value,
-    /// True once the operator has held the page's button.
+    /// True once the operator has confirmed the upload on the page.
     is_confirmed: bool,
     fault: Option<String>,
     progress: Progress,
-    /// Deadline of the present stage of the upload; `None` while a confirmation is awaited, and at the end.
+    /// Deadline of the present stage of the upload. `None` while the operator's confirmation is awaited, and at the
+    /// end.
     late_at: Option<Instant>,
 }
 
 impl Uploading {
     /// Starts an upload by asking the chain for the mission that it flies.
     ///
-    /// `version` is the version on the command line. The page's `form` gets the next version.
+    /// `version` is the version on the command line; `None` for an upload of the page. The page's values are in `form`,
+    /// and get the next version.
     pub(crate) fn begin(
         now: Instant,
         plan: &Plan,
@@ -149,12 +151,13 @@ impl Uploading {
         self.late_at.into_iter().chain(next).min()
     }
 
-    /// Returns true while the operator's answer at the terminal is awaited.
+    /// Returns true while the station waits for the operator's answer at the terminal.
     pub(crate) const fn is_asking(&self) -> bool {
         self.is_confirming() && self.form.is_none()
     }
 
-    /// Returns true if no upload is in progress, so that another upload may replace this upload.
+    /// Returns true if another upload may replace this upload. This one has then ended, or it is a preview that the
+    /// page has not confirmed.
     pub(crate) const fn is_idle(&self) -> bool {
         self.has_ended() || self.is_confirming() && self.form.is_some()
     }
@@ -177,7 +180,7 @@ impl Uploading {
         )
     }
 
-    /// Returns the reason why the upload has failed.
+    /// Returns the reason why the upload has failed; `None` if it has not failed.
     pub(crate) fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
     }
@@ -196,10 +199,10 @@ impl Uploading {
         }
     }
 
-    /// Uploads the previewed mission, if the chain still flies the mission on which the preview is based.
+    /// Uploads the previewed mission, if the chain still flies the mission from which the preview was made.
     ///
     /// # Errors
-    /// The reason why this preview cannot be uploaded, or not again.
+    /// The reason why this preview cannot be uploaded, for example because it was uploaded before.
     pub(crate) fn confirm(
         &mut self,
         now: Instant,
@@ -348,7 +351,7 @@ impl Uploading {
 
     /// Builds the upload from the mission that the relays fly, and starts to compute the moves.
     ///
-    /// Starts the upload instead if the page's operator has confirmed it.
+    /// If the operator has already confirmed the upload on the page, the function starts the upload instead.
     fn decide(
         &mut self,
         now: Instant,
@@ -529,7 +532,7 @@ impl Uploading {
     }
 }
 
-/// Returns a mission's version and the digest of its upload, as the page sends them back.
+/// Returns a mission's version and the digest of its upload as text. The page sends this text back with its requests.
 pub(crate) fn name_of(version: u16, upload: Option<&Upload>) -> String {
     upload.map_or_else(
         || version.to_string(),

@@ -65,7 +65,7 @@ impl Autopilot {
     }
 
     /// Creates the autopilot link for the line between the Tx and Rx positions `sites`, in static RAM. `None` if the
-    /// mission can not be flown along that line.
+    /// mission cannot be flown along that line.
     #[inline(never)] // its stack frame is released
     pub(crate) fn begin(
         uart: Uart,
@@ -79,8 +79,8 @@ impl Autopilot {
         Self::along(&course, uart, now)
     }
 
-    /// Creates the autopilot link for a course: line on earth and speed limit. The course is computed in another
-    /// function, to save stack.
+    /// Creates the autopilot link for a course, which is a line on earth and a speed limit. The caller computes the
+    /// course, to save stack here.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;
@@ -97,8 +97,8 @@ impl Autopilot {
         Some(autopilot)
     }
 
-    /// Processes bytes from the autopilot, and exchanges data with the relay. The relay's next frames then have the
-    /// drone's newest position.
+    /// Processes bytes from the autopilot, and exchanges data with the relay. The frames that the relay sends after
+    /// this call contain the drone's newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);
@@ -126,8 +126,8 @@ impl Autopilot {
         self.link.handle_event(event);
     }
 
-    /// Sends the autopilot frames for the relay's state; returns the time of the next call. `now` must be the `now`
-    /// of the call of [`listen`](Self::listen).
+    /// Sends frames with the relay's setpoint to the autopilot. Returns the time by which the next call is due. `now`
+    /// must be the time passed to the last call of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &mut Relay) -> Instant {
         // Its ports have been served since the last exchange: the newest setpoint is sent in this turn.
         self.link.exchange(relay, now);
@@ -147,8 +147,8 @@ impl Autopilot {
     }
 }
 
-/// Opens the autopilot's port, served by its interrupt. The function is not inlined, so that its stack is released:
-/// the queues are built on the stack before they are moved to static RAM.
+/// Opens the autopilot's port, served by its interrupt. The queues are built on the stack before they are moved to
+/// static RAM. The function is not inlined, so that this stack is released.
 #[inline(never)]
 fn open(uart: Uart) -> Option<Port> {
     Some(port::open(
@@ -159,7 +159,7 @@ fn open(uart: Uart) -> Option<Port> {
     ))
 }
 
-/// Error: an autopilot signing key is configured, but this image can not sign.
+/// Error: an autopilot signing key is configured, but this image cannot sign.
 struct CannotSign;
 
 /// Enables signing to the autopilot if the configuration block has a key. The board has no clock, so the link takes
@@ -174,7 +174,7 @@ fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
     Ok(())
 }
 
-/// Returns an error if the block has an autopilot signing key, because this image can not sign.
+/// Returns an error if the block has an autopilot signing key, because this image cannot sign.
 #[cfg(not(feature = "mavlink-signing"))]
 fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
     if config::autopilot_key(board::block()).is_none() {

@@ -10,7 +10,8 @@ use uav_relay::Instant;
 use crate::firmware::chip;
 use crate::firmware::clock::{self, Clock};
 
-/// Clock of the board, and the earliest time at which the task asked to be woken.
+/// Clock of the board, and the earliest time at which the task has requested to be polled. The time is `None` without a
+/// request.
 pub(crate) struct Time {
     clock: RefCell<Clock>,
     next: Cell<Option<Instant>>,
@@ -45,8 +46,8 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Runs `task` for ever. Polls it after each interrupt, after a wake-up, and at the time for which it asked. Calls
-/// `also` after every poll.
+/// Runs `task` forever. Polls the task after each interrupt, after a wake-up, and at the time that the task has
+/// requested. Calls `also` after every poll.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
     let waker = waker();
     let mut cx = Context::from_waker(&waker);

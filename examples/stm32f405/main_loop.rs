@@ -15,7 +15,7 @@ use crate::firmware::persistent;
 
 pub(crate) trait Links {
     /// Exchanges bytes between ports and relay. The relay's changed votes are stored after receiving and before
-    /// sending. Returns the time of the next call.
+    /// sending. Returns the time by which the next call is due.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
     fn log_counters(&self);
@@ -86,11 +86,12 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Returns no measurement. Replace it if the relay measures the interference, by a function that returns the newest
+/// Returns no measurement. If the relay measures the interference, replace this function by one that returns the newest
 /// measurement of your receiver.
 ///
 /// To estimate the interferer, the relay also needs the drone's position. If the mission gives the interference as a
-/// distribution along x, call `Relay::restart` at the leader after enough samples, so that the chain agrees again.
+/// distribution along x, call `Relay::restart` at the leader after enough samples. The chain then agrees on positions
+/// for the measured interference.
 const fn measured() -> Option<Sample> {
     None
 }

@@ -19,7 +19,8 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Placeholder type for the autopilot link, which this image lacks. It has no values, so it never exists.
+/// Placeholder type for the autopilot link, which this image lacks. The enum has no variants, so no value of it can
+/// exist.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {

@@ -50,7 +50,7 @@ impl Frame {
 /// arrive.
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
-/// Function that may change an arriving frame, and returns true if the frame is to be delivered.
+/// Function that can change an arriving frame, and returns true if the frame is to be delivered.
 pub type Delivery = Box<dyn FnMut(&mut Frame) -> bool>;
 
 /// Test bench in virtual time: relays, ground stations, and the frames between them.

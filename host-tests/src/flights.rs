@@ -16,7 +16,7 @@ pub const fn seconds(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Makes a simulated run continue until `at`, even if the chain has settled before then.
+/// Makes a simulated run continue at least until `at`, even if the chain has settled before then.
 pub fn go_on_until(setup: &mut Setup, at: Instant) {
     // A partition behind the last relay separates no relays, but keeps the run going.
     setup.partitions.push(Partition {
@@ -26,7 +26,7 @@ pub fn go_on_until(setup: &mut Setup, at: Instant) {
     });
 }
 
-/// Makes a simulated run end at `at`, even if the chain has settled before then.
+/// Makes a simulated run end exactly at `at`, even if the chain has settled before then.
 pub fn end_at(setup: &mut Setup, at: Instant) {
     go_on_until(setup, at);
     setup.deadline = at;
@@ -126,7 +126,7 @@ pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     own.collect()
 }
 
-/// Returns random fault probabilities: frame loss to 50 %; corruption, duplication, reordering to 20 %.
+/// Returns random fault probabilities of a frame: loss up to 50 %, all other faults up to 20 %.
 pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     Faults {
         loss: rng.random_range(0.0..=0.5),

@@ -20,10 +20,10 @@ pub fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).map_or(usual, |text| text.parse().unwrap())
 }
 
-/// Adds up to three random losses of relays to `setup`, each at the time in ms that `at` returns.
+/// Adds losses of up to three random relays to `setup`. `at` returns the time of each loss, ms.
 ///
-/// A lost relay returns if `all_return`, otherwise with a probability of one half. Sets the deadline [`RECOVERY`]
-/// after the last event.
+/// A lost relay is switched on again later: always if `all_return` is true, otherwise with a probability of one half. The run may last
+/// until [`RECOVERY`] after the last event.
 pub fn lose_relays(
     setup: &mut Setup,
     rng: &mut ChaCha8Rng,
@@ -50,7 +50,7 @@ pub fn lose_relays(
 /// Runs `count` random schedules, with the seeds from `first`, and prints their recovery times.
 ///
 /// # Panics
-/// `judge` has found a fault in one of them.
+/// `judge` has found a fault in one of the runs.
 pub fn run_all(
     first: u64,
     count: u64,

@@ -23,7 +23,7 @@ pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Prof
         .map_or(mission.config().common, |(_, profile)| *profile)
 }
 
-/// Returns the agreement that the leader of the chain predicts; `None` if no target SIR can be met.
+/// Returns the agreement that the chain's leader predicts; `None` if the chain can meet no target SIR.
 ///
 /// `own` has the relays whose profile differs from the common profile.
 pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
@@ -31,7 +31,7 @@ pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
     plan::solve(mission, Schedule::Bracketed, of).ok()
 }
 
-/// Returns the relays' positions for the target SIR `target`, linear, which the chain can meet.
+/// Returns the relays' positions for the target SIR `target`, linear.
 pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Placement> {
     let of = |index| profile_of(mission, own, index);
     (1..=mission.relays())
@@ -100,15 +100,14 @@ pub struct Solved {
     pub x: Vec<f64>,
     /// Relative shortfall of the SIR from the reference optimum: 1 - SIR / optimum.
     pub short: f64,
-    /// Number of passes of messages along the chain that the solution needs.
+    /// Number of passes (messages along the chain) that the solution needs.
     pub sweeps: u32,
 }
 
 /// Checks that the crate's solution is at most `allowed` (relative) below the optimum, never above.
 ///
-/// The relays of `link`, the chain, have one altitude; for these the crate's rule, that each relay goes as far as the
-/// target SIR allows, finds the optimum. Returns `None` if every chain has an SIR of 0, after a check that the crate
-/// reports so.
+/// All relays of the chain `link` must have the same altitude. Then the crate finds the optimum, because each relay goes as far as the
+/// target SIR allows. If no chain has an SIR above 0, checks that the crate finds no solution, and returns `None`.
 pub fn optimum_is_found(
     link: &Link,
     (mission, own): &(Mission, Vec<(u16, Profile)>),
@@ -141,12 +140,12 @@ pub struct Mixed {
     pub solved: u32,
     /// Number of chains whose SIR is at most 2e-4 (relative) below the optimum of the reference.
     pub best: u32,
-    /// Largest number of passes of messages along a chain, over all chains.
+    /// Largest number of passes (messages along the chain) that one of the chains needed.
     pub sweeps: u32,
 }
 
 impl Mixed {
-    /// Simulates a chain of unlike relays and counts it. Checks that the chain meets its agreed target SIR.
+    /// Solves a chain of different relays and counts it. Checks that the chain meets its agreed target SIR.
     ///
     /// The SIR must not exceed the optimum.
     pub fn meet_what_they_agree_on(&mut self, link: &Link) {
@@ -231,18 +230,19 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
 /// The crate's x is compared with the x of the reference.
 #[derive(Debug, Default)]
 pub struct Reaches {
-    /// Number of hops whose receiver cannot be as far as Rx, because the target SIR limits its x.
+    /// Number of hops whose farthest x is short of Rx, because of the target SIR.
     pub inside: u32,
-    /// Number of hops whose receiver meets the target SIR beyond the interferer, but not at some nearer x.
+    /// Number of hops that meet the target SIR at their farthest x, but miss it at some smaller x. The interferer is between these
+    /// positions.
     pub leaps: u32,
     /// Number of hops that meet their target SIR at no position of the receiver.
     pub infeasible: u32,
 }
 
-/// Checks the receiver's farthest x at which each of `count` random hops meets a target SIR.
+/// Checks the farthest x of the receiver at which a random hop meets a target SIR, for `count` hops.
 ///
-/// This x must lie between the exact x for two targets: 1e-6 (relative) below and above the target, with a tolerance
-/// of two f32 steps. `target` draws the target of a hop.
+/// `target` draws the target of a hop. The crate's x must lie between the exact x for a target 1e-6 (relative) higher and for one 1e-6
+/// lower, with a tolerance of two f32 steps.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,

@@ -24,8 +24,7 @@ struct Function {
     /// Range of the test points x. The points of a range above 0 are spaced logarithmically, the points of other
     /// ranges evenly.
     range: [f64; 2],
-    /// Function that maps a test point x to the arguments of the tested function. A tested function of one argument ignores the second
-    /// argument.
+    /// Maps a test point x to the arguments of the tested function. A function of one argument ignores the second one.
     arguments: fn(f64) -> [f64; 2],
     micromath: fn([f32; 2]) -> f32,
     libm: fn([f32; 2]) -> f32,

@@ -68,9 +68,8 @@ fn weakest_signal(link: &Link, places: &[f64]) -> f64 {
     weakest.min(relay.power_w / (link.eta * (last * last + height2)))
 }
 
-/// Returns the largest value that the weakest signal can have with relays at grid points, W. `points` is the number of
-/// grid steps. `chosen` has the positions of the first relays; the remaining `left` relays follow at the same or later
-/// points.
+/// Returns the largest value that the weakest signal can have with relays at grid points, W. The grid has `points` steps. `chosen` has the
+/// positions of the first relays; the last `left` relays are at the same or farther points.
 fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) -> f64 {
     if left == 0 {
         return weakest_signal(link, chosen);
@@ -89,7 +88,7 @@ fn best_of_grid(link: &Link, points: u32, left: usize, chosen: &mut Vec<f64>) ->
 
 /// Checks that no positions on a grid beat `blind_places`, which maximises the weakest signal.
 ///
-/// The random links have 1 to 3 relays; the interference does not count.
+/// The random links have 1 to 3 relays. Interference is ignored.
 #[test]
 fn no_grid_has_a_stronger_weakest_signal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(11));
@@ -123,7 +122,7 @@ fn no_grid_has_a_stronger_weakest_signal() {
 
 /// Checks that the last relay is above Rx if fewer relays would give the same weakest signal.
 ///
-/// The hop from there straight down to Rx is then the weakest one. All other hops are shortened by the same factor.
+/// The hop from the last relay straight down to Rx then has the weakest signal. All other hops are shortened by the same factor.
 #[test]
 fn surplus_relays_shorten_all_hops_in_proportion() {
     let link = Link::paper(50);

@@ -21,7 +21,7 @@ use uav_relay_tools::fewest;
 /// Largest relative shortfall from the optimum SIR at which a result counts as optimal.
 const NEAR: f64 = 1e-3;
 
-/// Relative error by which an upper bound may be too low: search tolerance and f32 rounding.
+/// Tolerated relative error of an upper bound that is too low: search tolerance and f32 rounding.
 const ROUNDING: f64 = 2e-4;
 
 /// Returns true if a chain meets the SIR `target` with every relay as far along as `target` permits.

@@ -24,8 +24,8 @@ fn close(got: f64, want: f64, rtol: f64, what: &str) {
     );
 }
 
-/// Returns the recorded problems of the tests whose name begins with `set`, and their optima. Problems whose optimum
-/// is recorded without positions are left out.
+/// Returns the recorded problems of all sets whose name begins with `set`, with their optima. A problem is left out if the positions of its
+/// optimum are not recorded.
 fn of(set: &str) -> impl Iterator<Item = (&'static Record, &'static Optimum)> {
     let wanted = move |record: &&Record| record.set.starts_with(set);
     let placed = |record: &'static Record| {
@@ -129,8 +129,7 @@ fn optima_of_independent_programs_are_recorded() {
     }
 }
 
-/// Checks that two recorded optimum SIRs agree for each of forty scenarios. The two were found by searches with
-/// different random seeds.
+/// Checks that the two recorded optimum SIRs of each of forty scenarios agree. They were found by searches with different random seeds.
 ///
 /// [`optima`] has the SIRs of all 2 000 numbered scenarios, without positions. [`optimum`] has the SIRs of forty of
 /// them, with positions.

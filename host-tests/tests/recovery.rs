@@ -100,7 +100,8 @@ fn detected(report: &ChainReport) -> f64 {
     lost.unwrap().at_s - AT_S as f64
 }
 
-/// Checks that the relays that remain after a loss agree on the same positions as a new chain. The new chain has as many relays.
+/// Checks that the relays that remain after a loss agree on the same positions as a new chain. The new chain has as many relays as remain
+/// after the loss.
 #[test]
 fn the_remaining_chain_is_as_good_as_a_new_one() {
     for (relays, lost) in [(4, 2), (8, 1), (8, 4), (8, 8), (16, 9)] {

@@ -235,8 +235,8 @@ fn even(relays: usize) -> StochasticLink {
     }
 }
 
-/// Checks that relays whose mission has a wrong field of interference measure the true field. Then they agree again.
-/// The wrong field is constant.
+/// Checks that relays whose mission has a wrong field of interference measure the true field. Then the relays agree a second time. The
+/// wrong field is constant.
 #[test]
 fn measurements_replace_the_agreed_field() {
     let mut rng = generator(67);

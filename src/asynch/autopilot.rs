@@ -34,7 +34,7 @@ pub struct AsyncAutopilot {
     /// Signal that wakes the future exchanging data with the relay. It is raised after received bytes and events of
     /// the relay.
     exchange_signal: Signal,
-    /// Signal that wakes the future sending frames to the autopilot: raised when a frame may be pending.
+    /// Signal that wakes the future sending frames to the autopilot: raised when frames can be pending.
     send_signal: Signal,
     /// Waker of the firmware task that waits in `next_event` for an event of the autopilot link.
     listener: Cell<Option<Waker>>,
@@ -73,8 +73,8 @@ impl AsyncAutopilot {
 
     /// Waits for the next event of the autopilot link and returns it to the firmware.
     ///
-    /// Only one task may wait: if a second task waits, it takes the place of the first task, and the first task is no
-    /// longer woken. The future may be dropped. An event that it has not returned is kept for the next call.
+    /// Only one task can wait at a time: a second task replaces the first, which is no longer woken. Dropping the
+    /// future loses no event: the event is kept for the next call.
     ///
     /// Constant work each time it is polled.
     pub fn next_event(&self) -> impl Future<Output = AutopilotEvent> + '_ {
@@ -87,17 +87,17 @@ impl AsyncAutopilot {
         })
     }
 
-    /// Returns true if the autopilot follows the relay's setpoints, also while the drone hovers.
+    /// Returns true while the drone follows the relay's setpoints, also while it hovers at a setpoint.
     pub fn is_flown(&self) -> bool {
         self.lend(|link| link.is_flown()).unwrap_or(false)
     }
 
-    /// Moves bytes between the link and its port, and positions between the link and `relay`, forever. Join it with,
-    /// or spawn it beside, the future that runs the relay's ports.
+    /// Moves bytes between the link and its port, and positions between the link and `relay`, forever. Join it with, or
+    /// spawn it beside, the future that runs the relay's ports.
     ///
-    /// Each poll reads the port once ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that
-    /// never completes does not delay the reader. The future may be dropped at any `await`, and created again: the
-    /// rest of a frame that was being written is lost, which the autopilot detects by the checksum.
+    /// Each poll reads the port once ([`READ_LIMIT`] bytes at most) and writes the pending frames. A writer that never
+    /// completes does not delay the reader. The future can be dropped at any `await`, and created anew. The unsent rest
+    /// of a frame is then lost, and the autopilot detects this by the checksum.
     pub async fn run(
         &self,
         relay: &AsyncRelay<'_>,

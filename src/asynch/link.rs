@@ -23,7 +23,7 @@ const PAUSE: u32 = 128;
 
 /// Time for which the driver-enable pin stays high after the last byte's computed end, in byte times.
 ///
-/// The first byte time is for a byte that the port may still be sending. The second byte time is for the tolerance of
+/// The first byte time is for a byte that the port can still be sending. The second byte time is for the tolerance of
 /// the port's clock.
 const PIN_HOLD: u32 = 2;
 
@@ -50,7 +50,7 @@ struct Sender<W, D> {
     byte_time: Duration,
     /// Time at which all bytes written so far have left the port, computed from the baud rate.
     quiet_at: Instant,
-    /// True if the last frame may have been cut short, because its writing failed or was cancelled.
+    /// True if the last frame is possibly cut short, because its writing failed or was cancelled.
     cut: bool,
 }
 
@@ -174,7 +174,7 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sends a frame, after a delimiter if the previous frame may have been cut short. Returns true on success.
+    /// Sends a frame, after a delimiter if the previous frame is possibly cut short. Returns true on success.
     async fn send(&mut self, frame: &[u8], clock: &impl Clock) -> bool {
         if self.cut && !self.write(&DELIMITER, clock).await {
             return false;
@@ -215,8 +215,8 @@ impl<W: Write, D: OutputPin> Sender<W, D> {
         }
     }
 
-    /// Sets the driver-enable pin high or low, if there is one. Returns true on success, and if there is no pin.
-    /// After a failure it pauses and returns false.
+    /// Sets the driver-enable pin high or low. Returns true on success, and without a pin. After a failure it pauses
+    /// and returns false.
     async fn drive(
         &mut self,
         high: bool,

@@ -46,17 +46,17 @@ impl<'a> AsyncRelay<'a> {
         }
     }
 
-    /// Passes the relay to `work`, for example to report a position or a sample, and wakes its ports. They run as
-    /// soon as the calling task waits. Returns `None`, and does nothing, inside the `work` of another call, which
-    /// already has the relay. Apart from `work` the call takes constant time.
+    /// Passes the relay to `work`, and wakes the task that runs its ports. For example, `work` reports a position or a
+    /// sample. The task of the ports runs as soon as the calling task waits. Returns `None`, and does nothing, inside
+    /// the `work` of another call, which already has the relay. Apart from `work` the call takes constant time.
     pub fn with<R>(&self, work: impl FnOnce(&mut Relay) -> R) -> Option<R> {
         let done = self.lend(work);
         self.notify_runner();
         done
     }
 
-    /// Passes the relay to `look` without waking its ports: for a setpoint or counters. Returns `None` inside the
-    /// `work` or `look` of another call, which already has the relay.
+    /// Passes the relay to `look`, which reads a setpoint or counters. Does not wake the task of the ports. Returns
+    /// `None` inside the `work` or `look` of another call, which already has the relay.
     pub fn look<R>(&self, look: impl FnOnce(&Relay) -> R) -> Option<R> {
         self.lend(|relay| look(relay))
     }

@@ -43,8 +43,8 @@ const LEAST_MEAN: f32 = 1e-6;
 
 /// Estimator of the mean interference power at one position; samples are summed, not stored.
 ///
-/// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, their effective
-/// number is smaller, and the standard error larger than stated.
+/// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, the true error is larger
+/// than the stated standard error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Estimator {
@@ -66,7 +66,7 @@ pub struct Estimate {
     pub alpha: f32,
     /// Second shape parameter of the Beta distribution fitted to I / `I_max`, above 0.
     pub beta: f32,
-    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32, so it may be a point of a [`Field`](super::Field).
+    /// Estimated Upsilon = E[1/I], 1/W: 1e-9 to 1e32. The value is valid for a point of a [`Field`](super::Field).
     pub upsilon_per_w: f32,
     /// Standard error of `upsilon_per_w`, 1/W, above 0. The true Upsilon is within two standard errors of the
     /// estimate with a probability of about 95 %.
@@ -81,8 +81,8 @@ pub struct Estimate {
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// An estimate with this minimum can still be bad: with 100 samples and a true alpha below 1.5, most estimates
-    /// exist only because alpha is overestimated by chance, and their Upsilon is too low.
+    /// An estimate from so few samples can still be bad. Example: 100 samples, and a true alpha below 1.5. Then most
+    /// estimates exist only because alpha is overestimated by chance, and the estimated Upsilon is too low.
     pub const MIN_SAMPLES: u32 = 100;
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.
@@ -136,9 +136,9 @@ impl Estimator {
 
     /// Returns the estimate of the samples so far.
     ///
-    /// `None` with fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES), without variance, if alpha is not above 1 by more than two of its standard errors
-    /// (E[1/I] may then be infinite), or if the mean is below 1e-6 `I_max` or Upsilon above 1e32. Constant work, at most 1000
-    /// instructions on a Cortex-M4F; 408 were counted.
+    /// `None` if there are fewer than [`MIN_SAMPLES`](Self::MIN_SAMPLES), if all samples are equal, if alpha minus two of its standard
+    /// errors is not above 1 (E[1/I] could then be infinite), if the mean is below 1e-6 `I_max`, or if Upsilon is above 1e32. Constant
+    /// work, at most 1000 instructions on a Cortex-M4F; 408 were counted.
     ///
     /// With 10 000 samples Upsilon is within 5 % in 99 of 100 cases for alpha from 3 to 20 and beta from 0.5 to 20, as asserted
     /// by `ten_thousand_samples_give_upsilon_within_five_percent` and `the_standard_error_covers_the_error` in
@@ -186,7 +186,7 @@ impl Estimator {
 struct Fit {
     /// Mean m of the accepted samples, each the interference power I divided by `I_max`.
     m: f32,
-    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without cancellation.
+    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without loss of digits.
     rest: f32,
     /// Standard deviation s of the accepted samples, each the interference power I divided by `I_max`.
     s: f32,

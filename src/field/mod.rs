@@ -9,8 +9,8 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to an interference I of 1e9 W down to 1e-32 W, a wider
-/// range than all measurements.
+/// Allowed range of Upsilon = E[1/I], 1/W. The range corresponds to an interference I of 1e9 W down to 1e-32 W, more
+/// than any receiver measures.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Point of a [`Field`]: an x, and Upsilon = E[1/I] at this x. Upsilon is the mean of the inverse interference power.
@@ -44,7 +44,7 @@ error_texts!(FieldError {
     Upsilon => "upsilon_per_w (mean of 1 / interference power, in 1/W) must be within 1e-9 to 1e32",
 });
 
-/// Interference field: a checked table of Upsilon = E[1/I] along x. It is linear between two points, and constant
+/// Interference field: a checked table of Upsilon = E[1/I] along x. Upsilon is linear between two points, and constant
 /// beyond the ends of the table.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -157,7 +157,8 @@ impl Field {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the two points around `x_m`, or a single point if `x_m` is at a point or beyond the table.
+    /// Returns the two points around `x_m`. If `x_m` is at a point or beyond the table, returns this point or the end
+    /// point, and `None`.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {
@@ -207,8 +208,8 @@ impl FieldPoint {
     /// It is (alpha + beta - 1) / ((alpha - 1) `i_max_w`), with the shape parameters `alpha` and `beta`, and the
     /// maximum power `i_max_w` in W. The paper's formula has no `I_max`, because its I is relative to `I_max`. `None`
     /// unless alpha > 1 (otherwise E[1/I] is infinite), beta > 0, `i_max_w` > 0, and all three and the result are
-    /// finite. In f64, since near alpha = 1 an f32 of alpha would be too coarse; intended for constants, where it is
-    /// free. Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in
+    /// finite. The computation uses f64, because near alpha = 1 an f32 of alpha would be too coarse. It is intended for
+    /// constants, where it takes no run time. Accuracy: `upsilon_of_a_beta_distribution_is_the_integral_of_its_mgf` in
     /// `host-tests/tests/field/closed_forms.rs`.
     pub const fn beta_upsilon(alpha: f64, beta: f64, i_max_w: f64) -> Option<f64> {
         let shapes = alpha > 1.0 && alpha.is_finite() && beta > 0.0 && beta.is_finite();

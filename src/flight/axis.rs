@@ -31,8 +31,8 @@
 use crate::geodetic::{Geodetic, Sites, to_integer};
 use crate::place::Placement;
 
-/// Maximum difference, m, between a mission's distance and the distance of its Tx and Rx positions. It covers
-/// rounding.
+/// Maximum difference, m, between a mission's distance and the distance of its Tx and Rx positions. The tolerance
+/// covers rounding.
 const TOLERANCE_M: f64 = 0.05;
 
 /// Reason why the positions of transmitter and receiver define no line.
@@ -213,7 +213,7 @@ impl Axis {
 
     /// Returns the distance along the ground from a point to the nearest point of the line, m. `None` for an invalid point.
     ///
-    /// It is defined everywhere on earth, also where [`place`](Self::place) is `None`. Constant work.
+    /// The distance is defined everywhere on earth, also where [`place`](Self::place) is `None`. Constant work.
     ///
     /// ```
     /// use uav_relay::flight::axis::Axis;
@@ -286,8 +286,7 @@ impl Axis {
         narrow(libm::atan2(east, north))
     }
 
-    /// Returns the angle between the directions of this line and `other` at their Tx, radians in [0, π]. Constant
-    /// work.
+    /// Returns the angle between this line and the line `other`, each at its own Tx, radians in [0, π]. Constant work.
     pub fn turn_rad(&self, other: &Self) -> f32 {
         turned(other.azimuth_rad(0.0) - self.azimuth_rad(0.0)).abs()
     }

@@ -187,7 +187,7 @@ impl Ground {
 
     /// Ends an upload or a query in progress: nothing more is offered to the relays.
     ///
-    /// A relay that has stored the mission passes it on all the same.
+    /// A relay that has stored the mission already still passes it on.
     pub fn cancel(&mut self) {
         self.upload = None;
         self.progress = Progress::Idle;
@@ -212,9 +212,9 @@ impl Ground {
     /// long enough for the relative error of [`Listen`](crate::Listen). One measurement per
     /// [`Listen::every`](crate::Listen::every) is enough.
     ///
-    /// A link carries one frame of 23 bytes and a tag, a shared channel one to each of the four nearest relays. A
-    /// relay that is absent or has restarted is sent a handshake instead. Reports are not acknowledged: the next one
-    /// replaces a lost one.
+    /// Over a wire one frame of 23 bytes and a tag is sent, on a shared channel one such frame to each of the four
+    /// nearest relays. A relay that is absent or has restarted is sent a handshake instead. Reports are not
+    /// acknowledged: the next one replaces a lost one.
     pub fn measured(&mut self, power_w: f32) -> bool {
         if !is_level(power_w) {
             return false;
@@ -435,7 +435,7 @@ impl Ground {
         is_under_way(self.progress)
     }
 
-    /// Schedules the next hello if its time has come: to the same relay again, or to the next relay. Takes constant
+    /// Schedules the next hello if its time has come: to the same relay as before, or to the next relay. Takes constant
     /// time.
     pub fn handle_timeout(&mut self, now: Instant) {
         let now = self.clock.advance(now);
@@ -489,7 +489,7 @@ impl Ground {
         Some(self.clock.external(next?))
     }
 
-    /// Writes the next frame into `frame`, if there is one, and returns its length in bytes. Work: one frame and one tag.
+    /// Writes the next frame into `frame` and returns its length in bytes; `None` if there is no frame. Work: one frame and one tag.
     pub fn poll_transmit(&mut self, frame: &mut [u8; MAX_FRAME]) -> Option<usize> {
         if self.endpoint.is_exhausted() {
             return None;
@@ -609,7 +609,7 @@ struct Watching {
     is_due: bool,
     /// Bit mask of the relays from which a frame was received since the last request to that relay.
     heard: u8,
-    /// Report entries that have arrived since the last call with a time.
+    /// Report entries that have arrived since the last call of [`apply`](Self::apply), which gets the time.
     arrived: heapless::Vec<(Entry, Option<Detail>), 32>,
     /// Newest known state of every relay that has reported, in the order of their node numbers.
     known: heapless::Vec<KnownState, REPORTED>,
@@ -625,10 +625,10 @@ struct KnownState {
 }
 
 impl Watching {
-    /// Creates the state of a station that requests no reports. With a larger `epoch` its later request numbers are
-    /// larger, too.
+    /// Creates the state of a station that requests no reports. The request numbers begin at 1024 times `epoch`, so
+    /// that they rise from start to start.
     ///
-    /// After a run of more than 85 minutes, the numbers of the next run may be smaller. Relays then ignore requests
+    /// After a run of more than 85 minutes, the numbers of the next run can be smaller. Relays then ignore requests
     /// until 60 s after the last request of the earlier run.
     #[expect(clippy::cast_possible_truncation, reason = "six bits are enough")]
     const fn new(epoch: u32, all: u16) -> Self {
@@ -673,8 +673,8 @@ impl Watching {
         is_silent
     }
 
-    /// Schedules the request for reports again for the relay at `distance`. This relay could not verify an earlier
-    /// request.
+    /// Schedules a repetition of the request for reports to the relay at `distance`. This relay could not verify an
+    /// earlier request.
     const fn answer(&mut self, distance: u16) {
         if self.repeat_at.is_some() && !self.is_due {
             self.distance = distance;
@@ -759,7 +759,7 @@ pub enum Progress {
     /// No mission upload is in progress.
     #[default]
     Idle,
-    /// The mission is being offered; no relay has reported yet that it has stored it.
+    /// The mission is being offered; no relay has reported yet that it has stored the mission.
     Offering,
     /// A relay has stored the mission. The ground station polls until the relays fly it.
     Stored {
@@ -789,7 +789,7 @@ pub enum Progress {
         /// is farther from the station.
         by: u16,
     },
-    /// The upload is outdated: a relay has stored a newer mission, or another one with the same version.
+    /// The upload is outdated. A relay has stored a newer mission, or another mission with the same version.
     Outdated {
         /// Version of the newer mission that the relay has stored.
         version: u16,
@@ -827,8 +827,8 @@ impl PendingReports {
         self.measurements == 0
     }
 
-    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. This relay
-    /// may have restarted and lost the report.
+    /// Schedules the last measurement report once more, for the relay `distance` hops from this station. This relay has
+    /// possibly restarted and lost the report.
     pub(super) fn schedule(&mut self, distance: u16) {
         if self.power_w > 0.0 {
             self.pending |= bit(distance);

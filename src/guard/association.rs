@@ -12,8 +12,8 @@ use crate::place::{CrossSection, Placement};
 use crate::side::Side;
 use crate::time::Jitter;
 
-/// Number of consecutive messages of another association (session) that prove the neighbour's restart. A smaller
-/// number may be late messages from an earlier session.
+/// Number of consecutive messages of another association (session) that prove the neighbour's restart. Fewer such
+/// messages are possibly late messages of an earlier session.
 const MAX_FOREIGN_MESSAGES: u8 = 3;
 
 /// Number of seconds after which a neighbour's halt request expires if it is not repeated.
@@ -155,7 +155,7 @@ impl Association {
     }
 
     /// Returns true if `fence` states that the neighbour has left the current association (session). A repetition of
-    /// this message does not count again, because the next association has another number.
+    /// this message does not count, because the next association has another number.
     pub(super) const fn is_leave_notice(&self, fence: &Fence) -> bool {
         fence.has_flag(Fence::LEFT) && fence.echo == self.own_number
     }
@@ -188,8 +188,7 @@ impl Association {
     }
 
     /// Returns true if a message belongs to a left association (session). This relay or its neighbour has left it. If
-    /// this relay has left the association, its leave notice is sent again, until the neighbour starts a new
-    /// association.
+    /// this relay has left the association, its leave notice is repeated, until the neighbour starts a new association.
     pub(super) fn is_of_left_association(&mut self, fence: &Fence) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             let left = fence.association == leave_notice.peer_number;
@@ -208,7 +207,7 @@ impl Association {
         fence.association == self.left_number
     }
 
-    /// Schedules a pending leave notice for sending again; returns true if a notice is pending.
+    /// Schedules a repetition of a pending leave notice; returns true if a notice is pending.
     pub(super) const fn remind(&mut self) -> bool {
         if let Some(leave_notice) = &mut self.leave_notice {
             leave_notice.due = true;
@@ -317,8 +316,8 @@ impl Association {
         })
     }
 
-    /// Counts a message of another association (session). Returns true once so many such messages were received in a
-    /// row that the neighbour must have restarted.
+    /// Counts a message of another association (session). Returns true once [`MAX_FOREIGN_MESSAGES`] such messages were
+    /// received in a row: the neighbour must have restarted.
     pub(super) const fn count_foreign(&mut self) -> bool {
         self.foreign_messages = self.foreign_messages.saturating_add(1);
         self.foreign_messages >= MAX_FOREIGN_MESSAGES
@@ -452,7 +451,7 @@ impl KeepOut {
         if turns { to } else { from }.cross_section().at(x_m)
     }
 
-    /// Limits this relay's x to `x_m`, the x of its first setpoint, because some relays were never heard.
+    /// Limits this relay's x to `x_m`, the x of its first setpoint. Reason: some relays were never received.
     ///
     /// These relays may hover anywhere beyond `x_m`. At x = `near_m` this relay has the separation from all of them.
     pub(super) fn begin(&mut self, x_m: f32, near_m: f32) {
@@ -479,7 +478,7 @@ impl KeepOut {
         !self.near_m.is_nan()
     }
 
-    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. It has the minimum
+    /// Ends [`is_near`](Self::is_near) once this relay is far enough from the lost relay. This relay has the minimum
     /// separation at x = `near_m`. `is_beyond` returns true if this relay has passed the x in its argument.
     pub(super) fn end_near(&mut self, side: Side, is_beyond: impl Fn(f32) -> bool) {
         if is_beyond(self.near_m) {

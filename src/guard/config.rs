@@ -51,7 +51,7 @@ pub struct GuardConfig {
     pub relays: u16,
     /// Maximum error of a hovering relay's reported position, 0 to 1e3 m per coordinate.
     ///
-    /// The separation of two relays may be smaller by twice this error.
+    /// The separation of two relays can be smaller than `separation_m` by twice this error.
     pub hover_m: f32,
     /// Maximum time from `Guard::steer` until the drone flies toward the new setpoint.
     ///

@@ -173,8 +173,8 @@ impl FenceFollower {
         (self.number != 0).then(|| self.across.at(self.target_m))
     }
 
-    /// Returns the smallest x that is allowed for this relay, m. If this x is above the x of the current setpoint,
-    /// this relay has to fly to it.
+    /// Returns the smallest x that is allowed for this relay, m. If this x is above the x of the current setpoint, this
+    /// relay has to fly to this x.
     #[inline(never)] // called from several places
     pub(super) fn min_x(&self, own: &Own) -> f32 {
         let granted = match (self.association.has_no_flown_neighbour(), self.number) {

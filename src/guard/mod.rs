@@ -121,8 +121,8 @@ pub struct Guard {
     owner: FenceOwner,
     /// True while this relay requests a halt of the chain.
     ///
-    /// Either it is on the wrong side of a neighbour, or its order along x was unknown for several seconds
-    /// (reminders) in a row.
+    /// Reason: it is on the wrong side of a neighbour, or its order along x was unknown for several seconds (reminders)
+    /// in a row.
     disorder: bool,
     /// Number of seconds (reminders) in a row in which the order along x was unknown.
     unordered: u8,
@@ -176,8 +176,8 @@ impl Guard {
 
     /// Handles a position report of the flight controller, measured at time `at`.
     ///
-    /// The first setpoint is a position reported since the start, with its altitude and lateral offset, even outside
-    /// of the geofence, but within [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
+    /// The first setpoint is a reported position, measured after the start. It can be outside of the geofence, within
+    /// [`BEGIN_WITHIN_M`](config::BEGIN_WITHIN_M) of it.
     pub fn position(&mut self, at: Instant, place: Placement) {
         if !is_placement(place) {
             return bump(&mut self.refused);
@@ -212,7 +212,7 @@ impl Guard {
         true
     }
 
-    /// Starts again because the line from Tx to Rx has changed. Earlier positions and messages are void.
+    /// Restarts the guard because the line from Tx to Rx has changed. Earlier positions and messages are void.
     ///
     /// The relay begins with the first position that is reported after `now`, once the drone has stopped. With
     /// `None`, it begins with the first position after the start. Lost relays may hover anywhere beyond this relay,
@@ -259,8 +259,8 @@ impl Guard {
     /// neighbour.
     ///
     /// The previous neighbour may still hover. This relay keeps clear of the previous neighbour until
-    /// [`forget`](Self::forget) is called. It also ends when the previous neighbour, or a node between the two, is
-    /// linked and has sent a message.
+    /// [`forget`](Self::forget) is called, or until the previous neighbour, or a node between the two, is the neighbour
+    /// and has sent a message.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {
@@ -276,7 +276,7 @@ impl Guard {
 
     /// Removes the obstacles of lost relays at `side`, which have landed or were removed.
     ///
-    /// `others` states that the chain has more relays at that side. If none of these relays has been received, this
+    /// `others` is true if the chain has more relays at that side. If none of these relays has been received, this
     /// relay keeps clear of everything beyond its present x until it receives one of them.
     pub fn forget(&mut self, side: Side, others: bool) {
         let ReachableInterval { low_m, high_m, .. } = self.own.reachable;
@@ -367,7 +367,7 @@ impl Guard {
 
     /// Requests an open chain, if needed: all relays at least the minimum separation apart along x. This relay or a
     /// neighbour may need it; a neighbour's request is forwarded to the neighbour on the opposite side. `clear` is true
-    /// if this relay may change its lateral offset and altitude.
+    /// if nothing forbids this relay to change its lateral offset and altitude.
     fn open(&mut self, clear: bool) {
         let own = &mut self.own;
         let is_blocked = !clear && !own.has_agreed_cross_section();
@@ -469,8 +469,8 @@ impl Guard {
         Some((Side::Downstream, self.owner.association.node, fence))
     }
 
-    /// Schedules again all messages that may have been lost; returns true if there are any. Call it about every
-    /// second.
+    /// Schedules repetitions of all messages that were possibly lost; returns true if there are any. Call it about
+    /// every second.
     pub fn remind(&mut self) -> bool {
         let begun = self.own.setpoint.is_some() && self.own.reachable.is_known();
         self.unordered = if begun && !self.is_ordered() {

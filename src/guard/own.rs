@@ -31,8 +31,8 @@ impl Span {
     }
 }
 
-/// Interval of x, m, in which this relay may be. It contains the last reported x and the setpoints that the relay may
-/// still fly to.
+/// Interval of x, m, in which this relay can be. It contains the last reported x and the setpoints to which the relay
+/// possibly still flies.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct ReachableInterval {
     pub(super) setpoint_m: f32,
@@ -43,8 +43,8 @@ pub(super) struct ReachableInterval {
     /// Interval that contains the x of all setpoints since the time `recent_since`, m.
     recent_span: Span,
     recent_since: Instant,
-    /// Interval of the x of earlier setpoints, m. At the last position report the relay may still have been on its
-    /// way to one of these setpoints.
+    /// Interval of the x of earlier setpoints, m. At the last position report the relay was possibly still on its way
+    /// to one of these setpoints.
     earlier_span: Span,
     reported_at: Instant,
     /// True once a position report was measured late enough to show the effect of the first setpoint.
@@ -57,8 +57,8 @@ impl ReachableInterval {
         Self::at(0.0, now)
     }
 
-    /// Returns the interval after the first setpoint, at `x_m`. The interval counts as unknown until a report shows
-    /// the effect of this setpoint, because the relay may still fly to an earlier setpoint.
+    /// Returns the interval after the first setpoint, at `x_m`. The interval counts as unknown until a report shows the
+    /// effect of this setpoint, because the relay possibly still flies to an earlier setpoint.
     pub(super) const fn at(x_m: f32, now: Instant) -> Self {
         Self {
             setpoint_m: x_m,
@@ -84,8 +84,8 @@ impl ReachableInterval {
         }
     }
 
-    /// Extends the interval of the relay's possible x by the new setpoint `x_m`. Reason: the relay may first continue
-    /// toward the previous setpoint, and then turn.
+    /// Extends the interval of the relay's possible x by the new setpoint `x_m`. Reason: the relay possibly first
+    /// continues toward the previous setpoint, and then turns.
     pub(super) fn extend_to(&mut self, x_m: f32, now: Instant) {
         if (x_m - self.setpoint_m).abs() > 0.0 {
             self.setpoint_m = x_m;
@@ -206,9 +206,9 @@ impl Own {
         self.reminders = self.reminders.saturating_add(1);
     }
 
-    /// Returns true if the setpoint has not moved for five seconds, and `side` may be the cause. Then the agreed
-    /// position is farther toward `side`, or this side forbids a change of lateral offset or altitude (`clear` is
-    /// false).
+    /// Returns true if the setpoint has not moved for five seconds, and `side` is a possible cause. It is a possible
+    /// cause if the agreed position is farther toward `side`, or if this side forbids a change of lateral offset or
+    /// altitude (`clear` is false).
     pub(super) fn is_held_up(&self, side: Side, clear: bool) -> bool {
         let Some((setpoint, target)) = self.setpoint.zip(self.target) else {
             return false;

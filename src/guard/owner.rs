@@ -149,9 +149,10 @@ impl FenceOwner {
     /// Returns true if the neighbour downstream is known to be at a larger x than this relay.
     ///
     /// Each report has an error of up to `hover_m`. Before the neighbour is beyond the first fence (limit of x), two
-    /// relays whose reports are closer than the errors along x are in order only if they may pass each other: lateral
-    /// offset and altitude then keep them at least the separation apart. A pair that was in order may have moved by the
-    /// errors once more since then, each time that one of them halts or is rebooted.
+    /// relays whose reports are closer than the errors along x count as in order only if lateral offset and altitude
+    /// keep them at least the separation apart. After that the neighbour counts as in order even if the reports show
+    /// the wrong order by up to twice the errors: relays in order can move by the errors when one of them halts or
+    /// restarts.
     fn is_beyond(&self, own: &Own) -> bool {
         let off_m = 2.0 * own.config.hover_m;
         let may_pass = own.config.least_step(own.cross_section(), self.across) <= 0.0;

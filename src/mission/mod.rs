@@ -591,8 +591,8 @@ impl Mission {
         }
     }
 
-    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, as
-    /// for [`Mission::reverse`]. Without the feature `altitude` the function returns a constant.
+    /// Returns the SNR gap of fitted slots, linear; 0 for equal slots. It is 0 while the interferer is unknown, because
+    /// relays then spread evenly. Without the feature `altitude` the function returns a constant.
     pub const fn fitted_gap(&self) -> f32 {
         if ALTITUDE && !matches!(self.config.interference, Interference::Unknown) {
             self.config.fitted_gap
@@ -725,8 +725,10 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, if relays computed after it need no separation. Farthest
-    /// means toward Rx, or toward Tx in an interference field.
+    /// Returns the farthest allowed x of relay `index`, m, without the separation of the relays after it.
+    ///
+    /// The relays after it are those whose positions are computed later. Farthest means toward Rx, or toward Tx in an
+    /// interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
@@ -745,7 +747,7 @@ impl Mission {
         self.latest_at(index, self.config.min_separation_m)
     }
 
-    /// Returns the largest x of relay `index`, m, if the relays between it and Rx may share one x.
+    /// Returns the largest x of relay `index`, m, if the relays between it and Rx can share one x.
     pub(crate) fn latest_freely(&self, index: u16) -> f32 {
         self.latest_at(index, 0.0)
     }
@@ -774,8 +776,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or last hop that makes it half as long as the other hops. In the best chain all
-/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of the first or last hop with which this hop is half as long as the other hops. In the best chain
+/// all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -832,9 +834,9 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns three gains, for an unknown interferer, with which hops of equal length are best. They are the gain of the
-/// first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the transmit power of the
-/// relays, W. With these gains every hop of length d has the SIR (`distance_m` / d)^2.
+/// Returns three gains for an unknown interferer. With these gains the best chain has hops of equal length. They are
+/// the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the transmit
+/// power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

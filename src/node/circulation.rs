@@ -30,8 +30,8 @@
 
 use crate::time::{Duration, Instant, Jitter};
 
-/// Factor on the wait for a reply if the relays on the path compute for long. They do so before they forward the
-/// message. Their frames are then twice as long, and each relay may take thirty steps of a computation.
+/// Factor on the wait for a reply if the relays on the path first compute for long, then forward. Such frames are twice
+/// as long, and each relay needs up to thirty steps of its computation.
 const SLOW: u32 = 4;
 
 /// Number of retransmissions after which the wait before the next retransmission no longer doubles. After n
@@ -148,8 +148,8 @@ impl Circulation {
         }
     }
 
-    /// Returns the time at which this relay knew the result of the message. `None` while the result is unknown, and
-    /// after the message was cancelled.
+    /// Returns the time at which the result of the message became known to this relay. `None` while the result is
+    /// unknown, and after the message was cancelled.
     pub(crate) const fn completed_at(&self) -> Option<Instant> {
         match self.stage {
             Stage::Completed => Some(self.completed_at),
@@ -227,8 +227,8 @@ impl Circulation {
         self.await_result(now, path);
     }
 
-    /// Schedules a retransmission of the message if its result is still awaited. Called when the next relay can be
-    /// reached again.
+    /// Schedules a retransmission of the message if its result is still awaited. Called when the next relay is
+    /// reachable after a loss.
     pub(crate) const fn resend(&mut self) {
         self.is_forward_due |= self.is_outstanding();
     }
@@ -309,7 +309,7 @@ impl LateMessages {
     pub(crate) const NONE: Self = Self(0);
 
     /// Counts a message with an old sequence number. Returns true if it is the fourth such message in a row
-    /// ([`SUSPICIOUS`]), and then counts from 0 again.
+    /// ([`SUSPICIOUS`]), and then sets the count to 0.
     pub(crate) const fn count_one(&mut self) -> bool {
         self.0 = self.0.saturating_add(1);
         let suspicious = self.0 >= SUSPICIOUS;

@@ -57,8 +57,8 @@ impl Member {
         (place, self.all)
     }
 
-    /// Returns the digest that every message of a pass along the chain contains. It identifies the active mission and
-    /// the accepted view (agreed members of the chain).
+    /// Returns the digest that every message of a pass along the chain contains. The digest identifies the active
+    /// mission and the accepted view (agreed members of the chain).
     pub(crate) const fn pass_digest(&self) -> u16 {
         self.active.digest.wrapping_add(self.view.mark())
     }
@@ -69,7 +69,7 @@ impl Member {
 pub(crate) struct Context<'a> {
     pub(crate) now: Instant,
     pub(crate) member: &'a Member,
-    /// Identifier of the newest mission that this relay has stored. The active mission may still be an older mission.
+    /// Identifier of the newest mission that this relay has stored. The active mission can still be an older mission.
     pub(crate) latest: MissionId,
     /// True if this relay is the last of its chain: it has no neighbour on the side away from the leader.
     pub(crate) end: bool,
@@ -94,9 +94,9 @@ impl<'a> Context<'a> {
         self.member.pass_digest()
     }
 
-    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. This is so if
-    /// the settings select the joint method, and the mission leaves the lateral offset or the altitude free, or has
-    /// fitted slots (as long as each hop needs).
+    /// Returns true if every relay computes the whole chain's positions itself, by the joint method. This is so if the
+    /// settings select the joint method, and the mission leaves the lateral offset or the altitude free, or has fitted
+    /// slots (time slots that are as long as each hop needs).
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
@@ -171,8 +171,8 @@ pub(crate) struct OtherLeases {
     pub(crate) lease_left: Duration,
     /// Last accepted view (agreed members of the chain).
     pub(crate) view: ViewId,
-    /// Longest remaining lease time granted in an earlier view than `view`. `None` if unknown, because a member may
-    /// not have accepted `view`.
+    /// Longest remaining lease time granted in an earlier view than `view`. `None` if unknown, because a member has
+    /// possibly not accepted `view`.
     pub(crate) earlier_lease_left: Option<Duration>,
 }
 
@@ -244,7 +244,7 @@ pub(crate) enum LayerEvent {
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
-    /// The lease has expired: this relay may no longer use the agreed positions.
+    /// The lease has expired: this relay is no longer allowed to use the agreed positions.
     Lapsed,
     /// A hello that requests a new view must be sent to the neighbour toward the leader.
     RequestView,

@@ -50,16 +50,17 @@ use crate::time::{Duration, Instant, Jitter};
 use crate::wire::message::Claim;
 use crate::wire::session::{RAISED, Rival, Sender};
 
-/// Wait before the first claim that this relay sends, without a request, to its own node number. The intervals
-/// between later claims double each time.
+/// Wait before the first claim that this relay sends without a request. A claim is a message by which two nodes with
+/// one node number detect each other. The intervals between later claims double each time.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
 /// Time added, after a start, before the first claim that this relay sends without a request. This is about the time
-/// that a hundred relays need for their first agreement. A relay that becomes active again waits as long.
+/// that a hundred relays need for their first agreement. A relay that was passive and becomes active waits for the same
+/// time.
 const AFTER_START: Duration = Duration::from_millis(2_000);
 
-/// Maximum of the doubling intervals between claims to this relay's node number. These claims are sent without a
-/// request. Later claims follow every `dead_after`.
+/// Maximum interval between claims that this relay sends without a request. The interval doubles up to this value;
+/// after that a claim follows every `dead_after`.
 const LAST_INTERVAL: Duration = Duration::from_millis(8_000);
 
 /// Number of claims by which this relay defends its node number against another node's claim. The interval between
@@ -77,8 +78,8 @@ fn least_interval(settings: &Settings) -> Duration {
     settings.hop_time.times(4)
 }
 
-/// Returns the interval between claims of a passive relay, a quarter of `probe_after`. It sends many claims before it
-/// becomes active again, so the loss of some does no harm.
+/// Returns the interval between claims of a passive relay, a quarter of `probe_after`. A passive relay sends many
+/// claims before it becomes active again, so the loss of some does no harm.
 const fn passive_interval(settings: &Settings) -> Duration {
     Duration::from_micros(settings.probe_after.as_micros() / 4)
 }
@@ -87,19 +88,20 @@ const fn passive_interval(settings: &Settings) -> Duration {
 #[derive(Clone, Debug)]
 pub(crate) struct IndexClaims {
     number: u32,
-    /// Largest claim number received from another node with the same node number and epoch.
+    /// Largest claim number received from another node with this relay's node number and epoch. Of two such nodes, the
+    /// node with the smaller claim number becomes passive.
     rival: u32,
-    /// Last claim number received from another node with the same node number; 0 if none has been received.
+    /// Last claim number received from another node with this relay's node number; 0 if there is none.
     last_rival: u32,
-    /// Last contact with another node of this node number: its time, and a flag. The flag is true if this relay
-    /// already had a position at the first contact. `None` without a contact.
+    /// Time of the last frame from another node with this relay's node number, and a flag. The flag is true if this
+    /// relay already had a position at the first such frame. `None` without such a frame.
     contest: Option<(Instant, bool)>,
     /// Times at which two nodes were last seen to use one number. Entry 0 is for this relay's number, entry 1 for a
-    /// neighbour's number.
+    /// neighbour's number; `None` for never.
     observed: [Option<Instant>; 2],
     /// Time at which this relay last received one of its own frames; `None` if none has been received.
     echoed: Option<Instant>,
-    /// Time at which a passive relay becomes active again; `None` while it is active.
+    /// Time at which a passive relay becomes active again; `None` while this relay is active.
     passive_until: Option<Instant>,
     /// Time of the next claim that this relay sends without a request, not in reply to a frame. `None` if none is
     /// scheduled.
@@ -153,8 +155,8 @@ impl IndexClaims {
         self.number
     }
 
-    /// Records that two nodes use the same number. Returns true, for a report, if this was not observed in the last
-    /// two `dead_after`.
+    /// Records that two nodes use the same number. Returns true if this must be reported: it was not observed within
+    /// the last two periods of `dead_after`.
     pub(crate) fn should_report(
         &mut self,
         now: Instant,
@@ -170,9 +172,10 @@ impl IndexClaims {
         since.is_none_or(|since| since > settings.dead_after.times(2))
     }
 
-    /// Returns true if another node with this relay's number has been received within three `dead_after`.
+    /// Returns true if another node with this relay's number was received recently. Recently means within the last
+    /// three periods of `dead_after`.
     ///
-    /// A passive node sends claims again after up to 2.25 `dead_after`.
+    /// Reason for three periods: a node that was passive sends claims again after up to 2.25 periods.
     pub(crate) fn is_observed(&self, now: Instant, settings: &Settings) -> bool {
         let [own, _] = self.observed;
         own.is_some_and(|at| now.since(at) < settings.dead_after.times(3))
@@ -206,7 +209,7 @@ impl IndexClaims {
     }
 
     /// Handles a frame that bears this relay's own node number as its sender. Returns true if this relay becomes
-    /// passive. `has_lease` is true while it has a setpoint and a lease.
+    /// passive. `has_lease` is true if this relay has a setpoint and a lease.
     pub(crate) fn handle_frame(
         &mut self,
         now: Instant,

@@ -53,7 +53,7 @@ use crate::wire::message::{Message, Orders, Pulse, Pulsed, Requests};
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum LeaseState {
-    /// No lease yet: this view has no agreement, or it is unknown if all members know the agreement.
+    /// No lease yet. Either this view has no agreement, or it is unknown if all members know the agreement.
     Pending,
     Until(Instant),
     Lapsed,
@@ -71,7 +71,7 @@ struct Current {
 pub(crate) struct Lease {
     state: LeaseState,
     current: Option<Current>,
-    /// Time until which the lease of another member may run because this relay took part in a renewal.
+    /// Latest possible end of another member's lease that is based on this relay's part in a renewal.
     vouched_until: Instant,
     /// Last accepted view, and the earliest time at which positions agreed on in it may be used.
     accepted: (ViewId, Instant),
@@ -100,7 +100,7 @@ pub(crate) struct Lease {
 #[derive(Clone, Copy, Debug)]
 struct Departures {
     requests: Requests,
-    /// Number of relays of the view when no relay requested to leave.
+    /// Number of relays that the view had when no relay requested to leave.
     complement: u16,
     /// Relay that requests to leave, 0 for none, and the time of its first request. Requests in earlier views count,
     /// too.
@@ -114,8 +114,9 @@ const fn from_tenths(tenths: u16) -> Duration {
 }
 
 impl Lease {
-    /// Creates the lease state of a relay that starts at `now`. Before a restart it may have taken part in a
-    /// lease that it does not remember, so other relays may still count on this relay for `dead_after`.
+    /// Creates the lease state of a relay that starts at `now`. Before a restart the relay has possibly taken part in a
+    /// lease renewal. So other relays can still have a lease for up to `dead_after`, which this relay does not
+    /// remember.
     pub(crate) fn new(seed: u32, now: Instant, settings: &Settings) -> Self {
         Self {
             state: LeaseState::Pending,
@@ -156,12 +157,13 @@ impl Lease {
         self.current.is_some() && !self.circulation.is_outstanding()
     }
 
-    /// Returns the leader's orders for the next renewal, by the requests in the last renewal.
+    /// Returns the leader's orders for the next renewal. They follow from the requests in the last renewal.
     ///
-    /// A relay may leave once all relays were in place in two renewals, so that the relay that left before knows. If
-    /// there is a spare, it joins first, unless the view already has more relays than without requests. A relay that
-    /// does not arrive counts as in place after half of the maximum duration of a lease. No relay waits longer than
-    /// that duration, or than its remaining endurance: so half of the endurance remains.
+    /// A relay is ordered to leave once all relays were in place in two consecutive renewals. The relay that left
+    /// before it has then received this information. If there is a spare, the spare joins first, unless a spare has
+    /// joined already: the view then has more relays than before the request. A relay that does not arrive counts as in
+    /// place after half of the maximum duration of a lease. No relay waits for the order longer than this maximum
+    /// duration, or than its remaining endurance. So at least half of the endurance at the first request remains.
     fn next_orders(&mut self, context: &Context<'_>) -> Orders {
         let (Some(requests), Some(known)) = (self.requests, self.departures.first_mut()) else {
             return Orders::NONE;
@@ -196,8 +198,8 @@ impl Lease {
         orders
     }
 
-    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. A lease
-    /// from before this relay's restart may still run at these members.
+    /// Extends the time for which other members may rely on this relay by the maximum duration of a lease. These
+    /// members can still have a lease from before this relay's restart.
     pub(crate) fn resume(&mut self, settings: &Settings) {
         self.vouched_until = self.vouched_until + longest_lease(settings);
     }
@@ -220,8 +222,8 @@ impl Lease {
         matches!(self.state, LeaseState::Pending)
     }
 
-    /// Returns the silence after which a neighbour may count as lost. It is the lease duration of the last renewal,
-    /// but at least `dead_after`.
+    /// Returns the silence after which a neighbour is permitted to count as lost. It is the lease duration of the last
+    /// renewal, but at least `dead_after`.
     pub(crate) fn span(&self, settings: &Settings) -> Duration {
         let span = self.current.map_or(0, |current| current.span);
         from_tenths(span).max(settings.dead_after)
@@ -238,10 +240,10 @@ impl Lease {
 
     /// Accepts `view`, which follows the view `base`. Positions of `view` must not be used before `rest`.
     ///
-    /// A member of `base` that has not accepted `view` may still have a lease. No renewal completes without all
-    /// members, so if this relay was a member, that lease ends by `vouched_until`. The age of an outstanding renewal
-    /// counts as a round trip only if this relay was a member of `base` and no relay is `lost`; otherwise it measures
-    /// an outage.
+    /// A member of `base` that has not accepted `view` can still have a lease. If this relay was a member of `base`,
+    /// that lease ends by `vouched_until`, because no renewal completes without all members. The age of an outstanding
+    /// renewal counts as a round trip only if this relay was a member of `base` and `lost` is false. If a relay is lost
+    /// (`lost` is true), the age measures an outage.
     pub(crate) fn accept_view(
         &mut self,
         now: Instant,
@@ -285,8 +287,8 @@ impl Lease {
         self.is_whole
     }
 
-    /// Records that this relay has agreed on its position. At the leader (`leads`) this means that all members have
-    /// agreed, so the first lease renewal is scheduled.
+    /// Records that this relay has agreed on its position. At the leader (`leads` is true) this means that all members
+    /// have agreed, so the first lease renewal is scheduled.
     pub(crate) fn on_agreement(&mut self, now: Instant, leads: bool) {
         self.is_agreed = true;
         if leads && self.current.is_none() && self.next_at.is_none() {
@@ -364,7 +366,8 @@ impl Lease {
     }
 
     /// Completes the current lease renewal and schedules the reply to the previous relay. The leader instead extends
-    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this relay.
+    /// its own lease and schedules the next renewal. `received` has the requests of the relays after this relay; `None`
+    /// at the last relay.
     fn complete_renewal(&mut self, context: &Context<'_>, received: Option<Requests>) {
         let (Some(current), Some(forwarded_at)) = (self.current, self.circulation.started_at())
         else {
@@ -471,7 +474,7 @@ impl Lease {
         }
     }
 
-    /// Returns the lease renewal to forward, if one is pending, and marks it as sent.
+    /// Returns the pending lease renewal to forward, and marks it as sent; `None` if none is pending.
     pub(crate) fn poll_onward(&mut self, context: &Context<'_>) -> Option<Message> {
         let is_due = self.circulation.poll_forward();
         let current = self.current.filter(|_| is_due)?;
@@ -485,7 +488,7 @@ impl Lease {
         }))
     }
 
-    /// Returns the reply to a lease renewal, if one is pending, and marks it as sent.
+    /// Returns the pending reply to a lease renewal, and marks it as sent; `None` if none is pending.
     pub(crate) fn poll_back(&mut self, context: &Context<'_>) -> Option<Message> {
         let reply = self.circulation.poll_reply()?;
         let current = self.current?;

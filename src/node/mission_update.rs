@@ -58,7 +58,7 @@ struct Offering {
     heard: Option<Instant>,
     /// True if an offer of the newest mission must be sent to this neighbour.
     is_due: bool,
-    /// Time at which the offer to the neighbour is sent again; `None` if it is not sent again.
+    /// Time at which the offer to the neighbour is repeated; `None` if it is not repeated.
     at: Option<Instant>,
     /// Number of mission offers sent since the mission or the neighbour last changed.
     tries: u8,
@@ -200,7 +200,7 @@ impl MissionUpdate {
     }
 
     /// Returns true if the nonce `answer` of an offer was in a recent hello of this relay. "Recent" means within the
-    /// last two `dead_after`.
+    /// last two periods of `dead_after`.
     pub(crate) fn is_recent_number(&self, answer: u16, now: Instant, member: &Member) -> bool {
         let span = member.settings.dead_after.times(2);
         let is_it = |asked: &Asked| asked.number == answer && now.since(asked.last) <= span;
@@ -215,7 +215,7 @@ impl MissionUpdate {
         })
     }
 
-    /// Records the nonce in a hello of the neighbour at `side`. The next mission offer repeats it.
+    /// Records the nonce in a hello of the neighbour at `side`. The next mission offer repeats this nonce.
     pub(crate) fn record_hello_number(&mut self, side: Side, nonce: u16, now: Instant) {
         if let Some(offering) = self.offering(side) {
             offering.nonce = nonce;
@@ -270,7 +270,7 @@ impl MissionUpdate {
         Some((upload, answers.then_some(offering.nonce)))
     }
 
-    /// Schedules the offer to the neighbour on each side again if its timer has expired.
+    /// Schedules a repetition of the offer to the neighbour on each side if its timer has expired.
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
         for side in [Side::Upstream, Side::Downstream] {
             if let Some(offering) = self.offering(side)
@@ -287,8 +287,8 @@ impl MissionUpdate {
         earliest(upstream.at, downstream.at)
     }
 
-    /// Schedules replies to the ground station at `side`. If `reports` is true, the reply is a hello. If `asks` is
-    /// the number of a request, the stored upload is sent.
+    /// Schedules replies to the ground station at `side`. If `reports` is true, the reply is a hello. If `asks` is the
+    /// number of a request (not `None`), the stored upload is sent.
     pub(crate) fn answer_ground(&mut self, side: Side, reports: bool, asks: Option<u16>) {
         if let Some(offering) = self.offering(side) {
             offering.reports |= reports;
@@ -309,8 +309,8 @@ impl MissionUpdate {
         Some((*self.upload().filter(|_| answer != 0)?, answer))
     }
 
-    /// Returns the last refused mission. `None` if there is none, if it is `active`, or if the stored mission is
-    /// newer.
+    /// Returns the last refused mission. `None` if there is none, if it is the mission `active`, or if the stored
+    /// mission is newer.
     pub(crate) fn refused_mission(&self, active: MissionId) -> Option<MissionId> {
         let refused = self.uploads()?.refused;
         refused.filter(|refused| *refused >= self.latest && *refused != active)
@@ -455,7 +455,7 @@ impl MissionUpdate {
     }
 
     /// Returns the configured geofence for the active mission; `None` without a guard. An active mission with its own Tx and Rx positions
-    /// may have another distance Tx-Rx than the loaded mission. The geofence's maximum x is changed by the difference.
+    /// can have another distance Tx-Rx than the loaded mission. The geofence's maximum x is changed by the difference.
     pub(crate) fn geofence(&self, member: &Member) -> Option<Geofence> {
         let mut fence = member.settings.guard?.geofence;
         if self.sites().is_some() {
@@ -469,9 +469,9 @@ impl MissionUpdate {
 impl Uploads {
     /// Checks that a mission with `config` is within the configured geofence. The error names the limit exceeded.
     ///
-    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. If a relay has a fixed
-    /// altitude, this altitude may be the lower or upper limit of its geofence. Then the limit of the loaded mission
-    /// counts instead, because all relays must decide alike.
+    /// The length of a mission with Tx and Rx positions of its own (`sited`) is not limited. If the fixed altitude of a
+    /// relay is the lower or upper limit of its geofence, the limit of the loaded mission counts instead. Reason: all
+    /// relays must decide alike.
     fn encloses(
         &self,
         member: &Member,

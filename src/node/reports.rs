@@ -59,8 +59,8 @@ pub(crate) const FIRST_PATIENCE: Duration = Duration::from_millis(6_000);
 /// Control state of a drone that the relay controls.
 const ENGAGED: u16 = State::Engaged as u16 + 1;
 
-/// Time by which a report that begins an alarm may be sent early. Other reports wait until the telemetry's share of
-/// the data rate allows them.
+/// Time by which a report that begins an alarm is allowed to be sent early. Other reports wait until the telemetry's
+/// share of the data rate allows them.
 const AHEAD: Duration = Duration::from_millis(2_000);
 
 /// Minimum time between the states in two entries of one relay. An entry is the state of a relay in a report. This
@@ -114,8 +114,8 @@ struct Stored {
     detail: Option<Detail>,
     /// Time at which the relay was in the state of this entry.
     at: Instant,
-    /// Earliest time at which the entry may be sent. Once it was sent, this time is so late that a newer entry should
-    /// replace it first.
+    /// Earliest time at which the entry may be sent. When the entry is sent, this time is set so late that a newer
+    /// entry usually replaces the entry before.
     from: Instant,
     rank: Rank,
 }
@@ -169,7 +169,7 @@ struct Watched {
 }
 
 /// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), the setpoint, and the agreed position.
+/// state), the setpoint, and the agreed position. `None` for an unknown position.
 pub(crate) type Own = (u16, [Option<Placement>; 2]);
 
 impl Reporting {
@@ -212,8 +212,8 @@ impl Reporting {
         }
     }
 
-    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry
-    /// belongs to a relay from which no report can come by way of `from`.
+    /// Handles a Watch (request for reports) or a Report from node `from` at `side`. Returns false if an entry belongs
+    /// to a relay from which no report can come through `from`.
     pub(crate) fn handle(
         &mut self,
         now: Instant,
@@ -469,9 +469,9 @@ impl Reporting {
         true
     }
 
-    /// Stores an entry if it is newer than the stored entry of the same relay. If the store is full, the oldest entry
-    /// that was already sent is dropped; if none was sent, the oldest entry that begins no alarm, if there is one.
-    /// Returns true if the entry begins an alarm.
+    /// Stores an entry if it is newer than the stored entry of the same relay. If the store is full, the new entry
+    /// replaces another one: the oldest entry that was already sent, else the oldest entry that begins no alarm. If all
+    /// stored entries begin an alarm, the new entry is dropped. Returns true if the entry begins an alarm.
     fn store(&mut self, now: Instant, entry: Entry, detail: Option<Detail>, at: Instant) -> bool {
         let mut stored = Stored {
             entry,
@@ -610,9 +610,9 @@ impl Reporting {
     /// Returns the time between two reports, divided by the length of the first report in bytes. With this time the
     /// reports of all relays take an eleventh of the data rate.
     ///
-    /// The data rate is at least one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes for
-    /// each relay in a `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). Relays may take a tenth of these
-    /// bytes, each in proportion to its load.
+    /// The data rate is assumed to be one sweep in each `hop_time`. On a shared channel it is also at least 2350 bytes
+    /// for each relay in each `probe_after`, see [`ChannelLoad`](crate::ChannelLoad). The reports use a tenth of these
+    /// bytes, divided among the relays in proportion to their loads.
     fn byte_time(&self, now: Instant, member: &Member, side: Side) -> Duration {
         let settings = &member.settings;
         let hop = (settings.hop_time.as_micros() * 106 / 1_200).clamp(1, 1 << 24);

@@ -35,30 +35,31 @@ pub enum Sample {
     },
     /// Mean interference power at a position, for the estimate of an unknown interferer.
     ///
-    /// The firmware averages it until the relative error of the mean is the one in
-    /// [`Listen`](crate::sensing::Listen). It excludes the signals of the chain, and includes the receiver's noise,
-    /// which the relay subtracts (`MissionConfig::noise_w`).
+    /// The firmware averages the power until the relative error of the mean is the error stated in
+    /// [`Listen`](crate::sensing::Listen). The power excludes the signals of the chain, and includes the receiver's
+    /// noise; the relay subtracts this noise (`MissionConfig::noise_w`).
     Heard {
         /// Position of the drone at the measurement. Each coordinate differs from the coordinate of Tx by at most 100
         /// times the distance from Tx to Rx.
         at: Placement,
-        /// Received power, W: 1e-30 to 1e6 (`MEASURED_W`) above the noise.
+        /// Received power, W. It must exceed the receiver's noise by 1e-30 to 1e6 W (`MEASURED_W`).
         power_w: f32,
     },
-    /// Mean interference power measured at Tx, on the ground. The firmware gives it to one of the first four relays,
-    /// usually relay 1.
+    /// Mean interference power measured at Tx, on the ground. The firmware gives the value to one of the first four
+    /// relays, usually relay 1.
     Transmitter {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
     /// Mean interference power measured at Rx, on the ground. The firmware gives the value to the last relay of the
-    /// view. It may also give the value to the three relays before the last relay. Such a relay uses the value once
-    /// it is the last relay itself.
+    /// view. The firmware can also give the value to the three relays before the last relay. Such a relay uses the
+    /// value once it is the last relay itself.
     Receiver {
         /// Received power, W: 1e-30 to 1e6.
         power_w: f32,
     },
-    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from it.
+    /// SIR of the hop from Tx, measured by relay 1 at its setpoint. The relay derives the interference power from this
+    /// SIR.
     FirstHop {
         /// Signal-to-interference ratio (SIR), linear, above 0.
         sir: f32,
@@ -159,7 +160,7 @@ pub(super) struct SensorState {
     pub(super) transmitter: Average,
     /// Average of the interference power that Rx, on the ground, has reported to this relay.
     pub(super) receiver: Average,
-    /// True while this relay withholds its measurements, because they contradict those of the other nodes.
+    /// True while this relay withholds its measurements. They contradict the measurements of the other nodes.
     pub(super) off: bool,
     /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
     /// measurements.
@@ -169,7 +170,7 @@ pub(super) struct SensorState {
     /// State of the leader's search for a faulty sensor. The search leaves out the measurements of one relay after
     /// the other.
     pub(super) trial: Trial,
-    /// Ground stations (Tx, Rx) whose measurements contradict those of the relays. Known at the leader only.
+    /// Ground stations (Tx, Rx) whose measurements contradict the measurements of the relays. Known at the leader only.
     pub(super) ends: EndsOff,
     /// True if the last collected measurements contradict each other, but the faulty sensor was not found.
     pub(super) contradicted: bool,

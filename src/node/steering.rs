@@ -9,8 +9,8 @@ use crate::settings::Settings;
 use crate::side::Side;
 use crate::time::{Duration, Instant};
 
-/// Interval after which the fence messages to the neighbours are repeated, because they may be lost. A fence is the
-/// plane across x that keeps two neighbours apart.
+/// Time after which the relay repeats its fence messages to the neighbours: a message can be lost. A fence is the plane across x that keeps
+/// two neighbours apart.
 const REMINDER: Duration = Duration::from_millis(1_000);
 
 /// Setpoint control of one relay: moves the setpoint to the agreed position, if the guard permits it.
@@ -18,7 +18,7 @@ const REMINDER: Duration = Duration::from_millis(1_000);
 pub(crate) struct Steering {
     guard: Option<Guard>,
     remind_at: Option<Instant>,
-    /// Setpoint last reported to the firmware; `None` if there was no setpoint.
+    /// Setpoint last reported to the firmware; `None` if the relay had no setpoint then.
     reported_setpoint: Option<Placement>,
     /// Stepwise motion to a new agreed position; the array is empty without the feature `departures`.
     way: [Way; DEPARTURES as usize],
@@ -36,10 +36,10 @@ struct Motion {
     at: Instant,
 }
 
-/// Stepwise motion of the setpoint to a new agreed position. All relays of a chain thus arrive at the same time.
+/// Stepwise motion of the setpoint to a new agreed position. It takes the same time at all relays of a chain, so that they arrive together.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Agreed position at the last call, and the position to fly to now. The position to fly to approaches the agreed
+    /// Agreed position at the last call of `advance`. The next field, `wanted`, is the position to fly to now: it approaches the agreed
     /// position in steps.
     agreed: Option<Placement>,
     wanted: Option<Placement>,
@@ -54,8 +54,8 @@ impl Way {
         motion: None,
     };
 
-    /// Advances the position to fly to at `now`, and returns it; `None` without an agreed position. If the agreed
-    /// position `agreed` has changed, the position to fly to moves there in small steps within the time `span`.
+    /// Returns the position to fly to at `now`; `None` without an agreed position. If the agreed position `agreed` has changed, the
+    /// position to fly to moves there in 32 steps within the time `span`.
     fn advance(
         &mut self,
         now: Instant,
@@ -86,7 +86,7 @@ impl Way {
         self.wanted
     }
 
-    /// Moves the position to fly to by those steps of the current motion that are due at `now`.
+    /// Moves the position to fly to. It makes all steps of the current motion that are due at `now`.
     fn step(&mut self, now: Instant) {
         let (Some(motion), Some(to)) = (&mut self.motion, self.agreed) else {
             return;
@@ -129,7 +129,7 @@ impl Steering {
         way: [Way::NONE; DEPARTURES as usize],
     };
 
-    /// Creates the guard, if `settings` request one. `neighbours` are the node numbers on the two sides.
+    /// Creates the guard, if `settings` request a guard. `neighbours` are the node numbers on the two sides.
     #[inline(never)] // a guard is built on the stack
     pub(crate) fn begin(
         &mut self,
@@ -220,8 +220,8 @@ impl Steering {
         }
     }
 
-    /// Records at `now` if the drone follows the setpoints: yes if `flown` is true. Returns true if this is a change
-    /// for the guard.
+    /// Records at `now` that the drone follows the setpoints (`flown` is true) or does not (false). Returns true if this changes the state
+    /// of the guard.
     pub(crate) fn handle_control(&mut self, now: Instant, flown: bool) -> bool {
         let is_news = self.guard().is_some_and(|guard| guard.control(now, flown));
         if is_news {
@@ -252,9 +252,9 @@ impl Steering {
         }
     }
 
-    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air.
-    /// `others` is true if some relays of the view at this side are not lost. Until the guard has received such a
-    /// relay, it does not move the setpoint toward this side.
+    /// Removes the limits that lost relays at `side` put on the setpoint. The lost relays are no longer in the air. `others` is true if
+    /// some relays of the view at this side are not lost. Until the guard has received a message of one of these relays, it does not move
+    /// the setpoint toward this side.
     pub(crate) fn clear_lost(&mut self, side: Side, others: bool) {
         if let Some(guard) = self.guard() {
             guard.forget(side, others);
@@ -293,7 +293,7 @@ mod tests {
         Instant::ZERO + Duration::from_millis(ms)
     }
 
-    /// Checks that the motion ends in time although new agreements arrive faster than its duration.
+    /// Checks that the motion ends in time even if new agreements arrive before its end.
     #[test]
     fn frequent_agreements_do_not_put_off_the_arrival() {
         let span = Duration::from_millis(20_000);

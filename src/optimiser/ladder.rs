@@ -19,8 +19,8 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Target SIR at the lower end of the ladder's middle gap, linear. With 16 targets it is the eighth target. In a
-    /// ladder with a single target it is this target.
+    /// Lower one of the two middle targets, linear SIR: the eighth of 16 targets. In a ladder with a single target it
+    /// is this target.
     anchor: f32,
     /// Code of the relative width of the gap between the two middle targets. The width is the difference of the two
     /// targets divided by the lower target. The code is a float of 5 exponent and 3 mantissa bits. Code 0: `anchor`
@@ -29,8 +29,8 @@ pub struct Ladder {
     /// Code of the growth of the gaps between targets from the middle of the list to its ends. Each gap is 1 +
     /// `growth` / 16 times the next one toward the middle.
     growth: u8,
-    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of that x for the sake of the next relay on the pass.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
+    /// stay short of that x to help the next relay on the pass.
     plain: bool,
 }
 
@@ -53,7 +53,7 @@ impl Ladder {
     }
 
     /// Returns true for a plain pass, in which every relay takes the farthest x that meets the target. In any other
-    /// pass a relay may stay short of this x to help the next relay.
+    /// pass a relay is allowed to stay short of this x to help the next relay.
     pub const fn is_plain(&self) -> bool {
         self.plain
     }

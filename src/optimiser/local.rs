@@ -23,19 +23,19 @@ use crate::sir::{Sender, in_noise, square};
 /// Number of altitudes in one round of the coarse-to-fine search of Algorithm 2.
 const ROWS: u8 = 5;
 
-/// Number of rounds of the coarse-to-fine search; each halves the range of altitudes.
+/// Number of rounds of the coarse-to-fine search. Each round halves the range of altitudes.
 const ROUNDS: u8 = 9;
 
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
 /// Number of equal intervals of x on each side of the interferer. The search evaluates both hops at the ends of the
-/// intervals. Only for traffic in both directions.
+/// intervals. It is used only for traffic in both directions.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
 
-/// Method by which one relay searches its best position between its neighbours (Algorithm 2).
+/// Method by which one relay searches for its best position between its neighbours (Algorithm 2).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Local {
@@ -52,7 +52,7 @@ pub enum Local {
     },
 }
 
-/// Neighbour of the relay that searches its best position, as an end of one of the relay's two hops.
+/// Neighbour of the relay that searches for its best position: an end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
@@ -63,8 +63,8 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Hops of a relay: from the node toward Tx to the relay, and from the relay to the node toward Rx. The relay may be
-/// anywhere.
+/// Hops of a relay: from the node toward Tx to the relay, and from the relay to the node toward Rx. The relay can be at
+/// any position.
 ///
 /// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from
 /// the node toward Tx are A q / l, with the gain A, and backward `returned` / l. The SIRs of the hop to the node
@@ -300,9 +300,8 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude in the range that the current round tries, m. `part` is the altitude's place in this
-    /// range: 0 is the lowest altitude, 1 the highest. The result never exceeds the highest altitude, in spite of
-    /// rounding.
+    /// Returns an altitude in the range that the current round tries, m. `part` 0 is the lowest altitude of the range,
+    /// 1 the highest. The result never exceeds the highest altitude, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -365,9 +364,9 @@ impl LocalSearch {
 
     /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
     ///
-    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where
-    /// the SIRs of both hops are equal may be narrower than the spacing, so the first two x with equal SIRs are
-    /// searched by bisection.
+    /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where the
+    /// SIRs of both hops are equal can be narrower than the spacing, so the first two x with equal SIRs are searched by
+    /// bisection.
     fn peak(&mut self, altitude_m: f32, low: f32, high: f32) -> f32 {
         let mut step = (high - low) / f32::from(SAMPLES);
         if !(step > 0.0) {

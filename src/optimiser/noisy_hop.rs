@@ -84,8 +84,8 @@ pub(super) struct NoisyHop {
 }
 
 impl NoisyHop {
-    /// Returns the maximum hop length along x, m, at which the SNR alone meets the target, at most 1e9. `None` if
-    /// there is none.
+    /// Returns the maximum hop length along x, m, at which the SNR alone meets the target, at most 1e9. `None` if the
+    /// SNR is too low at every length.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -97,9 +97,9 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error. g, m^2, is
-    /// at least 0 if the hop meets its target SIR. `d` is along x, m, at most the length at which the noise alone
-    /// prevents that the target is met.
+    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error. g, m^2, is at
+    /// least 0 if the hop meets its target SIR. `d` is along x, m. It must be short enough that the noise alone does
+    /// not make the hop miss the target.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -231,9 +231,9 @@ pub(super) fn before(x_m: f32, d: f32) -> f32 {
     }
 }
 
-/// Returns the shortest length from `least` to `most`, m, at which `hop` meets its target, or `None`.
+/// Returns the shortest length from `least` to `most`, m, at which `hop` meets its target.
 ///
-/// The hop must not meet the target at `least`.
+/// `None` if there is no such length. The hop must not meet the target at `least`.
 pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     if !(hop.ratio <= MOST_RATIO) {
         return None;
@@ -250,8 +250,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the length, m, from which a hop without noise meets its target as it gets longer. `None` if there is no
-/// such length; the length may be negative. The hop's margin to its target is 0 there, and rises.
+/// Returns the length, m, from which on longer hops without noise meet the target. The hop's margin to its target is 0
+/// at this length, and rises with the length. `None` if there is no such length; the length can be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -275,7 +275,7 @@ mod tests {
     use crate::features::NOISE;
 
     /// Returns the smallest hop length at which `hop` meets its target, m, by trial in fine steps. The test compares
-    /// [`closest`] with it.
+    /// the result of [`closest`] with this length.
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)

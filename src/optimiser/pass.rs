@@ -27,11 +27,12 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Only with data in both
-/// directions.
+/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Used only with data in
+/// both directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of points of an interference field that one call evaluates. One target may need more.
+/// Maximum number of points of an interference field that one call evaluates. The evaluation of one target is completed
+/// even if it needs more points.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay of a pass along the chain, as its message describes it.
@@ -46,7 +47,7 @@ pub struct Behind {
 }
 
 impl Behind {
-    /// Returns a previous relay with this altitude and power, above the line, without a measurement.
+    /// Returns a previous relay with this altitude and power, lateral offset 0, and no measurement.
     pub(super) const fn of(profile: Profile) -> Self {
         Self {
             relay: profile.on_line(),
@@ -62,18 +63,18 @@ pub struct Link<'a> {
     pub mission: &'a Mission,
     /// Previous relay of the pass; `None` for the first relay, which is next to Tx or Rx.
     pub behind: Option<Behind>,
-    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the one next to Rx.
+    /// Index of the relay in the chain: 1 for the relay next to Tx, N for the relay next to Rx.
     pub index: u16,
     /// Lateral offset, altitude and transmit power of this relay.
     pub own: Station,
     /// Upsilon, the mean inverse interference power, measured by the relay, 1/W. `None` to use the mission's
     /// interference field.
     pub measured_per_w: Option<f32>,
-    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay may stay short
-    /// of that x for the sake of the next relay on the pass.
+    /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
+    /// stay short of that x to help the next relay on the pass.
     pub plain: bool,
-    /// Maximum x of the relay, m, with enough space for the separation of the relays toward Rx. Only the joint method
-    /// computes it; `None` with other methods. Not used in an interference field.
+    /// Maximum x of the relay, m. It leaves the relays toward Rx enough space for their separation. Only the joint
+    /// method computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
     /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets at this x. `None` unless
     /// the mission has fitted slots (time slots as long as each hop needs).
@@ -86,7 +87,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x at which a pass starts: that of Tx, or of Rx in an interference field, m.
+/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx in an interference field.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -224,8 +225,8 @@ impl<'a> Link<'a> {
 
     /// Returns the maximum x of the previous relay in a pass toward Tx, m.
     ///
-    /// No separation in x is reserved for the relays toward Rx, since relays may be above each other if their
-    /// altitudes allow that.
+    /// No separation in x is reserved for the relays toward Rx, because relays at different altitudes can be above each
+    /// other.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
@@ -306,8 +307,9 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x at which this relay receives the previous relay of the pass, m. The result is at most `most_m`. The previous
-    /// relay may be anywhere up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x at which this relay receives the previous relay of the pass, m. The result is at most
+    /// `most_m`. The previous relay is allowed to take any x up to `from_m`, its farthest x. `None` if there is no such
+    /// x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -316,8 +318,8 @@ impl<'a> Link<'a> {
     }
 
     /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to
-    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach`
-    /// if its SIR from Rx would be too low at `reach`.
+    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. If the SIR from Rx would be too low
+    /// at `reach`, the relay stays short of `reach`.
     fn held(
         &self,
         hop: &FromRx,
@@ -351,8 +353,8 @@ impl<'a> Link<'a> {
     /// Returns the x that the previous relay of the pass must take to meet `target`. This relay is at x = `place`.
     ///
     /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
-    /// position. The search assumes that its possible positions are an interval, although there may be holes. Bounded
-    /// by two reaches, in an interference field by three for each of its points.
+    /// position. The search assumes that the possible positions of the previous relay are one interval, although this
+    /// interval can have gaps. Bounded by two reaches, in an interference field by three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -471,8 +473,8 @@ impl Verdict {
 }
 
 /// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different
-/// altitudes, a lower target may be missed; it counts all the same.
+/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different altitudes,
+/// some lower targets can be missed. They count all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -531,8 +533,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. The index 0
-    /// belongs to no relay. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. No relay has
+    /// the index 0. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -551,8 +553,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         None
     }
 
-    /// Returns the reach of relay `index`, m; for the index `None` the x at which the pass starts. `None` if a hop
-    /// cannot meet the target.
+    /// Returns the reach of relay `index`, m. If `index` is `None`, it returns the x at which the pass starts. The
+    /// result is `None` if a hop cannot meet the target.
     fn reach(&self, index: Option<u16>) -> Option<f32> {
         let Some(index) = index else {
             return Some(origin(self.mission));
@@ -561,8 +563,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. The index 0 belongs
-    /// to no relay: with it the result only tells, by `Some` or `None`, if all relays can.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. No relay has the
+    /// index 0. With index 0 the result is `Some` if all relays can take their required positions, else `None`.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

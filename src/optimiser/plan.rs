@@ -126,7 +126,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// Some relays may have to stay short of their farthest position; their positions are then checked as in [`place`].
+/// If some relays have to stay short of their farthest position, the positions are checked as in [`place`].
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

@@ -63,8 +63,8 @@ const ROUNDING: f32 = 4e-6;
 /// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, whose receiver is at a known position. A pass toward Tx computes the
-/// sender's x from it, for many targets.
+/// Hop toward Rx in an interference field, whose receiver is at a known position. In a pass toward Tx, a relay computes
+/// from this hop the sender's x for many targets.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
     /// Gain A of the hop, m^2. The SIR of the hop is A times `quiet`, divided by the squared length. Upsilon = E[1/I]
@@ -74,7 +74,7 @@ pub struct Retreat<'a> {
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
     least_step: f32,
-    /// Smallest x that the sender of this hop may take, m from Tx.
+    /// Smallest permitted x of this hop's sender, m from Tx.
     end_m: f32,
     to_rx: bool,
     /// Backward hop from the receiver to the sender: its gain, and the interference at the sender. `None` for data in
@@ -135,8 +135,8 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender that may be at any x down to Tx. No separation is reserved for the relays
-    /// between `index` and Tx.
+    /// Returns this hop with a sender at any x down to Tx. No separation is reserved for the relays between `index` and
+    /// Tx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -284,8 +284,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is the longest hop for data
-    /// toward Rx only.
+    /// Returns the longest hop, as [`Retreat::longest`] does, but for data in both directions. `there` is the longest
+    /// hop for data toward Rx only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,
@@ -334,8 +334,8 @@ impl<'a> Retreat<'a> {
     /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the receiver's Upsilon divided by
     /// the field's largest Upsilon.
     ///
-    /// Without `best_m` only the traffic toward Rx counts. With `best_m` both directions count; the sender's x has to
-    /// be smaller than `best_m`, and is then stored there.
+    /// Without `best_m` only the traffic toward Rx counts. With `best_m` both directions count. The sender's x then has
+    /// to be smaller than `best_m`, and replaces `best_m`.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -364,7 +364,8 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the receiver's x, m, of the hops that just meet the target in both directions; at most two.
+    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions. There are at most
+    /// two such hops.
     ///
     /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
     /// backward gain, each divided by the target.
@@ -421,9 +422,9 @@ pub enum HopInterference<'a> {
 }
 
 impl<'a> HopInterference<'a> {
-    /// Returns the interference at a receiver. It is the receiver's measurement if there is one, otherwise the
-    /// mission's field. `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both
-    /// measurement and field include the receiver noise.
+    /// Returns the interference at a receiver: its measurement if there is one, else the mission's field.
+    /// `measured_per_w` is Upsilon, the measured mean inverse interference power, in 1/W. Both measurement and field
+    /// include the receiver noise.
     pub fn new(mission: &'a Mission, measured_per_w: Option<f32>) -> Self {
         match (mission.heard(), measured_per_w) {
             (Some(field), Some(upsilon)) => Self::Evenly(upsilon / field.largest()),
@@ -472,7 +473,7 @@ struct Piece {
     start_m: f32,
     /// Largest x of this part of the interference field, m.
     end_m: f32,
-    /// Upsilon at the part's smallest x, as a fraction of the field's largest. Upsilon is the mean inverse
+    /// Upsilon at the smallest x of this part, divided by the field's largest Upsilon. Upsilon is the mean inverse
     /// interference power.
     level: f32,
     /// Change of `level` per metre of x.
@@ -484,7 +485,7 @@ struct Piece {
 ///
 /// `value` returns the sender's x for the receiver's x, y, and for `quiet`, which is Upsilon = E[1/I] at y divided by
 /// the field's largest Upsilon. This sender's x is y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the
-/// target, and s is the first of `squares`. It is `None` if the square under the root is below the second of
+/// target, and s is the first of `squares`. `value` returns `None` if the square under the root is below the second of
 /// `squares` minus the first. Work: at most three values for each field point from `low` to `high` that a hop could
 /// reach.
 pub(super) fn least(

@@ -97,8 +97,8 @@ impl Back {
         })
     }
 
-    /// Returns the squared maximum length of a backward hop times the forward target SIR, m^2. The receiver of the
-    /// backward hop is at `x_m`.
+    /// Returns the squared maximum length of a backward hop, multiplied by the forward target SIR, m^2. The receiver of the backward hop is
+    /// at `x_m`.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;

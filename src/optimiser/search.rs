@@ -34,8 +34,8 @@ pub enum Schedule {
     /// A single target per pass along the chain, falling in equal steps, as in the paper. The first target is the
     /// upper bound.
     FixedStep {
-        /// Step epsilon between two targets, linear SIR, above 0. In f64, because it is subtracted up to ten thousand
-        /// times from one start.
+        /// Step epsilon between two targets, linear SIR, above 0. The type is f64, because the step is subtracted up to
+        /// ten thousand times from the first target.
         step: f64,
     },
 }
@@ -62,9 +62,9 @@ const DEPTH: f32 = 1e-12;
 /// difference is the gap between two targets.
 const BEND: f32 = 0.25;
 
-/// Width of the bracket after a pass, divided by its width before; above this ratio the pass stalls. The bracket is
-/// the interval that contains the best target. After such a pass the next targets are spread evenly over the bracket,
-/// and not around an interpolated optimum.
+/// Maximum ratio of the bracket's width after a pass to its width before the pass. The bracket is the interval that
+/// contains the best target. With a larger ratio the next targets are spread evenly over the bracket, and not around an
+/// interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -91,7 +91,7 @@ pub struct Search {
     /// has only such passes. Plain passes are also used after a relay has refused a target. A relay refuses a target
     /// if it cannot take the x that the next relay requires.
     plain: bool,
-    /// Lowest target SIR known to be infeasible for every chain; `None` if unknown.
+    /// Lowest target SIR known to be infeasible for every chain; `None` if no such target is known.
     most: Option<f32>,
     /// Bisection for a target that all relays accept. `None` until a relay has refused a target, because it cannot
     /// take its required position.
@@ -101,8 +101,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Creates a search by the leader of `mission` with the profile `leader`. Other relays may have profiles of their
-    /// own.
+    /// Creates a search by the leader of `mission` with the profile `leader`. The other relays can have other profiles.
     ///
     /// # Errors
     /// [`Infeasible`] if a relay right above the receiver gives the receiver an SIR of 0, because the interferer is

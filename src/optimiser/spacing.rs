@@ -93,7 +93,7 @@ pub struct Hop {
     least_step: f32,
     /// True if the sender is Tx, which cannot move closer to the receiver.
     from_tx: bool,
-    /// Largest x that the receiver of this hop may take, m from Tx.
+    /// Largest permitted x of this hop's receiver, m from Tx.
     end_m: f32,
     /// Maximum x of the receiver and of the sender, m. With these x the relays nearer to Rx have room for their
     /// minimum separation.
@@ -174,8 +174,8 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver that may be at any x up to Rx. No separation is reserved for the relays
-    /// between `index` and Rx.
+    /// Returns this hop with a receiver at any x up to Rx. No separation is reserved for the relays between `index` and
+    /// Rx.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -474,7 +474,7 @@ impl Hop {
     }
 }
 
-/// Relative rounding error by which a hop's SIR may be below its target when a position is checked.
+/// Relative tolerance of a hop's SIR for rounding errors, when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
 /// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the rounded value equals `from_m`, because two
@@ -496,10 +496,10 @@ fn rounded(from_m: f32, d: f32) -> Option<f32> {
 
 /// Returns the paper's `d_max`, m: the largest distance along x at which a relay meets `target` at Rx.
 ///
-/// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared
-/// distance), gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above
-/// the receiver is too weak. The distance may exceed that from Tx to Rx, so that it is a smooth function of the
-/// target, which the root search needs.
+/// It is sqrt(K / gamma - y^2 - h^2), at most 1e9. K is the factor of the last hop (SIR at Rx times squared distance),
+/// gamma is `target`, y the relay's lateral offset and h its altitude. `None` if even a relay right above the receiver
+/// is too weak. The result can exceed the distance from Tx to Rx. So it is a smooth function of the target, as the root
+/// search requires.
 pub fn receiver_reach(mission: &Mission, relay: Station, target: f32) -> Option<f32> {
     let across = square(relay.cross_section.y_m) + square(relay.cross_section.altitude_m);
     let squared = mission.receiver_gain(relay.power_w) / target - across;
@@ -580,9 +580,9 @@ mod tests {
         )
     }
 
-    /// Checks the maximum length of a first hop whose SIR rises up to a length of 45 m, and then falls. The
-    /// interferer is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22. The target is met only in an
-    /// interval of lengths, which may be beyond the end of the hop's range.
+    /// Checks the maximum length of a first hop whose SIR rises up to a length of 45 m, and then falls. The interferer
+    /// is 10 m behind Tx, so the SIR rises from 1.04 above Tx to 1.22. The target is met only in an interval of
+    /// lengths. In some of the cases this interval is beyond the end of the hop's range.
     #[test]
     fn a_stretch_that_meets_the_target_is_found_or_not_by_where_the_link_ends() {
         // SIR_1 is at least 1.22 from 40.9 m to 50 m.

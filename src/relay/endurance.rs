@@ -11,54 +11,60 @@ use crate::settings::Settings;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
 
-/// Age at which the last value is too old.
+/// Age from which the last endurance value counts as too old.
 const STALE: Duration = Duration::from_millis(10_000);
-/// Maximum time between two comparisons of the margin with the limit.
+/// Maximum time between two comparisons of the margin with its limit. The margin is the drone's remaining flight time minus the time of the
+/// way home.
 const REVIEW: Duration = Duration::from_millis(1_000);
-/// Time for which a condition must hold.
+/// Time for which a condition must hold before it causes an action.
 const HOLD: Duration = Duration::from_millis(15_000);
-/// Hysteresis, difference of two values that agree, and change of a request that the leader is told.
+/// Hysteresis of the margin. Also the maximum difference of two endurance values that agree, and the minimum change of a request that is
+/// sent to the leader.
 const STEP: Duration = Duration::from_millis(30_000);
-/// Time between two `EnduranceUnknown`, and between two `AtReserve`.
+/// Minimum time between two events `EnduranceUnknown`, and between two events `AtReserve`.
 const AGAIN: Duration = Duration::from_millis(60_000);
-/// Usual time of a replacement, in units of `dead_after`.
+/// Usual duration of the replacement of a drone, in units of `dead_after`.
 ///
-/// It is 8 until the order, and 4 until the view without the relay is in place.
+/// It takes 8 units until the leader's order to leave, and 4 more until the relays of the view without this relay are in place.
 const REPLACEMENT: u32 = 12;
-/// Maximum time of a replacement.
+/// Maximum duration of the replacement of a drone that the limit of the margin includes.
 const LONGEST: Duration = Duration::from_millis(240_000);
-/// Maximum time between two pilots of relays of equal endurance who are told to leave.
+/// Maximum interval at which the pilots of drones with equal endurance are told to leave, one by one.
 const APART: Duration = Duration::from_millis(10_000);
-/// Maximum remaining time and way home, s. A longer one is unknown: it is no multicopter's.
+/// Maximum valid flight time and way home, s. A larger value counts as unknown, because no multicopter flies longer.
 const MAX_S: f32 = 21_600.0;
 
 #[expect(clippy::struct_excessive_bools, reason = "independent of each other")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Endurance {
-    /// Reserve beyond the way home; `None` if the relay does not leave by itself.
+    /// Flight time to keep beyond the way home; `None` if the relay does not request to leave by itself.
     reserve: Option<Duration>,
-    /// Last known end of the flight, and the time of the way home; `None` before a valid value.
+    /// End of the flight and time of the way home, by the last valid value; `None` before a valid value.
     end: Option<(Instant, Duration)>,
-    /// Time of the last valid value.
+    /// Time at which the relay received the last valid value.
     sampled_at: Instant,
-    /// Last end that agreed with the value before it; 0 for none since a pause of [`STALE`].
+    /// Last end of the flight that agreed with the previous value, within [`STEP`]. 0 if no value has agreed since the last pause of 10 s.
     confirmed: Instant,
-    /// True from the loss of the endurance to the next valid value.
+    /// True from the time at which the endurance becomes unknown to the next valid value.
     is_lost: bool,
     losses: u32,
-    /// Times of the last `EnduranceUnknown` and `AtReserve`; 0 before.
+    /// Times of the last events `EnduranceUnknown` and `AtReserve`; 0 before the first event.
     raised_at: [Instant; 2],
-    /// Limit of the margin since `Relay::stay`; `None` for the usual one.
+    /// Limit of the margin that `Relay::stay` has set; `None` to use the usual limit.
     limit: Option<Instant>,
-    /// Start times of four conditions, or 0: change due, floor reached, leader to be told, floor left.
+    /// Times since which four conditions hold; 0 for a condition that does not hold. The conditions are: the relay has to request to leave
+    /// or withdraw its request; the margin is at the floor; the leader has to receive a changed request; the margin is clearly above the
+    /// floor.
     since: [Instant; 4],
-    /// True if the request to leave is this module's.
+    /// True if this module has made the request to leave; false if the firmware has made it.
     is_own: bool,
-    /// True from a margin at or below the floor until it is [`STEP`] above the floor.
+    /// True from a margin at or below the floor until the margin is [`STEP`] above the floor. The floor is the margin at which `AtReserve`
+    /// is raised.
     is_spent: bool,
-    /// True from a landing at the reserve, or with a request, until that is over.
+    /// True after a landing at the reserve, or with a request of this module to leave. False again once there is no request, or the margin
+    /// is [`STEP`] above the floor.
     keeps_out: bool,
-    /// Time of the floor, as the leader was told.
+    /// Time at which only the way home and the reserve will be left, as last sent to the leader.
     floor_at: Instant,
     reviewed_at: Instant,
 }
@@ -70,7 +76,8 @@ impl Endurance {
         usual.since(Instant::ZERO).min(LONGEST)
     }
 
-    /// Returns the margin below which the relay requests to leave; `None` without a reserve.
+    /// Returns the margin below which the relay requests to leave; `None` without a reserve. The margin, a time from 0, is the remaining
+    /// flight time minus the time of the way home.
     fn limit(&self, settings: &Settings) -> Option<Instant> {
         let usual = Instant::ZERO + self.reserve? + Self::replacement(settings);
         Some(self.limit.map_or(usual, |lower| lower.min(usual)))
@@ -86,7 +93,8 @@ impl Endurance {
         now.since(self.sampled_at) >= STALE
     }
 
-    /// Returns the margin as a time from zero, to which durations are added.
+    /// Returns the margin as a time from 0, so that durations can be added; `None` before a valid value. The margin is the remaining flight
+    /// time minus the time of the way home.
     fn margin(&self, now: Instant) -> Option<Instant> {
         let (end, home) = self.end?;
         let is_confirmed = self.is_old(now) && self.confirmed > Instant::ZERO;
@@ -94,7 +102,7 @@ impl Endurance {
         Some(Instant::ZERO + end.since(now + home))
     }
 
-    /// Makes the endurance unknown, and reports that.
+    /// Records that the endurance is unknown, and counts this. With a reserve it also raises the event `EnduranceUnknown`.
     fn lose(&mut self, now: Instant, node: &mut Node) {
         if !core::mem::replace(&mut self.is_lost, true) {
             bump(&mut self.losses);
@@ -104,7 +112,7 @@ impl Endurance {
         }
     }
 
-    /// Raises an event whose last time is `which`, at most once per [`AGAIN`].
+    /// Raises `event`, at most once per minute ([`AGAIN`]). `which` is the index of the event's last time.
     fn raise(&mut self, now: Instant, node: &mut Node, which: usize, event: Event) {
         if let Some(last) = self.raised_at.get_mut(which)
             && (*last == Instant::ZERO || now.since(*last) >= AGAIN)
@@ -114,9 +122,10 @@ impl Endurance {
         }
     }
 
-    /// Updates the time `which` since which a condition holds. Returns true once it decides.
+    /// Records if the condition with the index `which` holds (`is_true`). Returns true once it decides: it must hold for 15 s.
     ///
-    /// A single value decides only if it `is_low`, and after [`STALE`].
+    /// A single endurance value is not enough: another value must agree with it, or a value must be received after the condition began.
+    /// There is one exception: a single value decides if `is_low` is true, once this value is [`STALE`].
     fn holds(&mut self, now: Instant, which: usize, is_true: bool, is_low: bool) -> bool {
         let is_sure =
             self.end.is_some_and(|(end, _)| end == self.confirmed) || is_low && self.is_old(now);
@@ -128,7 +137,7 @@ impl Endurance {
         is_true && now.since(at) >= HOLD && (is_sure || at < self.sampled_at)
     }
 
-    /// Compares the margin with the limit and the floor, and requests to leave or withdraws that.
+    /// Compares the margin with the limit and the floor. Requests to leave, or withdraws this request.
     fn review(&mut self, now: Instant, node: &mut Node) {
         if self.end.is_some() && self.is_old(now) {
             self.lose(now, node);
@@ -196,7 +205,7 @@ fn duration(seconds: f32) -> Option<Duration> {
         .then(|| Duration::from_millis((seconds * 1e3) as u64))
 }
 
-/// Returns a duration in whole seconds, at most 65 534: the maximum is the mark of an unknown one.
+/// Returns a duration in whole seconds, at most 65 534, because 65 535 stands for an unknown duration.
 fn seconds(span: Duration) -> u16 {
     u16::try_from(span.as_micros() / 1_000_000).map_or(u16::MAX - 1, |s| s.min(u16::MAX - 1))
 }
@@ -204,10 +213,11 @@ fn seconds(span: Duration) -> u16 {
 impl Relay {
     /// Records the drone's remaining time of flight and the time of its way home, s, 0 to 21 600.
     ///
-    /// Needs the feature `departures`. Any other value, such as NaN for an unknown one, and a pause of 10 s make the endurance unknown.
+    /// Needs the feature `departures`. The endurance is unknown after another value, such as NaN, and after 10 s without a call.
     ///
-    /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay calls [`leave`](Self::leave) by itself below [`endurance_limit_s`](Self::endurance_limit_s).
-    /// The rules are in [`docs::batteries`](crate::docs::batteries). Takes constant time.
+    /// With a reserve ([`set_reserve`](Self::set_reserve)) the relay requests to leave by itself below
+    /// [`endurance_limit_s`](Self::endurance_limit_s), as with [`leave`](Self::leave). The rules are in
+    /// [`docs::batteries`](crate::docs::batteries). Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -242,7 +252,8 @@ impl Relay {
         endurance.review(now, &mut self.node);
     }
 
-    /// Sets the reserve beyond the way home and the time of a replacement. With `None`, as at first, the relay does not leave by itself.
+    /// Sets the reserve: the flight time to keep beyond the way home and the time of a replacement. With `None`, the initial value, the
+    /// relay does not request to leave by itself.
     pub fn set_reserve(&mut self, reserve: Option<Duration>) {
         if let Some(endurance) = self.endurance.first_mut() {
             endurance.reserve = reserve;
@@ -254,9 +265,10 @@ impl Relay {
         self.endurance.first()?.known(self.clock.internal(now))
     }
 
-    /// Returns the endurance below which the relay requests to leave, s.
+    /// Returns the remaining flight time below which the relay requests to leave, s.
     ///
-    /// `None` without a reserve, and before a valid value. It is the way home and the limit of [`docs::batteries`](crate::docs::batteries).
+    /// It is the time of the way home plus the limit in [`docs::batteries`](crate::docs::batteries). `None` without a reserve, and before a
+    /// valid value.
     pub fn endurance_limit_s(&self) -> Option<u16> {
         let endurance = self.endurance.first()?;
         let limit = endurance.limit(&self.node.member().settings)?;
@@ -277,7 +289,8 @@ impl Relay {
 
     /// Returns true if the pilot has to fly the drone home now.
     ///
-    /// The drone may leave, or the relay has requested that and only the way home and the reserve are left. Takes constant time.
+    /// This is so if the relay has requested to leave, and either the chain allows the drone to leave ([`Event::MayLeave`]), or only the
+    /// way home and the reserve are left. Takes constant time.
     pub fn must_leave(&self) -> bool {
         let leaves = self.node.leaves();
         leaves.is_some_and(|is_free| is_free || self.is_at_reserve())
@@ -288,7 +301,7 @@ impl Relay {
         self.endurance.first().is_some_and(|it| it.is_spent)
     }
 
-    /// Forgets the endurance of a drone on the ground. A departure goes on.
+    /// Forgets the endurance of a drone that is on the ground. A departure in progress continues.
     pub(crate) fn reset_endurance(&mut self) {
         let keeps_out = self.leaves_by_endurance() || self.is_at_reserve();
         self.endurance = self.endurance.map(|it| Endurance {
@@ -304,7 +317,8 @@ impl Relay {
         }
     }
 
-    /// Records an order of the firmware. After `stay` the limit is at most half of the present margin.
+    /// Records that the firmware has called `stay` (`stays` is true) or `leave`. After `stay` the limit of the margin is at most half of
+    /// the present margin.
     pub(super) fn override_endurance(&mut self, now: Instant, stays: bool) {
         if let Some(endurance) = self.endurance.first_mut() {
             let limit = endurance.limit(&self.node.member().settings);
@@ -316,7 +330,8 @@ impl Relay {
         }
     }
 
-    /// Compares the margin of the endurance with its limit. Reports an unknown endurance of a drone that is `flown`.
+    /// Compares the margin of the endurance with its limit. While the drone follows the setpoints (`flown`), it also reports an unknown
+    /// endurance.
     pub(super) fn review_endurance(&mut self, now: Instant, flown: bool) {
         if let Some(endurance) = self.endurance.first_mut() {
             if flown && endurance.known(now).is_none() {
@@ -326,7 +341,7 @@ impl Relay {
         }
     }
 
-    /// Returns the time of the next comparison of margin and limit; `None` if none is due.
+    /// Returns the time of the next comparison of margin and limit. `None` without a reserve, and before a valid value.
     pub(super) fn endurance_timeout(&self) -> Option<Instant> {
         let endurance = self.endurance.first()?;
         let is_compared = endurance.reserve.is_some() && endurance.end.is_some();

@@ -34,19 +34,22 @@ use crate::wire::upload::{Upload, UploadError};
 /// # Contract
 /// - *Inputs*: [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) accept anything, never fail
 ///   and do a bounded amount of work; [`stats`](Self::stats) counts invalid input.
-/// - *Time* is an argument; the relay never reads a clock. Use a monotonic clock. After a backward step, timers and the lease
-///   continue as if no time had passed between the two calls; after a forward step they expire. A forward step while a part of
-///   the chain is out of reach ends the wait for that part's leases early: two chains may then fly until these have expired.
+/// - *Time* is an argument; the relay never reads a clock. Use a monotonic clock. After a backward step, timers and the
+///   lease continue as if no time had passed between the two calls; after a forward step they expire. While a part of
+///   the chain is out of reach, the other relays wait until the leases of that part have expired. A forward step ends
+///   this wait early: until the leases have expired, two chains can then fly.
 /// - *Getters* take constant time and return values of the last agreement. Positions are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
-/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store
-///   what [`unpersisted`](Self::unpersisted) returns, call [`poll_transmit`](Self::poll_transmit) until it returns `None`, then [`poll_event`](Self::poll_event) until `None`,
-///   then sleep until [`poll_timeout`](Self::poll_timeout) or the next byte.
+/// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store the record that
+///   [`unpersisted`](Self::unpersisted) returns, call [`poll_transmit`](Self::poll_transmit) until it returns `None`,
+///   then [`poll_event`](Self::poll_event) until it returns `None`, then sleep until
+///   [`poll_timeout`](Self::poll_timeout) or the next byte.
 /// - After that, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
-/// - *Setpoints* are finite, within [0, D] along the line, at the relay's altitude or one of the mission's band, and at least
-///   the mission's separation from the neighbours' setpoints of the same pass. There is none before the first agreement. Only
-///   a new agreement or the relay's own turn in Algorithm 2 changes it. A new mission keeps it until the chain has agreed in
-///   that mission, even outside the new limits; a mission between other sites removes it until then.
+/// - *Setpoints* are finite, within [0, D] along the line, at the relay's altitude or at an altitude in the mission's
+///   band, and at least the mission's separation from the neighbours' setpoints of the same pass. There is no setpoint
+///   before the first agreement. Only a new agreement or the relay's own move in Algorithm 2 changes the setpoint.
+///   After a new mission the setpoint stays until the chain has agreed in that mission, even outside of the new limits;
+///   if Tx or Rx have moved, there is no setpoint until then.
 ///
 /// ```
 /// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
@@ -87,7 +90,7 @@ pub struct Relay {
     /// downstream port.
     deframers: [Deframer; 2],
     pub(super) clock: MonotonicClock,
-    /// Endurance of the drone. Empty without the feature `departures`.
+    /// Endurance of the drone. The array is empty without the feature `departures`.
     pub(super) endurance: [Endurance; DEPARTURES as usize],
 }
 
@@ -117,7 +120,7 @@ impl Relay {
         Ok(relay)
     }
 
-    /// Creates a relay as [`new`](Self::new) does, but directly in `slot`, so that it takes no stack.
+    /// Creates a relay as [`new`](Self::new) does, but directly in `slot`, without use of the stack.
     ///
     /// # Errors
     /// Returns the errors of [`new`](Self::new); `slot` is then unchanged.
@@ -230,8 +233,8 @@ impl Relay {
         self.review_endurance(now, false);
     }
 
-    /// Restarts the placement method from its beginning. Better positions can result once the relays have measured
-    /// the interference at the present ones.
+    /// Restarts the placement method from its beginning. Better positions can result once the relays have measured the
+    /// interference at the present positions.
     ///
     /// Only the leader restarts; at other relays the call has no effect. The leader is relay 1, or relay N in a
     /// mission with an interference field.
@@ -251,10 +254,10 @@ impl Relay {
 
     /// Writes the next frame to send into `frame`, and returns its port and length. Call it until it returns `None`.
     ///
-    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted); the pending frames follow once it
-    /// is.
+    /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted). Once it is stored, the pending frames
+    /// follow.
     ///
-    /// The work is linear in the frame's length, plus a tag if frames are signed.
+    /// The work is linear in the frame's length. A signed frame also needs the computation of a tag.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -311,8 +314,8 @@ impl Relay {
         self.node.poll_event()
     }
 
-    /// Returns the latest time for the next call of [`Relay::handle_timeout`]; `None` if no timer runs. After that
-    /// call the time is later than `now`, or `None`.
+    /// Returns the latest time for the next call of [`Relay::handle_timeout`]; `None` if no timer runs. Right after a
+    /// call of `handle_timeout` the result is later than that call's `now`, or `None`.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -354,8 +357,7 @@ impl Relay {
 
     /// Returns the current votes on views (acceptor state), whether they are stored or not.
     ///
-    /// A firmware may store them at the start, so that a fault of the storage shows before flight. Takes constant
-    /// time.
+    /// A firmware can store them at the start, so that a fault of the storage shows before flight. Takes constant time.
     pub const fn view_record(&self) -> ViewRecord {
         self.node.view_record()
     }
@@ -382,7 +384,7 @@ impl Relay {
 
     /// Restores the votes on views that were stored before the relay was switched off in flight.
     ///
-    /// Call it right after the relay was created; only `Relay::resume` may come before. Takes constant time.
+    /// Call it right after the relay was created; only `Relay::resume` is allowed before. Takes constant time.
     ///
     /// # Errors
     /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and
@@ -398,8 +400,8 @@ impl Relay {
     /// Restores `upload`, the newest uploaded mission stored before the relay was switched off. The firmware stored
     /// it on [`Event::Uploaded`](crate::Event::Uploaded).
     ///
-    /// Call it right after the relay was created, before any other input. [`Relay::new`] still takes the mission that
-    /// was loaded before flight. Takes constant time.
+    /// Call it right after the relay was created, before any other input. Pass the mission that was loaded before
+    /// flight to [`Relay::new`], as without an upload. Takes constant time.
     ///
     /// # Errors
     /// Returns [`UploadError::Base`] if the upload replaces another loaded mission, [`UploadError::Line`] if it does
@@ -413,9 +415,9 @@ impl Relay {
     /// adopts it like any other upload. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if it replaces another
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if the upload replaces another
     /// loaded mission, [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the geofence, and
-    /// [`UploadError::Old`] if the relay has stored a mission that is as new.
+    /// [`UploadError::Old`] if the relay has already stored this mission or a newer one.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }
@@ -425,7 +427,7 @@ impl Relay {
         self.node.upload()
     }
 
-    /// Returns the version of the active mission; 0 for the one that was loaded before flight.
+    /// Returns the version of the active mission; 0 for the mission that was loaded before flight.
     pub fn version(&self) -> u16 {
         self.node.member().active.version
     }
@@ -434,8 +436,8 @@ impl Relay {
 impl Relay {
     /// Returns the current setpoint in metres in the mission's frame; `None` before the first agreement.
     ///
-    /// It is the agreed position. With `Settings::guard` (collision avoidance) it is the closest safe position to
-    /// that.
+    /// Without a guard it is the agreed position. With `Settings::guard` (collision avoidance) it is the safe position
+    /// closest to the agreed position.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -585,10 +587,10 @@ impl Relay {
         &self.node.member().mission
     }
 
-    /// Returns the positions of Tx and Rx in the active mission; `None` if the configured ones apply.
+    /// Returns the positions of Tx and Rx in the active mission; `None` if the configured positions apply.
     ///
-    /// All positions of relays are measured along the line between them. Once they change, convert positions to
-    /// latitude and longitude by the new ones.
+    /// All positions of relays are measured along the line from Tx to Rx. After a change of Tx or Rx, use the new line
+    /// to convert positions to latitude and longitude.
     pub fn sites(&self) -> Option<Sites> {
         self.node.sites()
     }
@@ -609,7 +611,7 @@ impl Relay {
 
     /// Returns the chain's newest estimate of the interferer, with the number of the estimate.
     ///
-    /// Until the chain has an estimate it is the interferer that the mission configures.
+    /// Until the chain has an estimate, the result is the interferer that the mission configures.
     pub fn interference_estimate(&self) -> NumberedEstimate {
         self.node.round().sensing().estimate()
     }
@@ -635,7 +637,7 @@ impl Relay {
         self.node.round().rounds()
     }
 
-    /// Returns the relay's transmit power, and the altitude that was agreed on for it last.
+    /// Returns the relay's transmit power, and its last agreed altitude.
     pub fn profile(&self) -> Profile {
         self.node.round().profile()
     }
@@ -688,11 +690,11 @@ impl Relay {
             .handle_position(now, place, self.clock.internal(measured_at));
     }
 
-    /// Records if the drone flies to the setpoints from now on (`flown`); initially true. Takes constant time.
+    /// Records that the drone flies to the setpoints from now on (`flown`) or not; initially true. Takes constant time.
     ///
     /// Pass false while a pilot controls the drone or it is on the ground. With `Settings::guard`, the relay then has
-    /// no setpoint, and its neighbours are informed that it may be anywhere: they keep their positions toward it.
-    /// Once it is true again, the relay starts as after power-up, with the next position from
+    /// no setpoint, and its neighbours are informed that the drone can be anywhere: they keep their positions toward
+    /// it. Once `flown` is true again, the relay starts as after power-up, with the next position from
     /// [`handle_position`](Self::handle_position). A repeated call with the same value has no effect.
     ///
     /// ```
@@ -709,9 +711,10 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Records if the drone flies to the setpoints (`flown`); see [`handle_control`](Self::handle_control).
+    /// Records that the drone flies to the setpoints (`flown` is true) or does not (false). See
+    /// [`handle_control`](Self::handle_control).
     ///
-    /// Returns true if that is a change for the guard (collision avoidance).
+    /// Returns true if this changes the state of the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {
         let now = self.clock.advance(now);
         self.review_endurance(now, flown);
@@ -728,9 +731,9 @@ impl Relay {
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See
     /// [`handle_control`](Self::handle_control).
     ///
-    /// The guard (collision avoidance) no longer keeps clear of them. It keeps clear of the other relays of the view
-    /// on that side until it has received the nearest one. If that one is lost before, call this again. Takes
-    /// constant time.
+    /// The guard (collision avoidance) no longer keeps clear of these relays. If the view has other relays on that
+    /// side, the guard keeps the drone from moving toward them until it has received the nearest of them. If this relay
+    /// is lost before that, call the function again. Takes constant time.
     pub fn clear_lost(&mut self, now: Instant, side: Side) {
         self.node.clear_lost(self.clock.advance(now), side);
     }
@@ -739,7 +742,8 @@ impl Relay {
     /// [`Event::DuplicateIndex`](crate::Event::DuplicateIndex).
     ///
     /// If this relay is [passive](Self::is_passive), it becomes active, and raises its claim number above the claim
-    /// number of the other node. The node with the larger claim number may have a setpoint. Takes constant time.
+    /// number of the other node. Only the node with the larger claim number is allowed to have a setpoint. Takes
+    /// constant time.
     pub fn clear_duplicate_index(&mut self, now: Instant) {
         self.node.clear_duplicate(self.clock.advance(now));
     }
@@ -748,12 +752,12 @@ impl Relay {
 #[cfg(feature = "departures")]
 impl Relay {
     /// Requests to leave the chain, because the drone has to land soon. `endurance_s` is the remaining endurance of the
-    /// drone, s; `None` if it is unknown. Call it again when that changes.
+    /// drone, s; `None` if it is unknown. Call it again when the endurance changes.
     ///
-    /// The relay holds its place until [`Event::MayLeave`]. It needs a guard, or
-    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). Right after a start the relay does not
-    /// join the chain, unless the chain turns out to need it. See [`docs::batteries`](crate::docs::batteries). Takes
-    /// constant time.
+    /// The relay holds its place until [`Event::MayLeave`]. A departure needs a guard, or
+    /// [`Settings::leave_without_guard`](crate::Settings::leave_without_guard). If `leave` is called right after a
+    /// start, the relay joins the chain only if the chain turns out to need this relay. See
+    /// [`docs::batteries`](crate::docs::batteries). Takes constant time.
     ///
     /// ```
     /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -772,9 +776,9 @@ impl Relay {
 
     /// Makes this relay a spare, which waits outside of the chain until the leader calls it.
     ///
-    /// Call it right after the start: it has no effect once the relay has taken part in anything. The first leader
-    /// cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it has to wait at
-    /// least the separation away from all positions of the chain. Takes constant time.
+    /// Call it right after the start: it has no effect once the relay has taken part in a pass or a view change. The
+    /// first leader cannot be a spare, nor can a relay with two wires. No guard knows the place of a waiting spare: it
+    /// has to wait at least the separation away from all positions of the chain. Takes constant time.
     pub fn wait_as_spare(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.node.wait_as_spare(now);
@@ -782,8 +786,9 @@ impl Relay {
 
     /// Cancels the request to leave the chain, or joins the chain again. Takes constant time.
     ///
-    /// The relay then requests to leave only by [`leave`](Self::leave), or below the lower of the usual limit and half of the present
-    /// time of flight beyond the way home (`handle_endurance`).
+    /// From now on the relay requests to leave only if the firmware calls [`leave`](Self::leave), or if the margin
+    /// becomes too small. The margin is the remaining flight time minus the time of the way home (`handle_endurance`).
+    /// Too small means: below the usual limit, and below half of the margin at this call.
     pub fn stay(&mut self, now: Instant) {
         let now = self.clock.advance(now);
         self.override_endurance(now, true);

@@ -49,40 +49,40 @@ use crate::place::Placement;
 /// is larger, the search for a faulty relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Squared deviation, in variances, above which a measurement shows a faulty relay. Without that relay, the fit's residual must be smaller
-/// by at least this amount.
+/// Minimum squared deviation of a faulty relay's measurement, as a multiple of the variance. Without this relay, the
+/// fit's residual must be smaller by at least this multiple of the variance.
 const DEVIATIONS: f64 = 49.0;
 
 /// Minimum residual of the fit to all measurements for which a faulty relay is searched. The residual is the sum of
-/// squared relative errors. A measurement that is wrong by some 15 % causes it.
+/// squared relative errors. One measurement that is wrong by some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the second smallest variance to the smallest that singles out one faulty relay. Each is the
-/// variance of a fit that leaves out one relay.
+/// Minimum ratio of the second smallest variance to the smallest variance that shows one faulty relay. Each variance
+/// belongs to a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative differences between measurements and fit. Up to it, the measurements count as consistent. The value is
-/// a standard deviation of 0.32, or some 1.5 dB.
+/// Maximum variance of the relative differences between consistent measurements and their fit. The value is a standard
+/// deviation of 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
 /// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay's measurement fits the others, so that it is used again. The first is a
-/// multiple of the variance, the second a squared relative difference; the larger one counts.
+/// Limits within which an excluded relay's measurement fits the other measurements, and is used again. The first limit
+/// is a multiple of the variance, the second a squared relative difference. The larger of the two limits counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays to identify a faulty one. With four, an exclusion leaves three, and three unknowns fit
-/// any three measurements.
+/// Minimum number of relays to identify a faulty relay. With four relays, an exclusion leaves three measurements, and
+/// the three unknowns fit any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions ([`Sums::count`]. Older ones count less) with which a faulty relay can be
-/// found.
+/// Minimum number of measured positions with which a faulty relay can be found. Older positions count less, see
+/// [`Sums::count`].
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above this ratio, rounding errors of the sums
-/// exceed that relay's share in them.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above this ratio, rounding
+/// errors of the sums exceed the share of this relay in the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -92,8 +92,8 @@ enum Stage {
     /// the other nodes fit far better then, that node is faulty.
     Trying(u16),
     /// Notice: a sensing pass that informs the faulty node, which has this number, that it is excluded. There are two
-    /// in a row. In the first one the flag is false, and the measurements of the other nodes are discarded. In the
-    /// second one the flag is true, and their measurements give the estimate.
+    /// such passes in a row. In the first pass the flag is false, and the measurements of the other nodes are
+    /// discarded. In the second pass the flag is true, and the measurements of the other nodes give the estimate.
     Announcing(u16, bool),
 }
 
@@ -101,7 +101,7 @@ enum Stage {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial {
     stage: Stage,
-    /// Number of sensing passes (collections of measurements) until the next search may start.
+    /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
     /// Node whose exclusion has given the fit with the smallest variance so far.
     best: u16,
@@ -109,14 +109,14 @@ pub(crate) struct Trial {
     seen: f32,
     /// Residual of the fit without the node `best`: sum of the squared relative errors.
     seen_best: f32,
-    /// Smallest variance of relative errors among the fits that each leave out one node. It is that without the node
+    /// Smallest variance of relative errors among the fits that each leave out one node. This fit leaves out the node
     /// `best`.
     least: f32,
     /// Second smallest variance of relative errors among the fits that each leave out one node.
     second: f32,
 }
 
-/// Use to be made of the measurements just collected, as decided by the search for a faulty relay.
+/// Action after a collection of measurements, as decided by the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the measurements of this sensing pass for the interference estimate.
@@ -235,7 +235,8 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Ratio of a relay's measurement to the estimate, or its inverse, above which the relay checks itself.
+/// Ratio of a relay's measurement to the estimate above which the relay doubts its measurement. A ratio below the
+/// inverse of this value has the same effect.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far off the estimate
@@ -261,9 +262,9 @@ pub(crate) fn is_absurd(
 
 /// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// The measurement v = 1e-12 W / I at `place` is compared with the value e that the fit to the other relays' sums,
-/// `others`, gives there. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the
-/// current estimate; it sets the measurement's weight.
+/// The measurement v = 1e-12 W / I at `place` is compared with a value e. e is the value at this place by the fit to
+/// the other relays' sums, `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v
+/// by the current estimate, and sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -304,8 +305,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than its errors explain. The squared difference ((ratio -
-/// 1 / ratio) / 2)^2 must exceed `deviations` times the variance `unsure`, and `least`.
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. The squared difference
+/// ((ratio - 1 / ratio) / 2)^2 must exceed two numbers: `deviations` times the variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -314,8 +315,9 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple
-/// of the variance, the second a squared relative difference, here a factor of 1.5; the larger one counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first limit is a
+/// multiple of the variance, the second a squared relative difference, here a factor of 1.5. The larger of the two
+/// limits counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is

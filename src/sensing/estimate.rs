@@ -93,7 +93,7 @@ impl Spread {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NumberedEstimate {
-    /// Sequence number of the estimate, 0 for the initial one.
+    /// Sequence number of the estimate, 0 for the initial estimate.
     pub number: u16,
     /// Interference estimate that has this sequence number.
     pub estimate: InterferenceEstimate,
@@ -103,18 +103,18 @@ pub struct NumberedEstimate {
 const WORTH: f64 = 1e-5;
 
 /// Mean square relative change of the interference up to which a new estimate counts as a refinement. A larger change
-/// may mean that the interference itself has changed.
+/// can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to that by chance, for a stationary source. Below it the new
-/// estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a stationary source.
+/// With a smaller ratio the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to that by chance, for a moving source. Below it the new
-/// estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a moving source. With
+/// a smaller ratio the new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum change of the estimate that shows another interferer, in a chain that has settled. It is the ratio of the mean square change to
-/// that expected by chance. [`REFINED`] refinements settle a chain.
+/// Minimum change of the estimate that shows another interferer, in a chain that has settled. The change is a ratio:
+/// the mean square change divided by the change expected by chance. A chain has settled after [`REFINED`] refinements.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -140,7 +140,7 @@ const FLIGHT: Duration = Duration::from_millis(1_000);
 const CONTRADICTED: f64 = 0.25;
 
 /// Minimum mean square error of measurements that contradicts the mission's interference. It is a multiple of the
-/// variance that the operator expects. The relays then treat it as unknown.
+/// variance that the operator expects. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
 /// Quality that the current estimate had when it was adopted, and the track of the interferer.
@@ -273,8 +273,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit to all measurements, and the source of interference that it gives. Those `levels` of transmitter
-/// and receiver that do not fit are cleared.
+/// Returns the fit to all measurements, and the source of interference that the fit gives. If the level measured at Tx
+/// or at Rx does not fit, it is cleared in `levels`.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -301,8 +301,9 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at its predicted position at the time when the drones have moved. `None` if it does
-/// not move, or if its track deviates too much from the fit. `heard` is the mean time of the measurements.
+/// Returns a moving interferer at its predicted position at the time when the drones have moved. `None` if the
+/// interferer does not move, or if its track deviates too much from the fit. `heard` is the mean time of the
+/// measurements.
 fn followed(
     mission: &Mission,
     fit: &Fit,
@@ -437,8 +438,8 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Minimum squared deviation from the track that shows another interferer. It is divided by the track's variance. The
-/// track then starts again.
+/// Minimum squared deviation of a new position from the track that shows another interferer. The deviation is divided
+/// by the track's variance. The track then starts again.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.
@@ -541,8 +542,8 @@ impl Track {
         self.at = Some(at);
     }
 
-    /// Returns the last position of the interferer, and the one predicted for `then`: (x, y), m, of each. `None` if
-    /// the interferer does not move.
+    /// Returns the interferer's last position, and its predicted position at `then`: (x, y), m, of each. `None` if the
+    /// interferer does not move.
     pub(crate) fn ahead(&self, then: Instant) -> Option<[[f32; 2]; 2]> {
         let seconds = then.since(self.at?).as_micros() as f32 * 1e-6;
         let [x, y] = self.axes;

@@ -22,13 +22,13 @@ pub enum Unfit {
     Places,
     /// The measurements fit no single source on the ground.
     NoSource,
-    /// The measurements are inconsistent, and the faulty one is unknown. This happens with four relays or fewer, with
-    /// more than one faulty relay, or if the path loss between the interferer and Tx or Rx differs from the
-    /// mission's.
+    /// The measurements are inconsistent, and it is unknown which measurement is faulty. This happens with four relays
+    /// or fewer, with more than one faulty relay, or if the path loss between the interferer and Tx or Rx differs from
+    /// the mission's.
     Contradiction,
 }
 
-/// Weight of the operator's expected error in the estimated variance, in measured positions.
+/// Weight of the operator's expected error in the estimated variance: a number of measured positions.
 const EXPECTED: f64 = 4.0;
 
 /// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance
@@ -43,7 +43,7 @@ pub struct FoundSource {
     pub source: Interferer,
     /// Variances of the source's estimated x and y, m^2.
     pub variance_m2: [f32; 2],
-    /// True if the measurements fit a single source. If false, `source` is the closest one, and `variance_m2` is 0.
+    /// True if the measurements fit a single source. If false, `source` is the closest source, and `variance_m2` is 0.
     pub is_one: bool,
 }
 
@@ -52,13 +52,13 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit determines all four unknowns. False if the last one is left out, which tells the source's side
-    /// of the line.
+    /// True if the fit determines all four unknowns. False if it leaves out the last unknown, which shows on which side
+    /// of the line Tx to Rx the source is.
     full_rank: bool,
 }
 
-/// Minimum pivot of the matrix factorisation, relative to the first one. Below it the measured positions cannot
-/// separate the unknowns of the fit.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. With a smaller pivot the measured positions
+/// cannot separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -137,7 +137,7 @@ pub struct Fit {
     factor: Factor,
     /// Variance of the relative error of one measured position, as estimated from the fit.
     variance: f64,
-    /// Variance of the relative error of one measured position, as the operator expects it.
+    /// Expected variance of the relative error of one measured position, as set by the operator.
     expected: f64,
     /// Residual of the fit, the sum of the squared relative errors of all measured positions.
     seen: f64,
@@ -148,7 +148,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Fits a source to the measurements in `sums`; `relative_error` is the expected one of a measurement.
+    /// Fits a source to the measurements in `sums`. `relative_error` is the expected error of a measurement.
     ///
     /// About 6 000 instructions on a Cortex-M4F, in software f64.
     ///
@@ -223,7 +223,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and their errors are as small as expected.
+    /// Returns true if the fit has more positions than unknowns, and small errors. The errors are small if their
+    /// variance is below four times the variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -463,7 +464,7 @@ mod tests {
         }
     }
 
-    /// Checks that the last unknown is 0 if its pivot is too small. The others solve their equations.
+    /// Checks that the last unknown is 0 if its pivot is too small. The other unknowns then solve their equations.
     #[test]
     fn an_unknown_that_is_not_seen_is_left_out() {
         let factor = factor(10.0);

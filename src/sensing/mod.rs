@@ -51,8 +51,8 @@ use crate::time::Duration;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Listen {
-    /// Interval between an agreement and the leader's next collection of measurements; above 0. While the collections change
-    /// nothing, the interval grows, up to 64 times.
+    /// Interval between an agreement and the leader's next collection of measurements; above 0. While the collections change nothing, the
+    /// interval grows to at most 64 times this value.
     pub every: Duration,
     /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. If it is
     /// at least ten times `every`, the interferer is assumed to be stationary: after five estimates the chain moves
@@ -63,8 +63,7 @@ pub struct Listen {
 }
 
 impl Default for Listen {
-    /// Returns settings for a stationary interferer: every 5 s, half-life 60 s, error 3 %. The mean of a thousand
-    /// samples has this error.
+    /// Returns settings for a stationary interferer: `every` 5 s, half-life 60 s, error 3 %. The mean of a thousand samples has this error.
     fn default() -> Self {
         Self {
             every: Duration::from_millis(5_000),
@@ -75,7 +74,7 @@ impl Default for Listen {
 }
 
 impl Listen {
-    /// Returns settings for a moving interferer: every second, half-life 0.1 s + 16 s / `relays`.
+    /// Returns settings for a moving interferer: `every` 1 s, half-life 0.1 s + 16 s / `relays`.
     pub const fn following(relays: u16) -> Self {
         let relays = if relays > 0 { relays as u64 } else { 1 };
         Self {

@@ -12,8 +12,8 @@ use crate::time::{Duration, Instant};
 
 /// Range of measurable interference power, W, without the receiver's noise.
 ///
-/// Powers outside of the range are rejected. Within it, the square of a value, and of the ratio of any two, is finite
-/// in the units of [`sensing`](crate::sensing).
+/// Powers outside of the range are rejected. Within the range, the square of a value is finite in the units of
+/// [`sensing`](crate::sensing), and so is the square of the ratio of two values.
 pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 
 /// Mean interference power that was measured at Tx or at Rx, and the number of its measurements.
@@ -21,16 +21,16 @@ pub const MEASURED_W: (f32, f32) = (1e-30, 1e6);
 pub struct Level {
     /// Mean interference power at this ground station, W; 0 without a measurement.
     pub power_w: f32,
-    /// Number of measurements in the mean; the older they are, the less they count.
+    /// Number of measurements in the mean. Older measurements count less.
     pub count: f32,
 }
 
-/// Check of the levels measured at Tx and Rx: true for each that does not fit the relays' measurements.
+/// Flags of the levels measured at Tx and Rx: true if a level does not fit the relays' measurements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
     pub(crate) receiver: bool,
-    /// True if the measurements of Tx and Rx contradict each other, so that the faulty one is unknown.
+    /// True if the measurements of Tx and Rx contradict each other, and it is unknown which is faulty.
     pub(crate) unknown: bool,
 }
 
@@ -71,7 +71,7 @@ pub(crate) fn is_level(power_w: f32) -> bool {
     (MEASURED_W.0..=MEASURED_W.1).contains(&power_w)
 }
 
-/// Terms of a position, of which the inverse interference of a source is a linear combination. They are 1, u, u^2 -
+/// Four terms of a position. The inverse interference of a source is a linear combination of them. They are 1, u, u^2 -
 /// 1/3 + t^2 + z^2 and t, with u = 2 x / D - 1, t = 2 y / D, z = 2 h / D, and D the distance from Tx to Rx.
 pub(crate) type Terms = [f32; 4];
 
@@ -100,9 +100,9 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Returns the strength k = eta D^2 [`UNIT_W`] / (4 P) of a source of P = `power_w` watts. eta is the mission's
-/// path-loss factor to the ground, D its distance. For a strength it returns the power: the function is its own
-/// inverse.
+/// Converts between a source's power and its strength k = eta D^2 [`UNIT_W`] / (4 P). P is `power_w`, in W, eta the
+/// mission's path-loss factor to the ground, and D its distance. The same function converts a power to a strength, and
+/// a strength to a power.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
@@ -140,10 +140,11 @@ pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.
 ///
-/// For each position: w a b for every two of the four terms, w a v for each term, w v^2, its share, its number of
-/// measurements, and its share times its age in seconds. The share is 1 for a new position and fades. w is 2 (v /
-/// e)^(1/2) / (v^2 + e^2) with v measured and e expected. It is 1 / e^2 if both agree, and gives errors that are
-/// equal in decibels equal weights, and no position more than all the others.
+/// The sums for each position: w a b for every two of the four terms a and b, w a v for each term, w v^2, the
+/// position's share, its number of measurements, and its share times its age in seconds. The share is 1 for a new
+/// position and fades. The weight w is 2 (v / e)^(1/2) / (v^2 + e^2), with the measured v and the expected value e of
+/// v. It is 1 / e^2 if both agree. Errors that are equal in decibels have equal weights, and no position has more
+/// weight than all the others.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sums {
@@ -210,7 +211,7 @@ impl Sums {
         }
     }
 
-    /// Returns the number of measured positions in the sums; older ones count less.
+    /// Returns the number of measured positions in the sums. Older positions count less.
     pub fn count(&self) -> f32 {
         let [.., count, _, _] = self.numbers;
         count
@@ -289,9 +290,9 @@ impl Listener {
         self.half_life
     }
 
-    /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units
-    /// of [`UNIT_W`]. `expected` returns the inverse power, 1e-12 W / I, that the current estimate predicts for the
-    /// terms of a position. It is needed for the weights of the measurements.
+    /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units of
+    /// [`UNIT_W`]. `expected` returns the inverse power, 1e-12 W / I, that the current estimate predicts for the terms
+    /// of a position. This prediction is needed for the weights of the measurements.
     pub(crate) fn add(
         &mut self,
         now: Instant,

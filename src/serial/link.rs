@@ -68,7 +68,7 @@ pub struct SerialLink<P, D = NoPin> {
     uncounted: u32,
     /// Time at which all bytes written before the last poll have left the port.
     quiet_at: Instant,
-    /// True if the last poll stopped reading at its limit, so that the port may have more bytes.
+    /// True if the last poll stopped reading at its limit. The port can then have more bytes.
     unread: bool,
     stats: SerialStats,
 }
@@ -155,7 +155,7 @@ impl<P, D> SerialLink<P, D> {
         &mut self.port
     }
 
-    /// Returns the port and the pin. The transmit queue is discarded, and the pin keeps its level.
+    /// Returns the port and the direction pin. The transmit queue is discarded, and the pin keeps its level.
     pub fn release(self) -> (P, Option<D>) {
         (self.port, self.pin)
     }
@@ -275,13 +275,13 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads from the serial port that failed for another reason.
     pub other: u32,
-    /// Number of failed writes to the port, plus failed checks if all bytes have left the port. Failed writes are
+    /// Number of failed writes to the port, plus failed queries if all bytes have left the port. Failed writes are
     /// repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each is repeated.
     pub pin: u32,
-    /// Number of frames dropped because the transmit queue was full: the port accepts nothing. The relay retransmits
-    /// those that matter.
+    /// Number of frames dropped because the transmit queue was full: the port accepts nothing. The relay sends
+    /// important frames again.
     pub dropped: u32,
     /// Number of frames for a port that this driver does not have. The relay's [`Wiring`](crate::Wiring) then does
     /// not match the driver.

@@ -36,7 +36,7 @@ impl core::error::Error for Fault {}
 
 /// Serial port whose calls never block.
 ///
-/// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA may implement it directly.
+/// [`Nb`] and [`Io`] adapt a HAL's port; a firmware with its own queues or DMA can implement it directly.
 pub trait SerialPort {
     /// Moves received bytes to the front of `into` (never empty), and returns their number. 0 if no byte was
     /// received.

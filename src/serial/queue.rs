@@ -319,8 +319,8 @@ impl AtomicSlot for AtomicU16 {
     }
 }
 
-/// Indices of a ring buffer: its first item, and the cell after its last item. The ring is empty if they are equal, so
-/// one cell is never used.
+/// Indices of a ring buffer: its first item, and the cell after its last item. The ring is empty if the two indices are
+/// equal, so one cell is never used.
 #[derive(Debug)]
 pub(super) struct RingIndices {
     first: AtomicUsize,
@@ -350,8 +350,8 @@ pub(super) struct Producer<'q, P>(RingEnd<'q, P>);
 #[derive(Debug)]
 pub(super) struct Consumer<'q, P>(RingEnd<'q, P>);
 
-/// Returns the producer's and the consumer's side of a ring buffer. No other sides exist, because `indices` is
-/// borrowed exclusively.
+/// Returns the producer's and the consumer's side of a ring buffer. The exclusive borrow of `indices` prevents a second
+/// pair of sides.
 pub(super) fn ring_ends<'q, P>(
     slots: &'q [P],
     indices: &'q mut RingIndices,

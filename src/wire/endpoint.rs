@@ -43,7 +43,8 @@ impl Endpoint {
     }
 
     /// Signs all frames from now on with the key and epoch in `auth`. This node's nonces count up from `claim`, a
-    /// random number drawn at start. The session of a node that is silent for `gone_after` may be replaced.
+    /// random number drawn at start. If a node is silent for `gone_after`, another node with its number can take its
+    /// session.
     pub(crate) fn sign(&mut self, auth: Auth, claim: u32, gone_after: Duration) {
         if let Some(session) = self.session.first_mut() {
             *session = Some(Session::new(auth, claim, gone_after));
@@ -90,8 +91,8 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once a signing node has used all frame counters. It must not send any more frames until it
-    /// restarts with a new epoch, because no counter may be used twice.
+    /// Returns true once a signing node has used all frame counters. It must not send any more frames until it restarts
+    /// with a new epoch, because a counter must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }

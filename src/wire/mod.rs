@@ -27,7 +27,7 @@ pub static CRC_32C: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISCSI
 /// Largest valid node number; 4095 is reserved for broadcasts.
 pub const MAX_NODE: u16 = 4094;
 
-/// Number of nearest nodes on one side that may become the neighbour and are sent hellos.
+/// Number of nearest nodes on one side to which hellos are sent. One of them becomes the neighbour.
 pub(crate) const CANDIDATES: u16 = 4;
 
 /// Maximum length on the wire of a sweep message with its frame, bytes. A sweep is a pass of up to sixteen target

@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant};
 pub(crate) enum Sender {
     /// The relay itself: the received frame is an echo of a frame that this relay has sent.
     Itself,
-    /// Another node, whose claim to the node number is not known. With signed frames it may be a forger.
+    /// Another node, whose claim to the node number is not known. With signed frames it can be a forger.
     Unknown,
     /// Another node that claims this relay's node number, with its claim.
     Rival(Rival),
@@ -44,7 +44,7 @@ pub(crate) enum Sender {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Rival {
     pub(crate) number: u32,
-    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are the same.
+    /// True if the other node's epoch (start counter) is newer than this relay's. False if both epochs are equal.
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
@@ -53,8 +53,8 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number. It thus wins against a node that starts later. Of two
-/// nodes with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number. With this bit the relay wins against a node that starts
+/// later. Of two nodes with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -89,14 +89,14 @@ struct Peer {
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
-    /// Largest nonce that this node has sent; 0 if none was sent.
+    /// Largest nonce that this relay has received from the node; 0 if none was received.
     nonce: u64,
     window: Window,
     older: OlderHandshakes,
 }
 
-/// Counts consecutive handshakes of a node with an outdated nonce. Several show that the node's epoch went back, or
-/// that it restarted in the same epoch.
+/// Counts consecutive handshakes of a node with an outdated nonce. Several of them show that the node's epoch went
+/// back, or that the node restarted in the same epoch.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 struct OlderHandshakes {
     epoch: u32,
@@ -168,8 +168,8 @@ pub(crate) enum Checked {
     /// New handshake that contains this relay's current nonce, which proves that its sender is present. `first` is
     /// true if the sender had not proved this before in the present session.
     Handshake { first: bool },
-    /// Handshake with the right tag but without this relay's current nonce. It may have been recorded earlier, so it
-    /// does not prove that its sender is present.
+    /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
+    /// not prove that its sender is present.
     Unproven,
     /// Received frame without an authentication tag.
     Unsigned,
@@ -183,8 +183,8 @@ pub(crate) enum Checked {
 }
 
 impl Session {
-    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. A node that is
-    /// silent for `gone_after` may be replaced by another node with its number.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. If a node is silent
+    /// for `gone_after`, another node with its number can replace it.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -404,7 +404,7 @@ impl Session {
         Some(Checked::Handshake { first })
     }
 
-    /// Returns the sender of `frame`, which bears this relay's own number: this relay or another node. Work: the
+    /// Returns the sender of `frame`, whose sender number is this relay's own: this relay, or another node. Work: the
     /// computation of one tag.
     pub(crate) fn sender(&self, frame: &Opened<'_>) -> Sender {
         let epoch = self.epoch;
@@ -423,8 +423,8 @@ impl Session {
         self.owner(nonces.sender)
     }
 
-    /// Returns the node that made `nonce`: this relay, or another node that uses its node number. `Unknown` if the
-    /// nonce's epoch (start counter) is older than this relay's.
+    /// Returns the node that made `nonce`: this relay, or another node with this relay's node number. `Unknown` if the
+    /// nonce's epoch (start counter) is older than this relay's epoch.
     fn owner(&self, nonce: u64) -> Sender {
         let [number, epoch] = halves(nonce);
         if epoch < self.epoch {

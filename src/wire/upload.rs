@@ -40,8 +40,8 @@ pub enum UploadError {
     Mission(MissionError),
     /// The upload was made for another mission than the mission loaded into this relay before flight.
     Base,
-    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. The positions may
-    /// be invalid, or have another distance than the mission.
+    /// The mission does not fit the positions of Tx and Rx on earth, the geofence, or the settings. Or the positions
+    /// are invalid, or have another distance than the mission.
     Line(LineError),
     /// The relay already has the uploaded mission or a newer mission.
     Old,
@@ -77,8 +77,8 @@ impl core::error::Error for UploadError {}
 impl Upload {
     /// Creates an upload of `config`, for relays that loaded `base` before flight. `version` is 1 to 65535.
     ///
-    /// The path-loss factor eta of links to the ground is clamped between the factors with line of sight (`mu_los`)
-    /// and without (`mu_nlos`), because rounding may have put eta outside.
+    /// The path-loss factor eta of links to the ground is clamped between the factors with line of sight (`mu_los`) and
+    /// without (`mu_nlos`), because rounding can put eta outside of this range.
     ///
     /// # Errors
     /// [`UploadError`] names the problem.

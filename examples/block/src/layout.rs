@@ -32,7 +32,7 @@ pub(super) struct Layout {
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
     /// Carrier frequency (Hz), excess losses with and without line of sight (factors), and a weight. The weight, 0 to
-    /// 1, is the weight of line of sight in the path loss between drone and ground.
+    /// 1, is the share of the line-of-sight loss in the path loss between drone and ground.
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],
@@ -135,10 +135,10 @@ impl Layout {
         }
     }
 
-    /// Returns the interference that the block gives. If the block has points of a distribution along x, the result
-    /// is this distribution, and the points are stored in `storage`. Otherwise the result is the block's interferer.
-    /// If all numbers of the interferer are 0 and `listens` is true, the interferer is unknown, and the relays
-    /// estimate it.
+    /// Returns the interference that the block gives. If the block has points of a distribution along x, the result is
+    /// this distribution, and the points are stored in `storage`. Otherwise the result is the block's interferer. If
+    /// all numbers of the interferer are 0 and `listens` is true, the result is `Unknown`: the relays estimate the
+    /// interferer.
     pub(super) fn interference(
         &self,
         listens: bool,

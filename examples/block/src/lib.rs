@@ -90,7 +90,7 @@ pub use write::write;
 /// Address of the configuration block: the last flash sector of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
 
-/// Bit rate of every port of the firmware, bit/s. The configuration block can not change it.
+/// Bit rate of every port of the firmware, bit/s. The configuration block cannot change it.
 pub const BAUD: u32 = 115_200;
 
 /// First bytes of every configuration block, which identify it.
@@ -108,7 +108,7 @@ pub const MAX_POINTS: usize = 16;
 /// Number of bytes that the block's CRC covers: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Maximum value of `probe_after_ms` in a block: silence of a neighbour before a heartbeat request, ms.
+/// Maximum value of `probe_after_ms` in a block, ms. After this silence a relay requests a heartbeat from a neighbour.
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
@@ -129,8 +129,8 @@ pub const EMPTY: FieldStorage = [FieldPoint {
 /// Reads and checks a configuration block of arbitrary bytes. If it gives the interference as a distribution along x,
 /// its points are stored in `storage`.
 ///
-/// A relay accepts every returned configuration if its build has the features for it. It rejects the joint method for
-/// more than 100 relays.
+/// A relay accepts every returned configuration, with two exceptions: it rejects the joint method for more than 100
+/// relays, and a configuration that needs a feature its build lacks.
 ///
 /// # Errors
 /// [`ConfigError`] names the fault, and for a number out of range which one.

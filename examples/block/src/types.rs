@@ -147,21 +147,22 @@ pub enum ConfigError {
     Profile,
     /// The flag for keeping this relay's altitude is neither 0 nor 1.
     Hold,
-    /// Unknown placement method. Or a method other than align although the block gives the interference as a
-    /// distribution along x.
+    /// The placement method is unknown. Or it is not align although the block gives the interference as a distribution
+    /// along x.
     Method,
     /// The parameters of the method adjust are out of range, or not 0 with another method.
     Adjust,
-    /// The settings for measuring the interference are out of range. Or they have a maximum power, but no number of
+    /// The settings for measuring the interference are out of range. Or they give a maximum power but no number of
     /// samples.
     Measure,
-    /// The settings for estimating an unknown interferer are out of range. Or the block has them although it gives
-    /// the interference as a distribution along x.
+    /// The settings for estimating an unknown interferer are out of range. Or they are given although the block has the
+    /// interference as a distribution along x.
     Listen,
-    /// The block has the joint method with an unknown interferer and traffic from receiver to transmitter.
+    /// The block combines three things that exclude each other. They are the joint method, an unknown interferer, and
+    /// traffic from receiver to transmitter.
     Reverse,
-    /// The block has fitted slots without the joint method or without a known interferer. Fitted slots are as long as
-    /// each hop needs.
+    /// The block requests fitted slots, but lacks the joint method or a known interferer. Fitted slots are time slots
+    /// as long as each hop needs.
     Fitted,
     /// The block has both an interferer and the interference as a distribution along x.
     Interferer,

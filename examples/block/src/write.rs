@@ -10,8 +10,8 @@ use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VE
 /// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of the
 /// mission's channel.
 ///
-/// Two things differ when the block is read back. The grid search of the method adjust becomes the fine search. A
-/// block with more than `MAX_POINTS` points of the interference's distribution along x is rejected.
+/// Two configurations are not read back as they were written. The grid search of the method adjust becomes the fine
+/// search. If the interference's distribution along x has more than `MAX_POINTS` points, reading rejects the block.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

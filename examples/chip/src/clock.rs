@@ -92,7 +92,8 @@ struct Pll {
     over_drive: bool,
     /// Multiplier PLLN of the PLL. The core's frequency is this number times 1 MHz; the PLL's input has 2 MHz.
     plln: u32,
-    /// Divisor for the PLL's 48 MHz output (PLLQ), which feeds USB. The output may also be slower, as USB is not used.
+    /// Divisor for the PLL's 48 MHz output (PLLQ), which feeds USB. The output is allowed to be slower, as USB is not
+    /// used.
     pllq: u32,
 }
 
@@ -146,7 +147,8 @@ const SCALE_READY: u32 = 1 << 14;
 /// Bit of the over-drive, at the same place in two registers. In PWR_CR the bit enables the over-drive; in PWR_CSR it
 /// shows that the over-drive is ready.
 const OVER_DRIVE: u32 = 1 << 16;
-/// Bit of the switch to the over-drive, at the same place in two registers. PWR_CR: switch. PWR_CSR: it is in use.
+/// Bit of the switch to the over-drive, at the same place in two registers. In PWR_CR the bit switches the core to the
+/// over-drive; in PWR_CSR it shows that the over-drive is in use.
 const OVER_DRIVE_SWITCH: u32 = 1 << 17;
 
 /// Mask of the flash wait states in the register FLASH_ACR.
@@ -161,8 +163,8 @@ const CACHES: u32 = 0b11 << 9;
 /// Chip ID of an STM32F405 of revision A, whose flash prefetch is defective (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Maximum number of reads of a register while a PLL, a voltage or a clock switch settles. They take some 10 ms at 16
-/// MHz; by the data sheets, the chip needs at most 0.3 ms.
+/// Maximum number of reads of a register while a PLL, a voltage or a clock switch settles. The reads take some 10 ms at
+/// 16 MHz; by the data sheets, the chip needs at most 0.3 ms.
 const POLLS: u32 = 20_000;
 
 /// Sets up the clocks of a board, and returns the frequencies reached. Call it once after a reset, with interrupts
@@ -199,9 +201,8 @@ pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     Clocks::HSI
 }
 
-/// Returns the frequencies that [`start`] reaches, and leaves the core on the oscillator HSI. Intended for a HAL that
-/// sets up the clocks itself and waits for them without a time limit. Such a HAL should be given only clocks that
-/// work.
+/// Returns the frequencies that [`start`] reaches, and leaves the core on the oscillator HSI. Some HALs set up the
+/// clocks themselves and wait for them without a time limit. The result tells such a HAL which clocks work.
 pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {

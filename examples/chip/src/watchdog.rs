@@ -5,19 +5,20 @@
 
 use crate::registers::{Register, Registers};
 
-/// Prescaler of the watchdog: its oscillator LSI / 64, 500 counts a second at the typical 32 kHz.
+/// Prescaler setting of the watchdog: division by 64. With the typical 32 kHz of its oscillator LSI the watchdog counts
+/// 500 times a second.
 const PRESCALER: u32 = 0b100;
 const RELOAD: u32 = 2_999;
 
-/// Time from the last feeding of the watchdog to the reset, ms: typical, shortest and longest. The watchdog's
-/// oscillator LSI then has 32, 47 and 17 kHz. The time is enough for an erase of a flash sector of 128 KiB, which
+/// Time from the last feeding of the watchdog to the reset, ms: typical, shortest and longest. These times are for 32,
+/// 47 and 17 kHz of the watchdog's oscillator LSI. Each is enough for an erase of a flash sector of 128 KiB, which
 /// stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
 /// Maximum time for which the relay's main loop sleeps, ms. The loop feeds the watchdog before it sleeps.
 pub const TURN_MS: u64 = 500;
 
-/// Lateness of the relay's timer, ms, from which on the main loop must not feed the watchdog any more.
+/// Delay of the relay's timer, ms, from which on the main loop must no longer feed the watchdog.
 pub const LATE_MS: u64 = 1_000;
 
 /// Returns true if the main loop may feed the watchdog at `now_us`. The relay's next timer expires at `due_us`;

@@ -17,8 +17,9 @@ pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
 /// Payload length of a journal record that stores an epoch, words.
 pub const WORDS: usize = 1;
 
-/// Key of the journal that stores the epochs. A journal ignores records with another key. This key does not depend on
-/// the configuration block, so that no change of the block makes the epoch fall, which must rise at every start.
+/// Key of the journal that stores the epochs. A journal ignores records with another key. The epoch must rise at every
+/// start. So this key is a constant: with a key computed from the configuration block, a changed block would reset the
+/// epoch.
 pub const KEY: u32 = 0;
 
 /// Returns the epoch of this start (a number that rises at every start), and true if it was stored.

@@ -106,7 +106,8 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Returns the payload of the newest record, if any. `WORDS` must be the payload's length, words.
+    /// Returns the payload of the newest record; `None` if there is no valid record. `WORDS` must be the payload's
+    /// length, words.
     ///
     /// Work: linear in the words of the sectors, and a CRC for the newest valid record and each record stored after
     /// it.
@@ -192,8 +193,8 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Returns the CRC of the record that begins at word `first`. It covers all words but the last, and then the
-    /// journal's key.
+    /// Returns the CRC of the record that begins at word `first`. The CRC covers all words of the record except the
+    /// last, which stores the CRC, and then the journal's key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();

@@ -15,7 +15,7 @@ use super::Line;
 use crate::autopilot::{AutopilotPlan, Port, SigningKey, port, stamp};
 use crate::options::Plan;
 
-/// Link number of the check in MAVLink signatures; the flight uses another one.
+/// Link number of the check in MAVLink signatures. In flight the program uses another link number.
 const LINK: u8 = 1;
 
 /// Silence after which the autopilot, or its position, counts as missing.
@@ -30,14 +30,15 @@ const AT_A_TIME: usize = 6;
 /// Names of the parameter with the autopilot's own MAVLink system number.
 const SYSTEM: [&str; 2] = ["MAV_SYS_ID", "SYSID_THISMAV"];
 
-/// Names of ArduCopter's parameters: up to version 4.6, and from 4.7 on. The number is the old unit divided by the
-/// new unit. An autopilot has one of the two names.
+/// Parameters that ArduCopter 4.7 has renamed: old name, new name, and a factor. The factor is the old unit divided by
+/// the new unit. An autopilot has only one of the two names.
 const NEW_NAMES: [(&str, &str, f64); 2] = [
     ("RTL_ALT", "RTL_ALT_M", 100.0),
     ("SYSID_THISMAV", "MAV_SYSID", 1.0),
 ];
 
-/// Parameter that the bundle's file has, and the autopilot's value once it has answered.
+/// Parameter of the bundle's parameter file: the value in the file, and the autopilot's value. The autopilot's value is
+/// `None` until the autopilot has answered.
 #[derive(Debug)]
 struct Parameter {
     name: String,
@@ -45,7 +46,7 @@ struct Parameter {
     found: Option<f64>,
 }
 
-/// State of the autopilot by its last HEARTBEAT.
+/// State of the autopilot, as reported in its last HEARTBEAT.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     at: Instant,
@@ -62,7 +63,8 @@ pub(super) struct Drone {
     parser: Parser,
     signing: Option<Signing>,
     axis: Axis,
-    /// Planned position, if the file has a plan, and the largest distance from it, m.
+    /// Planned position of this drone; `None` if the configuration has no plan. `within_m` is the permitted distance
+    /// from it.
     planned: Option<Placement>,
     within_m: f32,
     /// Folder with the parameter files.
@@ -108,12 +110,13 @@ impl Drone {
         })
     }
 
-    /// Returns true once the autopilot has reported that it is disarmed, and not in the air. Before, nothing is sent.
+    /// Returns true once the autopilot has reported that it is disarmed and not in the air. Until then the check sends
+    /// nothing to the neighbours.
     pub(super) fn is_disarmed(&self) -> bool {
         self.heard.is_some() && !self.is_armed()
     }
 
-    /// Returns true if the autopilot is armed or in the air: then nothing is sent to the neighbours.
+    /// Returns true if the autopilot is armed or in the air. The check then sends nothing to the neighbours.
     pub(super) fn is_armed(&self) -> bool {
         self.is_in_air || self.heard.is_some_and(|heard| heard.is_armed)
     }
@@ -209,7 +212,8 @@ impl Drone {
         }
     }
 
-    /// Takes a PARAM_VALUE: value (4 bytes), numbers (4), name (16), type.
+    /// Stores the value of a received PARAM_VALUE. Its payload is the value (4 bytes), count and index (2 bytes each),
+    /// the name (16 bytes) and the type.
     fn take_value(&mut self, kind: Kind, frame: &[u8]) {
         let length = usize::from(frame.get(1).copied().unwrap_or(0));
         let mut payload = frame
@@ -454,7 +458,8 @@ impl Drone {
     }
 }
 
-/// Returns true if two values of a parameter differ by more than the rounding of an f32 and of a unit.
+/// Returns true if two values of a parameter differ by more than rounding errors. These come from the f32 format and
+/// from a conversion of units.
 fn differ(found: f64, wanted: f64) -> bool {
     (found - wanted).abs() > 1e-4 * wanted.abs().max(1.0)
 }

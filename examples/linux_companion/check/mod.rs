@@ -33,7 +33,8 @@ use radio::Radio;
 /// Line of the check: its subject, and the finding. An `Err` is red.
 pub(crate) type Line = (&'static str, Finding);
 
-/// Time for which the check answers its neighbours after all lines are green. They may be checked, too.
+/// Time for which the check still answers its neighbours after all its lines are green. The neighbours may be running a
+/// check of their own.
 const LINGER: Duration = Duration::from_millis(5_000);
 
 /// Pause between two turns of the main loop.
@@ -45,11 +46,12 @@ const FREE: u64 = 64 << 20;
 /// Seconds from 1970 to 2024. A clock that shows an earlier time is not set.
 const YEAR_2024_S: u64 = 1_704_067_200;
 
-/// Files with the udev rules of a bundle: beside the configuration, or where they are installed.
+/// Name of the file with the bundle's udev rules. The file is in the folder of the configuration, or installed in
+/// /etc/udev/rules.d.
 const RULES: &str = "70-uav-relay.rules";
 
-/// Checks this computer, then the autopilot and the neighbours for at most `limit`. It listens first. Prints all lines;
-/// returns true if all are green.
+/// Checks this computer, then the autopilot and the neighbours for at most `limit`. At first it only receives. Prints
+/// all lines; returns true if all are green.
 pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     let options = &plan.options;
     let (mut lines, ports) = ports(plan);
@@ -319,7 +321,7 @@ fn records(plan: &Plan) -> Vec<Line> {
     lines
 }
 
-/// Checks the udev rules of the bundle; no line without rules and without a port that needs rules.
+/// Checks the udev rules of the bundle. `None` if there is no file with rules and no port needs one.
 fn rules(plan: &Plan) -> Option<Line> {
     let options = &plan.options;
     let ports = [&options.upstream, &options.downstream, &options.shared];

@@ -29,49 +29,51 @@ use super::Line;
 use crate::options::Plan;
 use crate::relay::seed;
 
-/// Longest silence of a neighbour in the check before it is probed.
+/// Silence of a neighbour after which the check requests a heartbeat from it.
 const PROBE_AFTER: Duration = Duration::from_millis(2_000);
 
 /// Number of own frames that are remembered, to recognise their echoes.
 const REMEMBERED: usize = 64;
 
-/// Number of damaged frames from which on the data rate is suspected.
+/// Number of damaged frames from which on the check suspects a wrong data rate.
 const DAMAGED: u32 = 5;
 
-/// Age from which on data received from a neighbour are too old for the check.
+/// Age from which on the check ignores data received from a neighbour.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Time added to the longest period of the lease renewals while the check only listens.
+/// Margin of the time in which the check only listens. This time is the longest period of the lease renewals, plus the
+/// margin.
 const RESERVE: Duration = Duration::from_millis(2_000);
 
-/// Distance by which the reported position of a drone on the ground may change, m.
+/// Maximum change of a drone's reported position, m, for the drone to count as on the ground.
 const STANDS_WITHIN_M: f32 = 5.0;
 
-/// Neighbour, by the frames that bear its number.
+/// Data about a neighbour, from received frames that name the neighbour's number as their sender.
 #[derive(Clone, Copy, Debug, Default)]
 struct Heard {
-    /// Time of the last frame with its number in this network, to any relay.
+    /// Time of the neighbour's last frame in this network, addressed to any relay.
     received: Option<Instant>,
-    /// Time of the last frame to this relay with the right key.
+    /// Time of the neighbour's last frame to this relay with a correct authentication tag.
     verified: Option<Instant>,
     /// Time of the neighbour's last message that states that the neighbour receives this relay.
     hears: Option<Instant>,
-    /// True if its drone flies.
+    /// True if the neighbour's drone flies.
     flies: bool,
-    /// True after a lease renewal, so that its chain has agreed positions.
+    /// True once a lease renewal was received from the neighbour: its chain then has agreed positions.
     takes_part: bool,
-    /// First position of its drone that it reported while it was not flown.
+    /// First position that the neighbour reported while its relay did not fly the drone. `None` before this report.
     stands: Option<Placement>,
-    /// Digest of its mission.
+    /// Digest of the neighbour's mission; `None` if not received yet.
     mission: Option<u16>,
-    /// Frames with another key, without a signature, of another network, of an old epoch.
+    /// Number of frames with another key. The next fields count frames without a signature, name the other network of a
+    /// frame, and count frames of an old epoch.
     forged: u32,
     unsigned: u32,
     network: Option<u16>,
     replayed: u32,
 }
 
-/// Port toward neighbours, with the received bytes of an incomplete frame, and the bytes to send.
+/// Port toward neighbours. `received` is the incomplete frame received so far, `outgoing` the bytes not sent yet.
 struct Wire {
     port: Port,
     tty: Tty,
@@ -90,7 +92,7 @@ pub(super) struct Radio {
     epoch: Option<u32>,
     heard: BTreeMap<u16, Heard>,
     sent: VecDeque<Vec<u8>>,
-    /// Number of frames of another node with this relay's number.
+    /// Number of frames received from another node that uses this relay's number.
     twins: u32,
     damaged: u32,
     sends_from: Instant,
@@ -141,19 +143,21 @@ impl Radio {
         })
     }
 
-    /// Returns the time before which the check only listens.
+    /// Returns the time from which on the check may send. Before this time it only listens.
     pub(super) const fn sends_from(&self) -> Instant {
         self.sends_from
     }
 
-    /// Returns the relays that fly, or are in a chain without a report that their drones are on the ground.
+    /// Returns the numbers of the relays that may fly. A relay may fly if it reports so, or if it is in a chain and has
+    /// not reported that its drone is on the ground.
     fn flying(&self) -> Vec<String> {
         let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
         let flying = self.heard.iter().filter(|(_, heard)| flies(heard));
         flying.map(|(node, _)| node.to_string()).collect()
     }
 
-    /// Exchanges frames with the neighbours; without `may_send`, or while a relay may fly, it only listens.
+    /// Receives frames from the neighbours and sends frames to them. Sends nothing if `may_send` is false, or while a
+    /// relay may fly.
     pub(super) fn exchange(&mut self, now: Instant, may_send: bool) {
         for at in 0..self.wires.len() {
             for (port, frame) in self.read(at) {
@@ -383,7 +387,7 @@ impl Radio {
 }
 
 impl Heard {
-    /// Records the data in a message about the flight of its sender.
+    /// Records whether the sender of a message flies and whether its chain has agreed positions.
     fn observe(&mut self, content: &Content) {
         let Content::Message(message) = content else {
             return;
@@ -404,13 +408,13 @@ impl Heard {
 
 /// Content of an intact frame.
 enum Content {
-    /// Handshake, with the epoch of its receiver as far as the sender knows it.
+    /// Handshake. The number is the receiver's epoch, as far as the sender knows it.
     Handshake(u32),
     Message(Message),
 }
 
 impl Content {
-    /// Returns true for messages from which nothing is agreed on.
+    /// Returns true for messages that take no part in an agreement. The check sends only such messages.
     const fn is_harmless(&self) -> bool {
         use Message::{Claim, Heartbeat, Hello};
         matches!(

@@ -15,7 +15,7 @@ pub(crate) fn block() -> &'static Block {
     unsafe { &*(config::ADDRESS as *const Block) }
 }
 
-/// Enables an interrupt. The driver that serves the interrupt must be in place.
+/// Enables an interrupt. The caller must have installed the driver that serves the interrupt.
 pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: no critical section of this program relies on a single interrupt being masked.
     unsafe { NVIC::unmask(interrupt) };
@@ -23,9 +23,9 @@ pub(crate) fn unmask(interrupt: Interrupt) {
 
 /// Returns a seed that differs between boards and between starts.
 ///
-/// After power-up it hashes the noise in the RAM, which is specific to the chip; after a reset, the value left there
-/// by the last call. The function does not use the chip's unique number, because the emulator has no such number at
-/// its address.
+/// After power-up the seed is a hash of the noise in the RAM, which is specific to the chip. After a reset it is a hash
+/// of the RAM's content, which includes the last seed. The function does not use the chip's unique number, because the
+/// emulator has no such number at its address.
 pub(crate) fn seed() -> u32 {
     const WORDS: usize = 64;
     #[unsafe(link_section = ".uninit.leftover")]
@@ -41,7 +41,7 @@ pub(crate) fn seed() -> u32 {
     seed
 }
 
-/// Feeds the watchdog and sleeps for ever, for a drone that can not join the chain. If no clock wakes the chip, the
+/// Feeds the watchdog and sleeps forever, for a drone that cannot join the chain. If no clock wakes the chip, the
 /// watchdog restarts it.
 pub(crate) fn stop() -> ! {
     loop {
@@ -50,7 +50,8 @@ pub(crate) fn stop() -> ! {
     }
 }
 
-/// Panic handler that can not be linked, so that `cargo cost` proves that no panic is reachable.
+/// Panic handler that makes the linker fail if it is used. So a successful `cargo cost` proves that no panic is
+/// reachable.
 #[cfg(prove_no_panic)]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -83,7 +84,8 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// True if interrupts were enabled before the log frame began. The end of the log frame enables the interrupts again.
+    /// True if interrupts were enabled before the log frame began. They are then enabled again at the end of the log
+    /// frame.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
     // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame, which no

@@ -17,8 +17,8 @@ pub(crate) struct Begun {
     pub(crate) reset: Reset,
 }
 
-/// Starts the watchdog and then the clocks, so that the watchdog ends a hanging start, too. Call it once after a reset, before
-/// anything that depends on a clock.
+/// Starts the watchdog, and then the clocks. If the start of the clocks hangs, the watchdog restarts the chip. Call it
+/// once after a reset, before anything that depends on a clock.
 pub(crate) fn begin() -> Begun {
     let reset = Reset::take(&mut Chip);
     WAS_HUNG.store(reset == Reset::Watchdog, Ordering::Relaxed);

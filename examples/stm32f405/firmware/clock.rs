@@ -13,7 +13,7 @@ use uav_relay::Instant;
 /// Number of `SysTick` cycles in a microsecond. `SysTick` interrupts every 1000 microseconds.
 static MICRO: AtomicU32 = AtomicU32::new(1);
 
-/// Milliseconds since the start, in 64 bits, which do not overflow.
+/// Milliseconds since the start. The 64 bits never overflow.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 /// True if bytes have arrived since the main loop's last sleep.
 static INPUT: AtomicBool = AtomicBool::new(false);
@@ -44,7 +44,7 @@ impl Clock {
         self.last
     }
 
-    /// Sleeps until the time `wake`, or until bytes arrive. Without `wake` there is no time limit.
+    /// Sleeps until the time `wake`, or until bytes arrive. If `wake` is `None`, there is no time limit.
     pub(crate) fn sleep(&mut self, wake: Option<Instant>) {
         while wake.is_none_or(|wake| self.now() < wake) {
             // An interrupt after this check of INPUT stays pending, and `wfi` returns for it.

@@ -13,14 +13,15 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay with its stored votes, and the autopilot link if the drone has one. They are in static RAM, to save stack.
+/// Relay, state of its stored votes, and the autopilot link if the drone has one. The relay and the link are in static
+/// RAM, to save stack.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
-/// Creates the drone that the configuration block describes; `None` if it can not fly.
+/// Creates the drone that the configuration block describes; `None` if it cannot fly.
 ///
 /// [`switch_on`] and this function are not inlined, so that their stack frames are released.
 #[inline(never)]
@@ -55,8 +56,8 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     }
 }
 
-/// Creates the relay in static RAM, to save stack. `None` if the relay rejects the configuration, because this image
-/// lacks a feature or the joint method is for more than 100 relays.
+/// Creates the relay in static RAM, to save stack. `None` if the relay rejects the configuration: this image lacks a
+/// feature, or the joint method is configured for more than 100 relays.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -79,13 +80,13 @@ fn switch_on(
         .ok()
 }
 
-/// Error: a signing key is configured, but frames can not be signed.
+/// Error: a signing key is configured, but frames cannot be signed.
 struct CannotSign;
 
 /// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
-/// If the flash can not be written, as in an emulator, the epoch is still larger than all stored ones, and at least
-/// that of the block; but the next start may then have the same epoch.
+/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored epochs and not below
+/// the block's epoch. But the next start may then use the same epoch once more.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {

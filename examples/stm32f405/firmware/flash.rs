@@ -11,7 +11,7 @@ use uav_relay_kept::views;
 #[cfg(feature = "upload")]
 use super::uploads;
 
-/// Address of a flash sector that no firmware image reaches (`memory.x`).
+/// Flash sector outside of every firmware image (`memory.x`), given by its address.
 #[derive(Clone, Copy)]
 struct Sector(u32);
 
@@ -86,7 +86,7 @@ impl Sector {
         unsafe { core::slice::from_raw_parts(self.0 as *const u32, self.len()) }
     }
 
-    /// Returns the sector number for the flash registers: the large sectors begin with number 5.
+    /// Returns the number by which the flash registers select the sector. The large sectors begin with number 5.
     const fn number(self) -> u8 {
         let number = if self.0 < LARGE {
             (self.0 - FLASH_START) / (16 * KIB)
@@ -162,8 +162,8 @@ fn unlocked() -> FLASH {
     flash
 }
 
-/// Waits until the flash is idle, as each command requires. Reads need no such wait, because the hardware delays
-/// them.
+/// Waits until the flash is idle, as each command requires. Reads need no such wait, because the hardware delays them
+/// while the flash is busy.
 fn wait(flash: &FLASH) {
     while flash.sr().read().bsy().bit_is_set() {}
 }

@@ -32,13 +32,13 @@ use super::uart_log::lost;
 #[cfg(feature = "rtt")]
 use defmt_rtt as _;
 
-/// Returns false: without a log over the UART nobody can request the counters.
+/// Returns false. The counters are requested over the log's UART, and this image has no log over a UART.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 pub(crate) const fn counters_requested() -> bool {
     false
 }
 
-/// Returns 0 as the number of dropped log frames, because only a log over the UART counts them.
+/// Returns 0. Dropped log frames are counted only in an image that logs over a UART.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 const fn lost() -> u32 {
     0

@@ -13,10 +13,10 @@ use uav_relay::serial::SerialPort;
 
 use super::port::{self, Port, Queues, RECEIVED, Slot};
 
-/// Buffer of a log frame. Its size is that of the longest frame, which has the relay's counters.
+/// Buffer of a log frame. Its capacity is the length of the longest log frame, the frame with the relay's counters.
 type Frame = Vec<u8, 160>;
 
-/// Capacity of the log's send queue, bytes. At full speed it is sent in 89 ms.
+/// Capacity of the log's send queue, bytes. A full queue takes 89 ms to send.
 const ROOM: usize = 1024;
 
 struct Log {
@@ -65,7 +65,7 @@ pub(crate) fn lost() -> u32 {
     lost
 }
 
-/// Begins a log frame. Interrupts are off until its end.
+/// Begins a log frame. Interrupts are off until the end of the frame.
 pub(crate) fn begin() {
     with(|log| {
         log.frame.clear();

@@ -1,7 +1,7 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Largest number of bytes that the splitter stores between two frame delimiters. More bytes are noise, of which only
-/// the start is kept.
+/// Maximum number of bytes that the splitter stores between two frame delimiters. More bytes cannot be a frame; only
+/// their start is kept.
 pub const MOST: usize = 1_024;
 
 /// Bytes of a stream from one frame delimiter to the next: usually a frame. The delimiter at the end is included.

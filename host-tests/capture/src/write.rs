@@ -19,7 +19,7 @@ const INTERFACE_DESCRIPTION_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
 
-/// Resolution of the timestamps in a capture, as pcapng states it: the exponent n of 10^-n s.
+/// Resolution of the timestamps in a capture, 10^-9 s. A pcapng file states only the exponent, 9.
 const NANOSECONDS: u8 = 9;
 
 /// Direction of a frame, relative to the node that writes the capture.
@@ -78,9 +78,10 @@ impl<W: Write> std::fmt::Debug for Capture<W> {
 }
 
 impl<W: Write> Capture<W> {
-    /// Starts a capture in `out`, written by `application`. `comment` describes the whole capture, empty for none.
+    /// Starts a capture in `out`, written by the program `application`. `comment` describes the whole capture; an empty
+    /// comment is left out.
     ///
-    /// Each frame is passed at once to `out`, which may buffer the frame.
+    /// The capture itself buffers no frame: each frame is passed to `out` at once.
     ///
     /// # Errors
     /// `out` cannot be written to.

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use uav_relay::{ChannelLoad, Duration};
 
-/// Largest data rate that the commands accept for `--baud`, bit/s.
+/// Maximum data rate that the commands accept for `--baud`, bit/s.
 pub const MOST_BAUD: u32 = 10_000_000;
 
 /// Error of a command: the line that is printed on standard error, and the exit status.
@@ -50,7 +50,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
 
 /// Prints the requested help, or the error in the options. Returns the exit status.
 ///
-/// An error is one line that states the permitted values.
+/// For an error the function prints one line, which states the permitted values.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         print(&error.to_string());
@@ -130,7 +130,8 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
 
 /// Checks that a radio channel of `baud` bit/s is fast enough for the relays that share it.
 ///
-/// `load` has the number of relays; `probe_after` is the silence after which a relay probes a neighbour.
+/// `load` has the number of relays; `probe_after` is the silence after which a relay requests a heartbeat from a
+/// neighbour.
 ///
 /// # Errors
 /// The least sufficient data rate, the number of relays on the channel, and the alternatives.

@@ -17,10 +17,10 @@ use crate::machine::Clock;
 use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Mark, Run, Solution};
 
-/// Relative tolerance of the SIR that this crate aims for, the same as in `cargo chain`.
+/// Relative tolerance of the target SIR that this crate computes; `cargo chain` has the same tolerance.
 const TOLERANCE: f64 = 1e-4;
 
-/// Number of timed batches, of which the median time is used.
+/// Number of timed batches. The result is the median of their times.
 const BATCHES: usize = 5;
 /// Minimum duration of a timed batch. It is far above the resolution of the processor clock, some milliseconds.
 const LONG_ENOUGH: Duration = Duration::from_millis(200);

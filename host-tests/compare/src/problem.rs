@@ -7,11 +7,11 @@ use uav_relay_oracle::reference::joint::Corridor;
 use uav_relay_oracle::reference::{Link, Relay, path_loss_factor};
 use uav_relay_scenario::{Interference, Scenario};
 
-/// Coordinates of the relays that a solver may choose.
+/// Coordinates that a solver may choose for each relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Choice {
-    /// Positions along the line from transmitter to receiver, at a fixed altitude.
+    /// Coordinate x alone, along the line from transmitter to receiver. All relays have the same fixed altitude.
     Places,
     Altitudes,
     Sides,
@@ -92,7 +92,8 @@ impl Problem {
         }
     }
 
-    /// Returns the problem as the reference and the other solvers need it: chain and corridor of relays.
+    /// Returns the problem as the reference functions and the other solvers need it. The result has the link, and the
+    /// limits of the relays' altitudes and lateral positions.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {

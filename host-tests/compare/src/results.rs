@@ -52,10 +52,12 @@ pub(crate) struct Solution {
     pub(crate) sir: f64,
     /// Position of every relay (x, y and altitude, m), from the transmitter on.
     pub(crate) chain: Chain,
-    /// First chain in the solver's run whose SIR is within [`crate::score::GOOD`] of the optimum, if any.
+    /// First chain in the solver's run whose SIR is within [`crate::score::GOOD`] of the optimum. `None` if the run has
+    /// no such chain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) good: Option<Mark>,
-    /// First chain in the solver's run that is as good as this crate's, if any.
+    /// First chain in the solver's run whose SIR is at least that of this crate's chain. `None` if the run has no such
+    /// chain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) level: Option<Mark>,
     /// True if the time limit ended the solver's run.

@@ -108,7 +108,7 @@ impl Rivals {
         &self.versions
     }
 
-    /// Solves `problem` with `solver`. The solver also reports the time at which its SIR first reaches `level`, linear.
+    /// Solves `problem` with `solver`. The solver also reports when its SIR (linear) has first reached `level`.
     pub(crate) fn run(
         &mut self,
         solver: Solver,

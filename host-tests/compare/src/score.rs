@@ -7,32 +7,33 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Mark, Solution};
 
-/// Relative difference from the optimum SIR up to which a chain is good enough. The relays' mission has the same
+/// Maximum relative difference from the optimum SIR for a chain to be good enough. The relays' mission has the same
 /// tolerance.
 pub(crate) const GOOD: f64 = 1e-4;
 
-/// Tolerance of a relay's position in the checks, m: 16 times the rounding of an f32 at a kilometre.
+/// Tolerance of a relay's position in the checks, m: 16 times the rounding error of an f32 near 1000 m.
 const SLACK_M: f64 = 1e-3;
 
-/// Tolerance of a solver's reported SIR, relative: ten times the rounding of a relay's f32 formulas.
+/// Relative tolerance of a solver's reported SIR. It is ten times the rounding error of a relay's f32 formulas.
 const SIR_SLACK: f64 = 1e-5;
 
 /// Reason why a solver's chain does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
     Count(usize),
-    /// A relay is not between transmitter and receiver: its index from 1, and its x, m.
+    /// A relay is not between transmitter and receiver. The fields are the index of the relay, from 1, and its x, m.
     Outside(usize, f64),
-    /// A relay is outside the lateral range: its index from 1, and its y, m.
+    /// A relay is outside the lateral range. The fields are the index of the relay, from 1, and its y, m.
     Side(usize, f64),
-    /// A relay is outside the range of altitudes: its index from 1, and its altitude, m.
+    /// A relay is outside the range of altitudes. The fields are the index of the relay, from 1, and its altitude, m.
     Altitude(usize, f64),
     /// A relay has a smaller x than the previous relay. The field is the index of the relay, from 1.
     Order(usize),
     /// A relay is too close to the previous relay. The fields are the index of the relay, from 1, and the distance of
     /// the two, m.
     Separation(usize, f64),
-    /// The SIR is wrong: that reported by the solver, and that computed from its chain.
+    /// The reported SIR is wrong. The fields are the SIR that the solver has reported, and the SIR computed from its
+    /// chain.
     Sir(f64, f64),
 }
 
@@ -106,12 +107,13 @@ pub(crate) struct Score {
     pub(crate) flown: f64,
     /// Processor time until the first chain that is good enough, s; `None` without such a chain.
     pub(crate) good_after_s: Option<f64>,
-    /// Processor time until the first chain as good as this crate's, s; `None` without such a chain.
+    /// Processor time until the first chain whose SIR is at least that of this crate's chain, s. `None` without such a
+    /// chain.
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// Scores a solver's result. `level` is the SIR (linear) of this crate's chain. The solver's SIR is recomputed; its
-/// times are trusted.
+/// Scores a solver's result. `level` is the SIR (linear) of this crate's chain. The SIR is computed anew from the
+/// solver's chain; the reported times are not checked.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -134,7 +134,8 @@ struct Line {
     all: String,
 }
 
-/// Solver's name, with the cells of the table row, or the reason why the row has no cells.
+/// Name of a solver, and its part of the table row. That part is the cells, or the reason why the solver's chain does
+/// not count.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
 fn rows(solved: &Solved) -> Result<String, String> {
@@ -158,8 +159,8 @@ fn rows(solved: &Solved) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns the table rows of all solvers of one problem. Each row has its cells, or the reason why the solver's chain
-/// does not count.
+/// Returns the table rows of all solvers of one problem. Each row has cells, or the reason why the solver's chain does
+/// not count.
 fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;
     let optimum = problem
@@ -207,7 +208,7 @@ fn plain(why: &str) -> String {
 
 /// Formats the relative difference of an SIR from the optimum for a table cell.
 ///
-/// Differences below 1e-8 are not resolved, because the optimum is known to nine digits.
+/// A difference below 1e-8 is written as "less than 1e-8", because the optimum is known only to nine digits.
 fn short(by: f64) -> String {
     if by.abs() < 1e-8 {
         "less than 1e-8".to_owned()
@@ -216,7 +217,7 @@ fn short(by: f64) -> String {
     }
 }
 
-/// Formats a time, s, to two digits, and its ratio to this crate's time, `own_s`.
+/// Formats a time, s, to two digits, followed by its ratio to `own_s`, the time of this crate.
 fn time(time_s: f64, own_s: f64) -> String {
     let (value, unit) = match time_s {
         ..1e-3 => (time_s * 1e6, "µs"),

@@ -12,7 +12,7 @@ use crate::format::{Field, Kind, Layout};
 use crate::range::{Numbers, bounds, has_room, targets};
 use crate::value::{Fields, Value};
 
-/// Fields of messages with their range in an ordinary mission. Half of the draws of such a field are from this range.
+/// Message fields with their usual ranges. Half of the values drawn for such a field are within its usual range.
 const ORDINARY: [(&str, f64, f64); 13] = [
     ("anchor", 0.25, 4.0),
     ("altitude_m", 15.0, 400.0),
@@ -29,7 +29,7 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("interferer_y_m", -2e3, 2e3),
 ];
 
-/// Function that may choose a field's value. If it returns `None`, the generator draws a random value.
+/// Function that can choose the value of a field. If it returns `None`, the generator draws a random value.
 pub type Hint<'a> = dyn FnMut(&mut Draw<'_>, &Field) -> Option<Value<'static>> + 'a;
 
 /// Generator of random messages, from a source of bytes: a random generator, or the input of a fuzzer.
@@ -49,12 +49,12 @@ impl<'s> Draw<'s> {
         Self { source }
     }
 
-    /// Draws a byte.
+    /// Draws one random byte from the source.
     pub fn byte(&mut self) -> u8 {
         (self.source)()
     }
 
-    /// Draws `N` bytes.
+    /// Draws `N` random bytes from the source.
     pub fn bytes<const N: usize>(&mut self) -> [u8; N] {
         std::array::from_fn(|_| self.byte())
     }
@@ -68,12 +68,12 @@ impl<'s> Draw<'s> {
         f64::from(u32::from_le_bytes(self.bytes())) / f64::from(u32::MAX)
     }
 
-    /// Draws fields for a message, all within the permitted ranges.
+    /// Draws the fields of a message. All values are within the permitted ranges.
     pub fn valid<'f>(&mut self, layout: &'f Layout) -> Fields<'f> {
         self.hinted(layout, &mut |_, _| None)
     }
 
-    /// Draws random values for all fields of a message. For each number, `hint` may return a value, even a value
+    /// Draws random values for all fields of a message. For each number, `hint` can return a value, even a value
     /// outside the permitted range. If `hint` returns `None`, the value is random and within the range.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
@@ -190,8 +190,8 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws the name of a proposed view: its number, at least 1, and its proposer. A view is a membership of the
-    /// chain.
+    /// Draws the 32-bit name of a proposed view (membership of the chain). The name has the view's number, at least 1,
+    /// and the node number of its proposer.
     fn view(&mut self) -> u32 {
         let most = 0x003F_FFFF;
         let number = match self.byte() % 8 {
@@ -207,7 +207,7 @@ impl<'s> Draw<'s> {
         number << 10 | node
     }
 
-    /// Draws fields with arbitrary numbers, in range or not. Their encoding is well-formed.
+    /// Draws fields with arbitrary numbers, within their ranges or not. The fields can always be encoded.
     pub fn arbitrary<'f>(&mut self, fields: &'f [Field]) -> Fields<'f> {
         let draw = fields.iter().map(|field| (field, self.any(&field.kind)));
         Fields(draw.collect())
@@ -257,7 +257,8 @@ impl<'s> Draw<'s> {
     }
 }
 
-/// Changes views of a Decision until they are in order.
+/// Changes the views in a Decision message so that they ascend, as the format requires. The order is: base view,
+/// accepted view, proposed view.
 fn decision(fields: &mut Fields<'_>) {
     let get = |fields: &Fields<'_>, name: &str| Numbers(fields).get(name);
     let (base, view) = (get(fields, "base_view"), get(fields, "proposed_view"));
@@ -275,7 +276,8 @@ fn decision(fields: &mut Fields<'_>) {
     }
 }
 
-/// Changes fields of a message so that they obey the rules between them. [`range`](crate::range) checks these rules.
+/// Changes the fields of a message so that they obey the rules between several fields. [`range`](crate::range) checks
+/// these rules.
 fn obey_rules<'f>(message: &str, fields: &mut Fields<'f>) {
     let get = |fields: &Fields<'f>, name: &str| Numbers(fields).get(name);
     let single = |fields: &mut Fields<'f>, name: &str, number: f64| {
@@ -374,10 +376,11 @@ fn list<'f>(fields: &mut Fields<'f>, name: &str, change: impl FnOnce(&mut Vec<Va
     }
 }
 
-/// Sorts the four views (memberships of the chain) in a Proposal message, as the format requires.
+/// Changes the four views in a Proposal message so that they ascend, as the format requires. A view is a membership of
+/// the chain.
 ///
-/// They ascend in this order: the view that was agreed on, the view that the relay accepted after it, the proposal
-/// that led to the accepted view, and the proposed view.
+/// The order is: the view that was agreed on, the view that the relay accepted after it, the proposal that led to the
+/// accepted view, and the proposed view.
 fn proposal(fields: &mut Fields<'_>) {
     let view = |fields: &Fields<'_>, name| Numbers(fields).get(name) as u32;
     let mut order = vec![view(fields, "agreed_view"), view(fields, "proposed_view")];

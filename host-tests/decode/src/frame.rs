@@ -33,8 +33,8 @@ pub struct Frame<'f> {
 
 /// Decodes a frame. `wire` has its bytes with the final delimiter, or only the first bytes of a longer frame.
 ///
-/// `len` is the length of the whole frame on the wire. The library decides whether a receiver rejects the frame; the
-/// tables of `FORMAT.md` provide its fields and the reason for a rejection.
+/// `len` is the length of the whole frame on the wire. The crate's own decoder decides whether a receiver rejects the
+/// frame. The tables of `FORMAT.md` give the fields, and the reason of a rejection.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     let mut frame = Frame {
         len,

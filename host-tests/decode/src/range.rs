@@ -52,8 +52,8 @@ fn is_between(range: &str, number: f64) -> bool {
     (least..=most).contains(&number) || zero && number == 0.0
 }
 
-/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`. Returns true if 0 is allowed besides
-/// the bounds, and the two bounds.
+/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`. Returns the two bounds, and before them
+/// true if 0 is permitted, too.
 pub fn bounds(range: &str) -> (bool, f64, f64) {
     let first = range.split(';').next().unwrap_or_default();
     let (zero, rest) = ["`00000000` or ", "0 or "]
@@ -101,13 +101,13 @@ impl<'f> Numbers<'_, 'f> {
         }
     }
 
-    /// Returns true if the number of the field `name` is exactly 0. It is an integer 0, or an f32 with all bits 0.
+    /// Returns true if the number of the field `name` is exactly 0; false for -0.0.
     fn is_zero(&self, name: &str) -> bool {
         let number = self.get(name);
         number == 0.0 && number.is_sign_positive()
     }
 
-    /// Returns true if a lease renewal has no part `nodes`, or one of its nodes is not 0.
+    /// Returns true if a lease renewal has no group `nodes`, or at least one node in this group is not 0.
     fn names_a_node(&self) -> bool {
         let mut names = ["leaver", "joiner", "spare"].into_iter();
         self.group("nodes")
@@ -243,9 +243,8 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
 
 /// Returns the target SIRs (linear, ascending) that a sweep message lists in compact form.
 ///
-/// The list starts from the target `anchor`. `gap` encodes the relative gap to the next target, 0 for a single
-/// target; `growth` encodes the factor from each gap to the next. Each f64 result is rounded to f32, as a relay's f32
-/// operation does.
+/// `anchor` is one of the targets. `gap` encodes the relative gap to the next target, 0 for a single target; `growth`
+/// encodes the factor from each gap to the next. Each f64 result is rounded to f32, as a relay's f32 operation does.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Reason for rejecting a frame: the first one that a receiver would find.
+/// Reason for rejecting a frame. If there are several reasons, it is the reason that a receiver finds first.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Refusal {
     /// The stream ends before the frame's delimiter.
@@ -13,15 +13,15 @@ pub enum Refusal {
     Truncated,
     /// The frame is too short for header and CRC, or for the tag. The number is its length without COBS, bytes.
     Short(usize),
-    /// The CRC is wrong: the received CRC and the computed CRC.
+    /// The CRC is wrong. The fields are the received CRC and the computed CRC.
     Crc(u32, u32),
-    /// The version of the frame format or the flags are unknown: both values.
+    /// The version of the frame format is unknown, or the flags are. The fields are the version and the flags.
     Version(u8, u8),
-    /// Unknown tag, the byte that states the kind of message.
+    /// The message tag (the byte that states the kind of message) is unknown.
     UnknownTag(u8),
-    /// Body that is not the canonical encoding of any message; with the fault.
+    /// The body is not the canonical encoding of any message. The text describes the fault.
     Malformed(String),
-    /// Number in the message that is out of range.
+    /// A number in the message is out of range.
     Range,
 }
 

@@ -42,12 +42,13 @@ impl TagCheck {
     }
 }
 
-/// Number of a node's latest nonces with which a tag is verified.
+/// Number of nonces that the verifier stores for a node: the newest ones.
 ///
-/// Several nonces are tried, because frames that were signed before a new handshake may arrive after it.
+/// A tag is right if it fits any of them. A frame that was signed before a new handshake can arrive after it, so the
+/// last nonce alone is not enough.
 const TRIED: usize = 4;
 
-/// Network number, sender and destination of frames, by which the sender's nonces are stored.
+/// Key of the stored nonces: network number, sender and destination of the frames.
 type Pair = (u16, u16, u16);
 
 /// Verifier of authentication tags, with the nonces of all captured handshakes.

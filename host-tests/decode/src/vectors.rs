@@ -8,14 +8,14 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 const FILE: &str = include_str!("../../tests/data/vectors.json");
 
-/// Test vectors: the content of their file.
+/// Test vectors: the content of the file `vectors.json`.
 #[derive(Deserialize, Debug)]
 pub struct Vectors {
     /// Valid frames without a tag.
     pub frames: Vec<Frame>,
-    /// Handshakes and a message with authentication tags, in the order of sending.
+    /// Handshakes and a message, with authentication tags, in the order in which they are sent.
     pub signed: Vec<Signed>,
-    /// Lists of target SIRs with the compact form in which a sweep message has them.
+    /// Lists of target SIRs, each with its compact form in a sweep message.
     pub ladders: Vec<Ladder>,
     /// Byte streams that a receiver rejects, or whose message has no effect.
     pub rejected: Vec<Rejected>,
@@ -74,8 +74,8 @@ pub struct Signed {
 /// Test vector: the compact form of a sweep message's list of target SIRs, and the targets.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Bits of the target SIR with index 7 (of 0 to 15) as f32, in hexadecimal. It may be the only target of the ladder. The targets below
-    /// and above follow from it.
+    /// Target SIR with index 7 of 0 to 15, or the only target: the bits of its f32, in hexadecimal. The targets below
+    /// and above are computed from it.
     pub anchor: String,
     /// Code of the relative gap between the anchor and the next target SIRs; 0 for a single target.
     pub gap: u8,
@@ -101,7 +101,7 @@ impl Vectors {
     /// Reads the test vectors from their built-in file.
     ///
     /// # Errors
-    /// The file is not as described; a test ensures that it is.
+    /// The file does not have this format. A test checks that it has.
     pub fn load() -> Result<Self, serde_json::Error> {
         serde_json::from_str(FILE)
     }

@@ -21,7 +21,8 @@ impl Rest<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    /// Reads a variable-length integer of the postcard format; an error unless it has its shortest form.
+    /// Reads a variable-length integer of the postcard format. Returns an error if the integer is not in its shortest
+    /// form.
     fn varint(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
@@ -50,7 +51,7 @@ impl Rest<'_> {
 
 /// Decodes the body of a message, with the tables of `FORMAT.md` instead of the crate's code.
 ///
-/// Returns the layout of the message and the values of its fields.
+/// Returns the layout of the message and the values of its fields. The body begins with the message tag.
 ///
 /// # Errors
 /// The reason for which a receiver has to reject the body according to the tables.
@@ -67,7 +68,8 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes the message fields `fields` from `body`. Also returns an error text if bytes are missing or left over.
+/// Decodes the message fields `fields` from `body`. Also returns an error text if bytes are missing or left over;
+/// otherwise `None`.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

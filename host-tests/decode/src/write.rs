@@ -5,8 +5,8 @@ use serde_json::Value as Json;
 use crate::format::{Field, Format, Kind};
 use crate::value::{Fields, Value};
 
-/// Encodes the body of the message `name`. `fields` are as `cargo decode --json` prints them; digests and flags may
-/// also be numbers.
+/// Encodes the body of the message `name`. `fields` has the values in the form that `cargo decode --json` prints;
+/// digests and flags are also accepted as numbers.
 ///
 /// # Errors
 /// Names the field whose value is missing or does not fit its type.

@@ -46,7 +46,7 @@ pub fn paper(relays: u16) -> Mission {
 
 const FLIGHT: Duration = Duration::from_millis(2);
 
-/// Radio range on a shared channel: number of relays in each direction that receive a frame.
+/// Radio range on a shared channel. A frame reaches this number of relays in each direction of the chain.
 const RANGE: usize = 4;
 
 struct Arrival {
@@ -100,7 +100,7 @@ impl Chain {
         &self.relays
     }
 
-    /// Returns the relays as mutable, so that a test can call the functions that their firmware would call.
+    /// Returns the relays as mutable. A test can then call the functions that a firmware calls.
     pub fn relays_mut(&mut self) -> &mut [Relay] {
         &mut self.relays
     }

@@ -10,7 +10,7 @@ use uav_relay_features::{Chain, paper, shared};
 
 // Results of the full set of features; `-- --nocapture` prints them, for an update after a change of the arithmetic or the wire
 // format.
-/// Expected x of the relays in a chain of five, m, each as the bits of an f32.
+/// Expected x of each relay in a chain of five, m, as the bits of an f32.
 const OF_FIVE: [u32; 5] = [
     0x439b_7618,
     0x43ac_5a98,
@@ -22,8 +22,8 @@ const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
 /// Expected CRC-32C of all bytes that the relays send, when they are connected by wires.
 ///
-/// With the feature `departures` each lease renewal contains a flag that all relays are in place. No other feature
-/// changes a byte.
+/// With the feature `departures` each lease renewal has one flag more: it states that all relays are in place. No other
+/// feature changes a byte.
 const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
     0x7b9b_6625
 } else {

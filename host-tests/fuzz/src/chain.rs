@@ -24,14 +24,14 @@ const MAX_IN_TRANSIT: usize = 24;
 const MAX_ROUNDS: u8 = 128;
 
 /// Tolerance for the minimum separation of two relays, as a fraction of the distance from Tx to Rx. Positions are f32
-/// numbers, so rounding may bring two relays closer by this much.
+/// numbers, so rounding can bring two relays closer by this much.
 const ROUNDING: f64 = 1.3e-7;
 
 /// Fuzz target. Reads `data` as a mission, settings of each relay, and operations on the frames between them.
 ///
 /// # Panics
-/// A relay breaks a rule that the module `watch` checks, two neighbours that got their positions by one pass (a round
-/// of messages along the chain) are too close, or the chain does not agree after faults have ended.
+/// A relay breaks a rule that the module `watch` checks. Or two neighbours whose positions come from the same pass (a
+/// message along the chain and back) are too close. Or the chain does not agree after faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
@@ -68,7 +68,7 @@ struct Chain {
     mission: Mission,
     members: Vec<Member>,
     now: Instant,
-    /// Random seed of the relay that starts next; it increases at every start.
+    /// Random seed of the next relay that starts. It increases at every start.
     seed: u32,
     version: u16,
 }
@@ -162,7 +162,7 @@ impl Chain {
         }
     }
 
-    /// Delays the oldest frame in transit to relay `at`: all others overtake it.
+    /// Delays the oldest frame in transit to relay `at`. All other frames to this relay then arrive before it.
     fn delay_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()
@@ -182,7 +182,7 @@ impl Chain {
         }
     }
 
-    /// Delivers the oldest frame to relay `at` in two pieces. The second piece may be lost, as `input` chooses.
+    /// Delivers the oldest frame to relay `at` in two pieces. `input` chooses whether the second piece is lost.
     fn cut(&mut self, at: usize, input: &mut Input<'_>) {
         let (place, lost) = (usize::from(input.byte()), input.flag());
         if let Some(frame) = self.take(at) {
@@ -220,7 +220,8 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Delivers to each relay its oldest frame, without faults. If no frame is in transit, advances the time first.
+    /// Delivers to each relay its oldest frame, without faults. If no frame is in transit, first advances the time to
+    /// the next timeout.
     fn round(&mut self) {
         if self.members.iter().all(|member| member.arriving.is_empty()) {
             self.wake();
@@ -242,7 +243,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Restarts relay `at`. The frames in transit to it stay.
+    /// Restarts relay `at`. The frames in transit to it are still delivered later.
     fn reboot(&mut self, at: usize) {
         let Some(settings) = self.members.get(at).map(|member| member.settings) else {
             return;
@@ -293,7 +294,7 @@ impl Chain {
         }
     }
 
-    /// Puts the frames of relay `at` in transit, and checks the distance of this relay from its neighbours.
+    /// Puts the frames that relay `at` sends in transit. Checks the relay's view, and its distance from its neighbours.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -325,9 +326,10 @@ impl Chain {
         }
     }
 
-    /// Checks the view (membership of the chain) of a relay against the mission.
+    /// Checks the index of relay `at` in its view, and the number of relays in the view. A view is a membership of the
+    /// chain.
     ///
-    /// On either side of the relay, the view must not have more relays than the mission.
+    /// On either side of the relay, the view must not have more relays than the mission has there.
     fn check_place(&self, at: usize) {
         if let Some(member) = self.members.get(at) {
             let relay = member.watched.relay();
@@ -341,8 +343,8 @@ impl Chain {
         }
     }
 
-    /// Checks the separation of relay `at` (from 0) from the previous relay, if the same pass placed both. A pass is
-    /// a round of messages along the chain.
+    /// Checks the separation of relay `at` (from 0) from the previous relay. Does nothing unless both have their
+    /// positions from the same pass. A pass is a message along the chain and back.
     fn check_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

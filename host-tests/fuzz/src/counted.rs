@@ -5,8 +5,8 @@ use uav_relay::Stats;
 /// Returns the number of received frames with a valid CRC, as a sum of counters. Each such frame is in exactly one of
 /// the summed counters.
 ///
-/// `key` is true if the relay has a signing key. It then rejects unsigned frames, and their counter is added. Without
-/// a key it accepts them, and they are in the counters of accepted frames.
+/// `key` is true if the relay has a signing key. Such a relay rejects unsigned frames, and counts them in `unsigned`,
+/// which is added. A relay without a key accepts unsigned frames, and counts them with the accepted frames.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {
     let unsigned = if key { stats.unsigned } else { 0 };
     stats.received

@@ -10,11 +10,12 @@ use super::setting;
 
 /// Fuzz target. Reads `data` as two lengths and a byte stream.
 ///
-/// A deframer gets the stream byte by byte, one relay gets it whole, and another relay in pieces of those lengths.
+/// A deframer receives the stream byte by byte, one relay receives it as a whole, and another relay in pieces of these
+/// lengths.
 ///
 /// # Panics
 /// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it
-/// got (each push stores at most one, so that its work is bounded); or the relays differ.
+/// has received. Or the two relays differ afterwards. (Each push stores at most one byte, so that its work is bounded.)
 pub fn deframe(data: &[u8]) {
     let mut input = Input::new(data);
     let lengths = input.word();

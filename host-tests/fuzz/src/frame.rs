@@ -21,14 +21,14 @@ use super::watch::NETWORK;
 
 const CHECK: usize = 4;
 
-/// Value of a byte of fuzzer input that makes `setting::of_chain` select signed frames.
+/// Byte of fuzzer input for which `setting::of_chain` selects signed frames.
 const SIGNS: u8 = 8;
 
 /// Fuzz target. Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
 ///
 /// # Panics
-/// The frame changes on its way, a flipped bit is not detected, a message has two encodings, or a body is not
-/// accepted or rejected as the tables of `FORMAT.md` say.
+/// The decoded frame differs from the original, a flipped bit is not detected, a message has two encodings, or the
+/// decoder accepts or rejects a body against the tables of `FORMAT.md`.
 pub fn frame(data: &[u8]) {
     let plain = sealed(data.to_vec());
     let wire = stuffed(&plain);
@@ -91,10 +91,10 @@ fn check_decoded(plain: &[u8]) {
     assert_eq!(opened.handshake, flags == 3);
 }
 
-/// Checks a relay that requires authentication tags.
+/// Checks that a relay which requires authentication tags verifies them.
 ///
-/// The relay must accept the body with valid addresses and tag once. With a flipped bit it must reject the frame as
-/// forged.
+/// The relay must accept a frame with this body, valid addresses and a valid tag, but only once. If a bit of the frame
+/// is flipped, the relay must reject the frame as forged.
 fn check_signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
     let Some(HandshakenPair {
@@ -150,7 +150,7 @@ fn check_signed(plain: &[u8]) {
     assert_eq!(after, expected);
 }
 
-/// Relay 2 of 3, which requires authentication tags, and its upstream neighbour, after their handshake.
+/// Relay 2 of 3, which requires authentication tags, and its upstream neighbour. Both have exchanged handshakes.
 #[derive(Clone)]
 struct HandshakenPair {
     relay: Relay,
@@ -220,7 +220,7 @@ fn check_flipped_bit(plain: &[u8]) {
     assert_eq!(frame::decode(&plain), Err(refusal));
 }
 
-/// Checks that a message body is accepted or rejected as the tables of `FORMAT.md` say.
+/// Checks that the decoder accepts exactly the message bodies that the tables of `FORMAT.md` permit.
 fn check_body(body: &[u8]) {
     static FORMAT: LazyLock<Option<Format>> = LazyLock::new(|| Format::load().ok());
     let Some(format) = &*FORMAT else {

@@ -53,7 +53,7 @@ pub fn allocations() -> u64 {
 /// Runs `work`, which must not allocate.
 ///
 /// # Panics
-/// It allocates.
+/// If `work` allocates memory.
 pub fn without_allocation<T>(work: impl FnOnce() -> T) -> T {
     let before = allocations();
     let done = work();

@@ -83,7 +83,7 @@ impl<'a> Input<'a> {
         narrow(f64::from(low) * ratio.powf(part)).clamp(low, high)
     }
 
-    /// Reads any number one time in sixteen, else the result of `usual`.
+    /// Reads an arbitrary f32 in one of sixteen cases, otherwise the result of `usual`.
     pub fn mostly(&mut self, usual: impl FnOnce(&mut Self) -> f32) -> f32 {
         if self.byte() % 16 == 15 {
             self.any_number()

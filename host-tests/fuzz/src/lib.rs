@@ -38,7 +38,7 @@ pub use mavlink::mavlink;
 pub use relay::relay;
 pub use scenario::scenario;
 
-/// Fuzz target: its name, which is also the name of its corpus, and its function.
+/// Fuzz target: its name and its function. The name is also the name of its corpus, the collection of inputs.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// List of all fuzz targets.

@@ -27,14 +27,14 @@ const HANDSHAKE_BODY: usize = 2 * NONCE + 1;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Nonce of the simulated neighbour itself, larger after every start.
+    /// Nonce of the simulated neighbour. It increases at every start.
     own: Vec<u8>,
     relay: Vec<u8>,
     counter: u32,
 }
 
 impl Member {
-    /// Creates a neighbour that has received the tested relay's handshake, if `frame` is a handshake.
+    /// Creates a neighbour that has received `frame`, the tested relay's handshake. `None` if `frame` is no handshake.
     pub fn from_handshake(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
@@ -52,7 +52,7 @@ impl Member {
         })
     }
 
-    /// Creates a neighbour before any handshake in either direction.
+    /// Creates a neighbour that has neither sent nor received a handshake.
     pub fn unknown() -> Self {
         Self {
             key: KEY,
@@ -62,7 +62,7 @@ impl Member {
         }
     }
 
-    /// Returns this neighbour as after a restart: with a larger nonce.
+    /// Returns this neighbour after a restart: with a larger nonce, and with the frame counter 0.
     pub fn restarted(&self) -> Self {
         Self {
             own: incremented(&self.own),
@@ -123,7 +123,7 @@ fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
     handshake.then(|| body.to_vec())
 }
 
-/// Returns a little-endian number of any length, plus one.
+/// Returns `number` plus one. `number` is a little-endian number of any length.
 fn incremented(number: &[u8]) -> Vec<u8> {
     let mut carry = true;
     let up = number.iter().map(|&byte| {

@@ -13,7 +13,8 @@ use parts::Body;
 
 pub use parts::RelayState;
 
-/// Builds a message body with fuzzed fields, of one of the kinds 0 to 22 except 20, or arbitrary bytes.
+/// Builds a message body. It is a message with fuzzed fields, of one of the kinds 0 to 22 except 20, or it consists of
+/// arbitrary bytes.
 ///
 /// Some fields are drawn near the values in `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
@@ -62,9 +63,10 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     body.bytes
 }
 
-/// Field that a sweep message has between the sender's power and its list of positions.
+/// Additional field of a sweep message: none, Upsilon = E[1 / interference], or the lateral position.
 ///
-/// The list has one position for each target SIR: the farthest position at which the next relay meets the target.
+/// The field is between the sender's power and the list of positions. The list has one position for each target SIR:
+/// the sender's farthest position at which the target is met.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
@@ -115,7 +117,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends profiles (altitude and power) of up to eight relays to the message. Their indices mostly rise.
+    /// Appends profiles (altitude and power) of up to eight relays to the message. The relays' indices mostly ascend.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -222,7 +224,7 @@ impl Body<'_, '_> {
         self.small(0, 15);
     }
 
-    /// Appends a number and the digest of a mission, as in a Watch.
+    /// Appends a sequence number and the digest of a mission. A Watch message begins with these two fields.
     fn pass_of_mission(&mut self) {
         self.request_number();
         self.digest();

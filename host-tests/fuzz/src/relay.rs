@@ -18,13 +18,13 @@ use addresses::{far, from, port};
 /// Maximum number of fuzzed operations in one run. It limits the run's duration: each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
-/// Maximum number of relays in the fuzzed mission; but one mission in sixteen has a thousand.
+/// Maximum number of relays in the fuzzed mission. One mission in sixteen has 1000 relays instead.
 const MAX_RELAYS: u8 = 5;
 
 /// Maximum number of timeouts that one operation handles.
 const MAX_WAKES: u8 = 64;
 
-/// Fuzz target. Reads `data` as a mission, a relay, its settings, and operations on it.
+/// Fuzz target. Reads `data` as a mission, a relay's settings, and operations on this relay.
 ///
 /// # Panics
 /// The relay breaks a rule that the module `watch` checks, or an intact frame is not counted exactly once.
@@ -57,11 +57,12 @@ struct Bench {
     mission: Mission,
     wiring: Wiring,
     now: Instant,
-    /// Simulated neighbours upstream and downstream, if the relay requires authentication tags.
+    /// Simulated neighbours upstream and downstream. `None` if the relay does not require authentication tags, or if
+    /// the fuzzer does not know the relay's nonce.
     members: [Option<Member>; 2],
 }
 
-/// Bytes of a frame for the relay, and the counter that must count the frame.
+/// Bytes of a frame for the relay, and the counter in which the relay must count this frame.
 struct TestFrame {
     wire: Vec<u8>,
     counter: ExpectedCounter,
@@ -104,7 +105,8 @@ impl Bench {
         })
     }
 
-    /// Exchanges handshakes between the relay and its neighbours, if it requires authentication tags.
+    /// Exchanges handshakes between the relay and its neighbours, if it requires authentication tags. Without this
+    /// requirement there is no handshake.
     fn exchange_handshakes(&mut self) {
         let (sent, _) = self.watched.settle(self.now);
         for side in [0, 1] {
@@ -118,8 +120,8 @@ impl Bench {
         }
     }
 
-    /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake. The relay does not
-    /// send its handshake to Tx or Rx before it has received a handshake from Tx or Rx.
+    /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake. `None` if this
+    /// neighbour is a relay. Tx or Rx sends its handshake first, because the relay only answers their handshakes.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -138,7 +140,8 @@ impl Bench {
 
     /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream).
     ///
-    /// Its handshake is delivered to the relay. With `None` there is no neighbour at this side any more.
+    /// The neighbour's handshake is delivered to the relay. If `member` is `None`, this side has no neighbour from now
+    /// on.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -181,8 +184,8 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes to the relay. If they contain a recorded handshake, the relay changes its nonces, so
-    /// the fuzzer then forgets its simulated neighbours.
+    /// Delivers arbitrary bytes to the relay. If they contain a valid handshake, the relay changes its nonces. The
+    /// simulated neighbours are then removed, because they do not know the new nonces.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -231,8 +234,8 @@ impl Bench {
         self.watched.sample(self.now, sample, count);
     }
 
-    /// Reports a present or past position of the drone to the relay. Now and then reports that lost neighbours have
-    /// landed.
+    /// Reports a present or past position of the drone to the relay. In some draws it reports instead that lost
+    /// neighbours have landed.
     fn position(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         if how >= 0xF0 {
@@ -252,7 +255,7 @@ impl Bench {
 
     /// Delivers a message with a valid CRC to the relay.
     ///
-    /// Header and port mostly belong to a neighbour; sometimes the header or the port has another value.
+    /// Header and port are mostly those of a neighbour. In some draws one of them has another value.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
@@ -340,8 +343,8 @@ impl Bench {
         assert_eq!(before.poll_timeout(), after.poll_timeout());
     }
 
-    /// Builds a frame with this body. It is signed if the relay requires authentication tags; now and then it is made
-    /// as an attacker would.
+    /// Builds a frame with this body. The frame is signed if the relay requires authentication tags. In some draws the
+    /// frame is forged: altered, unsigned, or signed with a wrong key or nonce.
     fn test_frame(
         &mut self,
         side: usize,
@@ -391,8 +394,8 @@ impl Bench {
     }
 }
 
-/// Returns the number of received frames that the relay has counted as accepted or rejected. `key` is true if it has
-/// a signing key.
+/// Returns the number of received frames that the relay has accepted or rejected, by its counters. `key` is true if the
+/// relay has a signing key.
 fn frames(stats: &Stats, key: bool) -> u64 {
     let broken = [stats.oversized, stats.truncated, stats.crc];
     let broken: u64 = broken.into_iter().map(u64::from).sum();

@@ -10,7 +10,7 @@ const RELAYS: [u16; 4] = [1, 3, 8, 1000];
 /// Fuzz target. Reads `data` as the text of a scenario file; ignores it if it is not UTF-8.
 ///
 /// # Panics
-/// An error has more than one line, a number is out of its field's range, or a mission has a number that is not
+/// An error text has more than one line, a number is out of its field's range, or a mission has a number that is not
 /// finite.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {

@@ -63,7 +63,8 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the paper's scenario with `relays` relays and one change, which `kind` selects. `None` for no such kind.
+/// Returns the paper's scenario with `relays` relays and one change, which `kind` selects. `None` if `kind` selects no
+/// change.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,
@@ -225,7 +226,8 @@ fn channel(input: &mut Input<'_>) -> Option<Channel> {
     Channel::from_db(carrier_hz, los.into(), nlos.into(), air_ground).ok()
 }
 
-/// Reads the settings of one relay of `mission`. `chain` has the settings that all its relays share.
+/// Reads the settings of one relay of `mission`. `chain` has the settings that are the same for all relays of the
+/// chain.
 pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Settings {
     let own = input.byte();
     let profile = (own % 4 == 1).then(|| Profile {

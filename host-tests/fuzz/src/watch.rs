@@ -40,7 +40,7 @@ pub struct Sent {
     pub bytes: Vec<u8>,
 }
 
-/// Relay under test, with its state at the last check of its rules.
+/// Relay under test, with its state when the rules were last checked.
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
@@ -55,12 +55,12 @@ pub struct Watched {
     setpoint: Option<Placement>,
     /// Surveyed positions of Tx and Rx in the mission that the relay uses now; `None` if it has none.
     sites: Option<Sites>,
-    /// Distance from Tx to Rx in the mission that was loaded into the relay before flight, m.
+    /// Distance from Tx to Rx, m, in the mission that was loaded into the relay before flight.
     loaded_m: f32,
     frames: Frames,
-    /// Number of bytes received since the last frame delimiter, for each port.
+    /// Number of bytes received at each port since the last frame delimiter.
     begun: [usize; 3],
-    /// Pass (round of messages along the chain) that gave the relay its position: view and number.
+    /// Pass that has given the relay its position: view and number. A pass is a message along the chain and back.
     ///
     /// `None` if unknown.
     held: Option<(ViewId, u16)>,
@@ -110,7 +110,7 @@ impl Watched {
         &self.settings
     }
 
-    /// Returns the number of the last pass (round of messages along the chain) in the relay's frames.
+    /// Returns the number of the last pass (message along the chain and back) in the relay's frames.
     pub const fn number(&self) -> u16 {
         self.frames.number
     }
@@ -120,21 +120,23 @@ impl Watched {
         self.frames.association
     }
 
-    /// Returns the number in the relay's last hello that an offer of a mission has to repeat, 0 for none.
+    /// Returns the number in the relay's last hello, 0 for none. The offer of a mission has to repeat this number.
     pub const fn offer_number(&self) -> u16 {
         self.frames.asked
     }
 
-    /// Returns view and number of the pass (round of messages) that gave the relay its agreed position.
+    /// Returns view and number of the pass that has given the relay its agreed position. A pass is a message along the
+    /// chain and back.
     ///
-    /// `None` if the pass is not known. With a collision guard it is never known.
+    /// `None` if the pass is not known. The pass of a relay with a collision guard is never known.
     pub const fn held(&self) -> Option<(ViewId, u16)> {
         self.held
     }
 
-    /// Forgets which pass (round of messages) gave the relay its position.
+    /// Forgets which pass (message along the chain and back) has given the relay its position.
     ///
-    /// A restarted leader numbers its passes anew, so that equal numbers may be different passes.
+    /// Called when a relay restarts. A restarted leader numbers its passes anew, so two different passes may have the
+    /// same number.
     pub const fn forget_pass(&mut self) {
         self.held = None;
     }
@@ -142,7 +144,8 @@ impl Watched {
     /// Delivers bytes to the relay at `port`.
     ///
     /// # Panics
-    /// The relay exceeds its bounds on work: one CRC for each 16 bytes, and one decoded message for each 19 bytes.
+    /// The relay exceeds its bounds on work: one CRC for every 16 received bytes, and one decoded message for every 19
+    /// received bytes.
     pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let before = *self.relay.stats();
         heap::without_allocation(|| self.relay.handle_bytes(now, port, bytes));
@@ -181,7 +184,7 @@ impl Watched {
         heap::without_allocation(|| self.relay.clear_lost(now, side));
     }
 
-    /// Uploads a mission to the relay, which may refuse it.
+    /// Uploads a mission to the relay. The relay can refuse it.
     pub fn upload(&mut self, now: Instant, upload: &Upload) {
         // An older mission, or one for a relay without a key, is refused.
         _ = heap::without_allocation(|| self.relay.handle_upload(now, upload));
@@ -265,8 +268,8 @@ impl Watched {
 
     /// Checks the relay's setpoint, and that each of its changes is reported.
     ///
-    /// Without a collision guard the setpoint must be the agreed position. With a guard it must be inside the
-    /// geofence, or at least no farther outside than before.
+    /// Without a collision guard the setpoint must be the agreed position. With a guard it must be inside the geofence,
+    /// or no farther outside than before.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);

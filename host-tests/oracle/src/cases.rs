@@ -99,7 +99,7 @@ pub fn of(function: &str) -> Result<Vec<Case>, serde_json::Error> {
 }
 
 impl Case {
-    /// Returns the scenario of this case as a link with `n` relays, all at the same altitude.
+    /// Returns the scenario of this case as a link with `n` relays. All relays have the same altitude and power.
     pub fn link(&self, n: usize) -> Link {
         let p = &self.params;
         Link {

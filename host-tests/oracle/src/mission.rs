@@ -11,8 +11,8 @@ use crate::reference::{Link, Relay};
 
 /// Converts a reference link to a mission, and to the profiles of relays that differ from the first.
 ///
-/// The first relay's profile (altitude and power) is the common one of the mission. Each other profile has the
-/// relay's index, from 1, beside it. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay
+/// The profile (altitude and power) of the first relay becomes the common profile of the mission. Each returned profile
+/// has the index of its relay, from 1. `tolerance` is the relative tolerance of the mission's SIR. `None` if a relay
 /// would reject a number.
 pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profile)>)> {
     let weight = (link.mu_nlos - link.eta) / (link.mu_nlos - link.mu_los).max(f64::MIN_POSITIVE);
@@ -54,9 +54,9 @@ pub fn of_link(link: &Link, tolerance: f64) -> Option<(Mission, Vec<(u16, Profil
     Some((Mission::try_new(config).ok()?, own.collect()))
 }
 
-/// Converts a reference link to the planner's description of a chain. `None` without relays.
+/// Converts a reference link to the planner's description of a chain. `None` if the link has no relays.
 ///
-/// The range of altitudes that the planner may choose from is the altitude of the first relay only.
+/// The planner's range of altitudes contains only one altitude, that of the first relay.
 pub fn scene_of(link: &Link) -> Option<Scene> {
     let altitude_m = link.relays.first()?.altitude_m;
     let relay = |station: &Relay| scene::Relay {
@@ -135,7 +135,8 @@ pub fn of_stochastic_link(link: &StochasticLink, min_separation_m: f32) -> Optio
 /// factors.
 const UNIT_CARRIER_HZ: f64 = 299_792_458.0 / (4.0 * std::f64::consts::PI);
 
-/// Rounds every number of `link` to the f32 of relays, so that only a relay's arithmetic is tested.
+/// Rounds every number of `link` to f32, as in a relay's mission. A comparison then tests only a relay's arithmetic,
+/// not the rounding of its inputs.
 pub fn as_relays_know_it(link: &Link) -> Link {
     let round = |value: f64| f64::from(narrow(value));
     Link {

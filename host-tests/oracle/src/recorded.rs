@@ -139,7 +139,8 @@ impl Row {
     }
 }
 
-/// Returns all parameters of a placement problem in f32, by which it is found in the recorded file.
+/// Returns all parameters of a placement problem as f32 numbers. The problem is looked up in the recorded file by these
+/// numbers.
 ///
 /// The altitudes of `link` are left out, because relays choose their altitudes in these problems.
 fn key(link: &Link, corridor: Corridor, held: &[FixedCrossSection]) -> Vec<f32> {
@@ -186,7 +187,7 @@ pub fn all() -> Result<&'static [Record]> {
 /// `None` if no chain has a positive SIR and keeps the minimum separation.
 ///
 /// # Errors
-/// If the problem is not recorded: `SEED` and `COUNT` of a test can select recorded problems only.
+/// If the problem is not recorded. So the `SEED` and `COUNT` of a test must select recorded problems.
 pub fn optimum(
     link: &Link,
     corridor: Corridor,

@@ -11,11 +11,11 @@ use uav_relay_sim::cli::Prepared;
 use uav_relay_sim::report::seconds;
 use uav_relay_sim::simulator::outcome::{Outcome, Shot, Transmission};
 
-/// Largest number of pictures of the chain in a recording. If there are more, pictures that are close in time are
+/// Maximum number of pictures of the chain in a recording. If there are more, pictures that are close in time are
 /// merged.
 const STANDS: usize = 600;
 
-/// Largest number of frames in a recording; later frames are left out.
+/// Maximum number of frames in a recording; later frames are left out.
 const FRAMES: usize = 20_000;
 
 #[derive(Serialize)]
@@ -35,13 +35,13 @@ struct StandTold {
     ///
     /// The position is `None` until the relay has agreed on a position.
     relays: Vec<(u16, bool, Option<[f32; 3]>)>,
-    /// Linear SIR of every hop from Tx to Rx, over the relays that are on and have a position. Empty if there are no
-    /// such relays.
+    /// SIR of every hop, linear, from Tx to Rx. The hops lead over the relays that are on and have a position. Empty if
+    /// there are no such relays.
     sirs: Vec<f32>,
     /// SIR of every hop in the direction from Rx to Tx, linear; empty for data in one direction.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     backs: Vec<f32>,
-    /// Number of frames sent on all links from the start until this time.
+    /// Number of frames sent by all nodes from the start until this time.
     messages: u64,
     /// Estimated interferer: power in W, x and y in m. `None` if no interferer is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -52,7 +52,8 @@ struct StandTold {
 struct Change {
     relays: BTreeMap<u16, (bool, Option<Placement>)>,
     messages: u64,
-    /// New interference estimate of the relays at this time. `None` without a change, or if they measure nothing.
+    /// New interference estimate of the relays at this time. `None` if it has not changed, or if the relays do not
+    /// measure.
     believed: Option<InterferenceEstimate>,
 }
 
@@ -83,7 +84,7 @@ fn changes(shots: &[Shot], outcome: &Outcome) -> BTreeMap<Instant, Change> {
 
 /// Merges changes that are close in time, so that a recording has at most [`STANDS`] pictures.
 ///
-/// A merged change has the time of the later of its changes.
+/// The merged change has the time of the last of its changes.
 fn thinned(all: BTreeMap<Instant, Change>) -> BTreeMap<Instant, Change> {
     let mut all = all;
     let mut apart_us = 1_000;

@@ -22,10 +22,10 @@ use film::FilmTold;
 
 const NAME: &str = "the page";
 
-/// Number of simulator events between two checks that the run is not longer than permitted.
+/// Number of simulator events after which the program checks that the run is not too long.
 const HAPPENINGS: u64 = 20_000;
 
-/// Longest run, s of virtual time: a longer run is an error, so that the page stays responsive.
+/// Maximum length of a run, s of virtual time. A longer run is an error, so that the page stays responsive.
 const LONGEST_S: u64 = 3_600;
 
 /// Result of a run in the page, as JSON: the report, the recording, and an error message.
@@ -42,8 +42,9 @@ struct RunOutput {
 
 /// Runs a simulated chain and returns the result as one JSON object.
 ///
-/// It has `report`, `film` (the recording) if requested, and `wrong`, an error line, if something failed. `options`
-/// are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML text.
+/// The object has up to three members: `report`; `film`, the recording, if `film` is true; `wrong`, an error line, if
+/// the run has failed. `options` are separated by spaces as on the command line of `cargo chain`; `scenario` is TOML
+/// text.
 #[wasm_bindgen]
 #[must_use]
 pub fn chain(options: &str, scenario: &str, film: bool) -> String {

@@ -12,31 +12,31 @@ use uav_relay_capture::Direction;
 
 use crate::recording::{Frame, Recording};
 
-/// Time window for which one clock offset is determined, s. Clocks drift by at most 100 ppm, which is 2 ms in this
-/// window.
+/// Length of the time windows, s. For each window one clock offset is computed. Clocks drift by at most 100 ppm, which
+/// is 2 ms in a window.
 const WINDOW: f64 = 20.0;
 
-/// Change of the clock offset between two consecutive frames that counts as a step of a clock, s. A backward jump by
-/// this amount also counts.
+/// Minimum change of the clock offset between two common frames that counts as a step of a clock, s. A time that goes
+/// back by more than this also counts.
 const STEP: f64 = 2.0;
 
-/// Maximum time without a common frame, s, up to which two capture files count as one flight. The same limit holds
-/// for the time between two frames of one flight.
+/// Maximum time, s, between two capture files of one flight, if they have no common frame. The time between two
+/// consecutive frames of a file has the same limit.
 const APART: f64 = 3_600.0;
 
-/// Offset of a file's clock from the clock of the first file, with the quality of this offset.
+/// Offset of a file's clock from the clock of the first file, and the number of frames behind it.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
     /// Name of the capture file.
     pub name: String,
-    /// Number of frames that connect the clocks; `None` for the first file.
+    /// Number of frames that this file has in common with the other files; `None` for the first file.
     pub common: Option<usize>,
-    /// Smallest and largest time that is added to the times of the file, s.
+    /// Smallest and largest offset that is added to the times of the file, s.
     pub offset_s: [f64; 2],
 }
 
-/// Part of a file, from one frame on, in which the offset of the file's clock is known. Each offset, s, is at a time
-/// of that clock.
+/// Part of a file, from the frame `from` on, without a step of the file's clock. `offsets` are pairs: a time of that
+/// clock, and the clock's offset at this time, s.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -54,8 +54,8 @@ impl Segment {
     }
 }
 
-/// Bounds of the clock offset in one time window, s. It also has the offsets by frames that were received in both
-/// files.
+/// Bounds of the clock offset in one time window, s. They come from frames that were sent in one file and received in
+/// the other. `equal` are the offsets by all other frames.
 #[derive(Default)]
 struct Window {
     times: Vec<f64>,
@@ -91,7 +91,8 @@ impl Window {
     }
 }
 
-/// Returns the frames that occur exactly once in a file, by their bytes.
+/// Returns the index of each frame that occurs exactly once in a file. The key is the bytes of the frame. `None` for a
+/// frame that occurs more often.
 fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     let mut known = HashMap::new();
     for (index, frame) in frames.iter().enumerate() {
@@ -101,8 +102,8 @@ fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     known
 }
 
-/// Frames of aligned files by their bytes: time by the reference clock, and direction. Sent frames replace received
-/// frames.
+/// Frames of the aligned files: the bytes, the time by the reference clock, and the direction. If a frame was sent in
+/// one file and received in another, the sent frame counts.
 type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
 
 fn add(aligned: &mut Aligned, frames: &[Frame]) {
@@ -118,7 +119,7 @@ fn add(aligned: &mut Aligned, frames: &[Frame]) {
 /// Frames of all files, merged by time.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// Frames, sorted by the clock of the first file, each once.
+    /// Frames in the order of time, by the clock of the first file. A frame of several files occurs once.
     pub frames: Vec<Frame>,
     /// Relation of each file's clock to the clock of the first file, in the order of the files.
     pub files: Vec<Alignment>,
@@ -129,7 +130,7 @@ pub struct Merged {
 /// Merges the frames of all files.
 ///
 /// # Errors
-/// One line that names a file of another chain or another flight.
+/// One line that names a file which belongs to another chain or another flight.
 pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     let mut warnings = Vec::new();
     if let Some(first) = files.first() {
@@ -204,10 +205,10 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     })
 }
 
-/// Removes steps of a file's clock: more than [`STEP`] backward or [`APART`] forward. The clock after the last step
-/// is kept.
+/// Removes steps of a file's clock, which go more than [`STEP`] backward or [`APART`] forward. The times before a step
+/// are shifted to the clock after the last step.
 ///
-/// Returns a description of them; `None` for no step.
+/// Returns a description of the steps; `None` if there is no step.
 fn without_steps(frames: &mut [Frame]) -> Option<String> {
     let times: Vec<f64> = frames.iter().map(|frame| frame.at).collect();
     let pairs = times.iter().zip(times.iter().skip(1));
@@ -257,7 +258,8 @@ fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
     }
 }
 
-/// Checks that a file without common frames is from the time `span` of the others, by its own clock.
+/// Checks that a file without common frames is of the same flight, by its own clock. `span` are the first and the last
+/// time of the other files, s.
 fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     let times = file.frames.iter().map(|frame| frame.at);
     let [first, last] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
@@ -274,7 +276,8 @@ fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     ))
 }
 
-/// Returns the frame before which the clock changes most, after frame `from` and up to frame `to`.
+/// Returns the index of the frame with the largest change of time from the previous frame. Only the frames after `from`
+/// and up to `to` count.
 fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
     let change = |index: &usize| {
         let [one, other] =

@@ -13,15 +13,15 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two computed snapshots of a flight, s. Alarms compare times of seconds, so it does not depend on the
-/// flight's duration.
+/// Time between two computed snapshots of a flight, s. It is the same for long flights, because alarms are raised after
+/// a few seconds.
 const PERIOD: f64 = 0.5;
 
-/// Largest number of stored snapshots besides the last snapshot. Of a longer flight only every k-th snapshot is
+/// Maximum number of stored snapshots, not counting the last snapshot. Of a long flight only every k-th snapshot is
 /// stored.
 const MOST: f64 = 7_200.0;
 
-/// Longest time between two reported positions for which a position in between is interpolated, s.
+/// Maximum time between two reported positions of a relay, s, for an interpolation between them.
 const GAP: f64 = 5.0;
 
 /// Mission that the chain loaded before flight, as the scenario describes it.
@@ -29,7 +29,7 @@ const GAP: f64 = 5.0;
 pub struct Loaded {
     /// Mission loaded before flight, with all parameters.
     pub mission: Mission,
-    /// Relays with an altitude or a power of their own.
+    /// Altitudes and powers of the relays that differ from the others, each with the relay's number.
     pub profiles: Vec<(u16, Profile)>,
     /// Line on earth from Tx to Rx, if the scenario has such a line.
     pub axis: Option<Axis>,
@@ -50,7 +50,7 @@ pub struct Loss {
 
 impl Loss {
     /// Returns true if the relay was silent only because all relays were silent. `all` is the silence of all relays.
-    /// Up to 5 s before and after it also count.
+    /// The relay's own silence may begin up to 5 s earlier, and may end up to 5 s later.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -90,10 +90,11 @@ pub struct Flight {
     pub alarms: Vec<Alarm>,
     /// Number of relays in the recorded flight.
     pub relays: u16,
-    /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first all relays
-    /// had agreed, in the second as many as the last agreed view had.
+    /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first share all
+    /// relays had agreed positions; in the second share at least as many relays as the last agreed view has.
     pub available: Option<(f64, [f64; 2])>,
-    /// Lowest SIR of any known hop since the previous stored snapshot, for each stored snapshot, dB.
+    /// Lowest SIR of any hop, dB, for each stored snapshot. It covers the time since the previous stored snapshot.
+    /// `None` if no SIR is known.
     pub worst_db: Vec<Option<f64>>,
     /// Periods in which relays did not report.
     pub losses: Vec<Loss>,
@@ -109,7 +110,8 @@ pub fn largest(frames: &[Frame]) -> u16 {
     entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
 }
 
-/// Returns the report entries (states of relays) in a frame with their details. None for other messages.
+/// Returns the entries of a report message, each with its details, if any. An entry is the state of one relay. Empty
+/// for other messages.
 fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
     let report = match &frame.message {
         Some(Message::Report(report)) => Some(report),
@@ -214,7 +216,8 @@ impl Flight {
     }
 }
 
-/// Returns the states of all relays, sorted by their times. A state is as old as its entry says when the frame was captured.
+/// Returns the states of all relays, sorted by time. The time of a state is the frame's time minus the age in the
+/// entry.
 fn reports(frames: &[Frame], begin: f64, relays: u16) -> Vec<Report> {
     let mut all: Vec<_> = frames
         .iter()
@@ -250,9 +253,10 @@ struct Recorder<'a> {
     loaded: Option<&'a Loaded>,
     view: StationView,
     uploads: BTreeMap<u16, Upload>,
-    /// End of the chain at which the station is that last sent a Watch (request for reports).
+    /// End of the chain (Tx or Rx) at which the ground station is. It is the station that has sent the last Watch, a
+    /// request for reports.
     end: Side,
-    /// Numbers of reports and of frames that have been processed.
+    /// Number of reports, and number of frames, that have been processed.
     used: [usize; 2],
     received: u32,
     newest: BTreeMap<u16, Report>,
@@ -261,10 +265,10 @@ struct Recorder<'a> {
     worst_db: Option<f64>,
     /// Periods without a report that have not ended yet, by relay number.
     open: BTreeMap<u16, Loss>,
-    /// Last time at which no relay was reporting its state.
+    /// Last time at which no relay was reporting.
     silent_at: Instant,
-    /// Time of the first agreement, s, and three numbers of snapshots since then. The numbers count all snapshots,
-    /// the snapshots with all relays agreed, and the snapshots with all members agreed.
+    /// Time of the first agreement, s, and three numbers of snapshots since then. They count all snapshots, the
+    /// snapshots in which all relays had agreed, and the snapshots in which all members of the view had agreed.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -295,8 +299,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Returns the snapshot at `now`, and adds its figures to the figures of the flight. `frames` are all frames up
-    /// to `now`.
+    /// Returns the snapshot at `now`, and updates `flight`, for example its lowest SIR. `frames` are all frames up to
+    /// `now`.
     fn advance(&mut self, flight: &mut Flight, now: f64, frames: &[Frame]) -> Snapshot {
         for frame in frames.get(self.used[1]..).unwrap_or_default() {
             match &frame.message {
@@ -380,8 +384,8 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Updates the chain's availability and the periods without reports. They follow from the relays' states in `snapshot` at `now`. The
-    /// availability is the fraction of time in which all relays have agreed positions.
+    /// Updates the chain's availability and the periods without reports. Both follow from `snapshot`, the state at
+    /// `now`. The availability is the fraction of time in which all relays have agreed positions.
     fn losses(&mut self, flight: &mut Flight, now: f64, snapshot: &Snapshot) {
         let is_fresh = |report: &Report| instant(now).since(report.at) < SILENT_AFTER;
         let reporting: Vec<&Report> = self.newest.values().filter(|it| is_fresh(it)).collect();
@@ -433,8 +437,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Updates the closest approach by the distances of all relays at a time. With `only`, only this relay's
-    /// distances are new.
+    /// Updates the closest approach from the distances between all relays at a time. If `only` is given, only the
+    /// distances of this relay are computed.
     fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
@@ -482,8 +486,8 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Removes from the text of a station's alarm the part about the station's received frames. A replay does not know
-/// these frames.
+/// Removes the part about the station's received frames from the text of an alarm. A replay does not know which frames
+/// the station received.
 fn replayed(text: String) -> String {
     match text.split_once("nothing received from the chain") {
         Some(("", rest)) => {
@@ -495,8 +499,8 @@ fn replayed(text: String) -> String {
     }
 }
 
-/// Returns the position of a relay at `now`, interpolated between two reported positions. `None` if these are more
-/// than [`GAP`] apart in time.
+/// Returns the position of a relay at `now`, interpolated between two reported positions. `None` if the times of these
+/// two differ by more than [`GAP`].
 fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     let after = track.partition_point(|(at, _)| *at < now);
     let (t0, one) = track.get(after.checked_sub(1)?)?;
@@ -511,7 +515,8 @@ fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     })
 }
 
-/// Returns a snapshot as JSON with rounded numbers. A relay has the time of its report, `at_s`, in place of its age, which always changes.
+/// Returns a snapshot as JSON with rounded numbers. The age of a relay's report is replaced by its time, `at_s`,
+/// because the age differs in every snapshot.
 fn compact(snapshot: &Snapshot, now: f64) -> Value {
     let mut value = serde_json::to_value(snapshot).unwrap_or_default();
     if let Some(all) = value.as_object_mut() {
@@ -530,7 +535,7 @@ fn compact(snapshot: &Snapshot, now: f64) -> Value {
     value
 }
 
-/// Rounds all numbers in a JSON value to two decimals, except small powers and degrees.
+/// Rounds all numbers in a JSON value to two decimals, except powers and degrees, which need more.
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
@@ -548,8 +553,8 @@ fn round(value: &mut Value) {
 
 /// Returns the changes from `old` to `new`, in the form that the page applies; `None` for no change.
 ///
-/// The changes of an object or an array are an object of the changed values by key or index; `#` is the new length of
-/// an array.
+/// For an object or an array the result is an object with the changed values, by key or index. Its key `#` is the new
+/// length of an array.
 fn difference(old: &Value, new: &Value) -> Option<Value> {
     let mut changes = serde_json::Map::new();
     match (old, new) {

@@ -37,7 +37,8 @@ pub struct Replay {
 
 /// Reads the captures `files` of one flight, and creates its page. The first file has the reference clock.
 ///
-/// Without a `scenario` the mission is the default scenario's, if the relays report that they fly it, or else unknown.
+/// If `scenario` is `None`, the mission is that of the default scenario, provided that the relays report its digest.
+/// Otherwise the mission is unknown.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -89,7 +90,8 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
     })
 }
 
-/// Returns the mission of a scenario, with equal or fitted slots; `None` if neither has this digest.
+/// Returns the mission of a scenario whose digest is `digest`, with equal or fitted slots. `None` if neither has this
+/// digest. If `digest` is `None`, the slots are equal.
 fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Option<Loaded>, String> {
     let (plain, profiles) =
         mission(scenario, relays, TOLERANCE).map_err(|error| error.to_string())?;

@@ -17,7 +17,7 @@ const BAR: &str = include_str!("../web/bar.html");
 /// Width and height of the chart, and its margins at the left and the bottom, px.
 const CHART: [f64; 4] = [1000.0, 180.0, 44.0, 22.0];
 
-/// Returns the page of a flight as a single HTML document that loads nothing else. `name` is the title of the report.
+/// Returns the page of a flight as a single HTML document that loads no other files.
 pub fn page(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
     let file = |name: Option<&str>| {
         let mut files = FILES.iter();
@@ -83,7 +83,7 @@ fn escaped(text: &str) -> String {
     text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Formats a time of the flight as a button that shows that time.
+/// Formats a time of the flight as a button. A click on the button shows the flight at this time.
 fn time(at: f64) -> String {
     format!(
         "<button type=\"button\" class=\"time\" data-time=\"{at:.1}\">{}</button>",

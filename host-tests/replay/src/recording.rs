@@ -36,7 +36,7 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// Number of the network that most frames of the file belong to.
     pub network: u16,
-    /// Digest of the mission that the chain loaded before flight; `None` if no frame of the file has it.
+    /// Digest of the mission that the chain loaded before flight; `None` if no frame of the file states it.
     pub mission: Option<u16>,
     /// Fault in the file after its last readable frame; `None` if it is intact.
     pub fault: Option<String>,
@@ -116,7 +116,8 @@ fn frame(packet: &Packet<'_>) -> Option<Frame> {
     })
 }
 
-/// Returns the digest of the mission that the sender of a message loaded before flight.
+/// Returns the digest of the mission that the sender of a message loaded before flight. `None` if the message does not
+/// state it.
 fn loaded(message: &Message) -> Option<u16> {
     match message {
         Message::Heartbeat { mission, .. }

@@ -15,10 +15,10 @@ use uav_relay_replay::flight::Flight;
 use uav_relay_replay::recording::{Frame, Recording};
 use uav_relay_replay::{clocks, page};
 
-/// State number of a relay whose drone is flown by its pilot.
+/// State number in a report, of a relay whose drone is flown by its pilot.
 const FLOWN: u16 = 4_096;
 
-/// Returns a frame with the report of a relay at `x_m` on the line, at a time in s.
+/// Returns a frame with a report: relay `relay` is at `x_m` on the line at the time `at`, s.
 fn report(at: f64, relay: u16, x_m: f32) -> Frame {
     let place = Placement {
         x_m,

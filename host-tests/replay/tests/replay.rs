@@ -33,8 +33,8 @@ struct Flown {
     places: BTreeMap<u16, [f64; 2]>,
 }
 
-/// Simulates a chain whose ground station at Tx requests reports, over wires or on a shared channel. Relay 2 is
-/// switched off at `kill_s`.
+/// Simulates a chain over wires or, if `is_shared` is true, on a shared channel. The ground station at Tx requests
+/// reports. Relay 2 is switched off at `kill_s`.
 fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown {
     let (mission, _) = mission(&Scenario::default(), relays, 1e-4).unwrap();
     let mut setup = if is_shared {
@@ -79,8 +79,8 @@ fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown
     }
 }
 
-/// Clock of a simulated node with errors: an offset, s, a relative drift, and a step. The step is the time, s, at
-/// which the clock jumps, and by how much, s; `None` for no step.
+/// Clock of a simulated node with three errors: an offset, s, a relative drift, and a step. `step` has the time of the
+/// step, s, and its size, s; `None` for no step.
 #[derive(Clone, Copy, Default)]
 struct Clock {
     offset: f64,
@@ -98,8 +98,9 @@ impl Clock {
     }
 }
 
-/// Writes the capture of `node`, by its clock, until it is switched off at `end_s`. From second 70 to 71.5 it has received nothing, so that
-/// no frame connects the clocks just after a step.
+/// Writes the frames that `node` has sent and received to a capture, with the times of `clock`. The node is switched
+/// off at `end_s`. From second 70 to 71.5 it has received nothing, so that no frame connects the clocks just after a
+/// step.
 fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) -> PathBuf {
     let path = folder.join(format!("node{node}.pcapng"));
     let mut capture = Capture::new(std::fs::File::create(&path).unwrap(), "a test", "").unwrap();
@@ -136,7 +137,7 @@ fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) ->
     path
 }
 
-/// Returns the sender of a frame: the low 12 bits of its first word, behind the first COBS code.
+/// Returns the node number of a frame's sender, from its decoded header.
 fn sender(wire: &[u8]) -> u16 {
     let mut deframer = uav_relay::wire::deframe::Deframer::new();
     let (last, rest) = wire.split_last().unwrap();
@@ -220,8 +221,7 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
     assert!(shown.worst_db.last().unwrap().is_some());
 }
 
-/// Writes the captures of all nodes with one common clock, and returns their paths. Relay 2 is switched off at
-/// `kill_s`.
+/// Writes the captures of all nodes with the same clock, and returns their paths. Relay 2 is switched off at `kill_s`.
 fn captures(flown: &Flown, folder: &Path, relays: u16, kill_s: f64) -> Vec<PathBuf> {
     let clock = Clock {
         offset: EPOCH,

@@ -15,13 +15,14 @@ pub enum Area {
         /// Radius, m, > 0.
         radius_m: f64,
     },
-    /// Polygon, convex or not; its corners in order, without a repeated last corner.
+    /// Polygon, convex or not, as the list of its corners in order. The first corner is not repeated at the end.
     Polygon(Vec<[f64; 2]>),
 }
 
-/// Area in which an interferer may be anywhere, and the least power of the interferer.
+/// Area in which an interferer can be anywhere, and the least power of the interferer.
 ///
-/// The entry in [`Interference`](crate::Interference) has the greatest power, and the middle of the area.
+/// The corresponding entry of [`Interference`](crate::Interference) is an interferer with the greatest power, in the
+/// middle of the area.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SourceArea {
     /// Possible positions of the interferer. Neither Tx nor Rx is inside.
@@ -30,18 +31,18 @@ pub struct SourceArea {
     pub least_w: f64,
 }
 
-/// Area in which relays may not fly, between two altitudes.
+/// No-fly area: relays must not fly in it between two altitudes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoFly {
     /// Key of the area in the file, for messages, such as `no_fly[0]`.
     pub key: String,
-    /// Boundary of the area; a circle of the file is a polygon around it.
+    /// Corners of the boundary. A circle of the file is replaced by a polygon that contains it.
     pub corners: Vec<[f64; 2]>,
-    /// Lowest and highest altitude of the area, m, as `geometry.altitude_m`.
+    /// Lowest and highest altitude of the area, m, measured like `geometry.altitude_m`.
     pub altitudes_m: RangeInclusive<f64>,
 }
 
-/// Least surface of a polygon, m2.
+/// Minimum surface of a polygon, m2.
 const LEAST_M2: f64 = 1.0;
 
 /// Number of corners of the polygon around a circle.
@@ -124,7 +125,7 @@ impl Area {
         }
     }
 
-    /// Returns the corners of a polygon that contains the area; of a circle, 64 corners.
+    /// Returns the corners of a polygon that contains the area. For a circle the polygon has 64 corners.
     pub fn corners(&self) -> Vec<[f64; 2]> {
         match self {
             Self::Circle { centre, radius_m } => {
@@ -179,9 +180,10 @@ impl Area {
 }
 
 impl NoFly {
-    /// Returns how deep the area contains a relay, m; `None` if the relay is outside.
+    /// Returns how far a relay is inside the area, m; `None` if the relay is outside.
     ///
-    /// It is the distance to the boundary, to the lowest or to the highest altitude, whichever is least.
+    /// The result is the smallest of three distances: to the boundary, to the lowest altitude and to the highest
+    /// altitude.
     pub fn depth_m(&self, at: [f64; 2], altitude_m: f64) -> Option<f64> {
         if !(self.altitudes_m.contains(&altitude_m) && is_inside(&self.corners, at)) {
             return None;
@@ -195,7 +197,8 @@ impl NoFly {
         Some(beside.chain(heights).fold(f64::INFINITY, f64::min))
     }
 
-    /// Returns the length of the straight way inside the area, seen from above, m. Each end is [x, y, altitude].
+    /// Returns the horizontal length, m, of the part of a straight way that is inside the area. Each end of the way is
+    /// [x, y, altitude].
     pub fn crossing_m(&self, [from, to]: [[f64; 3]; 2]) -> f64 {
         let climb = to[2] - from[2];
         let mut turns = vec![0.0, 1.0];
@@ -231,7 +234,7 @@ fn edges(corners: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> {
     corners.iter().zip(next).map(|(from, to)| [*from, *to])
 }
 
-/// Returns true if a ray from `at` leaves the polygon an odd number of times.
+/// Returns true if the point `at` is inside the polygon: a ray from it crosses an odd number of edges.
 fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
     let crossed = edges(corners).filter(|[a, b]| {
         (a[1] > at[1]) != (b[1] > at[1])
@@ -240,7 +243,7 @@ fn is_inside(corners: &[[f64; 2]], at: [f64; 2]) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// Returns twice the signed area of a triangle.
+/// Returns twice the area of the triangle a, b, c; negative if c is on the other side of a-b.
 fn turn([a, b]: [[f64; 2]; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

@@ -92,7 +92,8 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Rejects `key` if its table also has a key that excludes it. For example, `power_w` excludes `power_dbm`.
+    /// Rejects `key` if its table also has a key that must not be given together with it. An example of such a pair is
+    /// `power_w` and `power_dbm`.
     fn check_exclusive(
         &self,
         path: &str,
@@ -115,7 +116,7 @@ impl Check<'_> {
         ))
     }
 
-    /// Checks a number in a list.
+    /// Checks that an entry of a list is a number within `range`.
     fn number(&self, path: &str, value: &Value, range: &Range) -> Result<(), ScenarioError> {
         let problem = match as_number(value) {
             Some(number) if range.holds(number) => return Ok(()),
@@ -231,7 +232,7 @@ impl Check<'_> {
     }
 }
 
-/// Least similarity (Jaro-Winkler, 0 to 1) at which an error message suggests a known key.
+/// Minimum similarity for an error message to suggest a known key: Jaro-Winkler, 0 to 1.
 const ALIKE: f64 = 0.8;
 
 /// Returns "; did you mean KEY?" with the known key most similar to `name`. Empty if no known key is similar.
@@ -261,7 +262,7 @@ fn as_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// Creates the error for a table that [`table`] accepts but serde cannot convert.
+/// Creates the error for a table that [`table`] accepts, but serde cannot convert to its Rust type.
 ///
 /// Such an error is a bug of this crate: the table of allowed keys and the Rust types differ.
 pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> ScenarioError {
@@ -274,7 +275,7 @@ pub(super) fn internal_mismatch(file: &str, error: &toml::de::Error) -> Scenario
     }
 }
 
-/// Largest size of a scenario file, bytes. It is far more than 1000 relays and as many interferers need, and stops
+/// Maximum size of a scenario file, bytes. It is far more than 1000 relays and as many interferers need. The limit ends
 /// the reading of endless files such as `/dev/zero`.
 const LONGEST: u64 = 1 << 20;
 

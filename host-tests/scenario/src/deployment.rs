@@ -14,11 +14,11 @@ use crate::error::{Problem, ScenarioError};
 /// Default network number of all tools. Relays ignore frames with another network number.
 pub const NETWORK: u16 = 1;
 
-/// Relative tolerance on the SIR with which companions compute. No option or key changes it.
+/// Relative tolerance of the target SIR that companions compute. No option or key changes it.
 pub const COMPANION_TOLERANCE: f64 = 1e-4;
 
-/// Settings of the programs in a scenario file: `[network]`, `[companion]` and `[ground]`. For a missing value,
-/// `None`, the program uses its default.
+/// Settings of the programs in a scenario file: `[network]`, `[companion]` and `[ground]`. If a value is `None`, the
+/// program uses its default.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Deployment {
@@ -44,7 +44,7 @@ pub struct Network {
     pub method: Option<String>,
     /// Data rate of the serial ports between relays, bit/s, 1200 to 4000000.
     pub baud: Option<u32>,
-    /// Time without a frame from a neighbour after which the relay probes this neighbour, ms, 1 to 3600000.
+    /// Time without a frame from a neighbour after which the relay requests a heartbeat, ms, 1 to 3600000.
     pub probe_after_ms: Option<u32>,
     /// Time without a frame from a neighbour after which this neighbour counts as lost, ms, 1 to 3600000.
     pub dead_after_ms: Option<u32>,
@@ -77,7 +77,8 @@ pub struct Companion {
     pub autopilot_key_file: Option<PathBuf>,
     /// Greatest speed of the drone, m/s, 0.1 to 20.
     pub speed_m_s: Option<f32>,
-    /// Reserve of the drone's remaining time of flight, s, 0 to 3600. Without it the relay does not leave by itself.
+    /// Reserve of the drone's remaining time of flight, s, 0 to 3600. If it is `None`, the relay never leaves the chain
+    /// by itself.
     pub reserve_s: Option<f32>,
     /// Time of flight with a full battery, s, 1 to 21600.
     pub flight_time_s: Option<f32>,
@@ -85,7 +86,7 @@ pub struct Companion {
     pub return_speed_m_s: Option<f32>,
     /// Mean speed of the descent to land, m/s, 0.1 to 20.
     pub descent_m_s: Option<f32>,
-    /// True to wait outside of the chain as a spare.
+    /// True if the relay waits outside of the chain until the leader calls it to replace another relay.
     pub spare: Option<bool>,
     /// FIFO from which the companion reads the drone's own position. Another program writes it.
     pub positions: Option<PathBuf>,
@@ -115,7 +116,7 @@ pub struct Ground {
     pub epoch_file: Option<PathBuf>,
     /// Time after which the ground station gives up an upload, s, 1 to 86400.
     pub timeout_s: Option<u32>,
-    /// True if the ground station keeps running at its end of the chain instead of ending after an upload.
+    /// True if the ground station continues to run after an upload; false if it ends then.
     pub stand: Option<bool>,
     /// Source of interference measurements: a FIFO, a file, or `udp:[HOST:]PORT`.
     pub measurements: Option<String>,
@@ -153,10 +154,10 @@ pub(super) fn from_table(file: &str, sections: &Table) -> Result<Deployment, Sce
         .map_err(|error| check::internal_mismatch(file, &error))
 }
 
-/// Checks that the number of relays in `[network]` equals the one in `[plan]`, if both are given.
+/// Checks that `[network]` and `[plan]` have the same number of relays, if both give it.
 ///
 /// # Errors
-/// Names the key, its value and the plan's number.
+/// The error names the key, its value and the plan's number of relays.
 pub fn agree(file: &str, relays: Option<u16>, planned: Option<u16>) -> Result<(), ScenarioError> {
     match (relays, planned) {
         (Some(relays), Some(planned)) if relays != planned => Err(check::mistake(

@@ -12,8 +12,8 @@ const PX4_LISTENS: core::ops::RangeInclusive<u16> = 14_580..=14_589;
 /// Local UDP port to which vehicle 0 of PX4's simulation sends. Each further vehicle sends to the next port.
 const PX4_SENDS_TO: u16 = 14_540;
 
-/// Default local port of the companion, minus the autopilot's port. Only for autopilot ports outside of
-/// [`PX4_LISTENS`]; the ports in this range have local ports from [`PX4_SENDS_TO`] on.
+/// Difference between the companion's default local port and the autopilot's port. It applies only to autopilot ports
+/// outside of [`PX4_LISTENS`]; the ports in this range have local ports from [`PX4_SENDS_TO`] on.
 const APART: u16 = 1_000;
 
 /// Description of a valid UDP address and its ports, for error messages.

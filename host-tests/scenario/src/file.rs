@@ -63,7 +63,8 @@ struct RawNoFly {
     highest_m: Option<f64>,
 }
 
-/// Area; exactly one of the fields is given. Those on earth have latitudes and longitudes.
+/// Area as a file gives it: exactly one of these keys. Keys with `_deg` contain latitudes and longitudes, the others x
+/// and y in m.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawArea {
@@ -1038,7 +1039,7 @@ fn no_fly(
 
 /// Reads the outer boundaries of all polygons of a GeoJSON file, as latitude and longitude, degrees.
 ///
-/// `name` is relative to the folder of the scenario. Holes are ignored, so that they are no-fly areas, too.
+/// `name` is relative to the folder of the scenario. Holes in a polygon are ignored: they are part of the area.
 fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, ScenarioError> {
     let fail = |why: String| {
         let allowed = format!(

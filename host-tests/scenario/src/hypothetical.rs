@@ -30,16 +30,16 @@ const REPORTED: usize = 60_000;
 
 /// Largest lateral distance y_H of the interferer in the search, as a multiple of the scene's size.
 ///
-/// At this distance the interference is already the same at all relay positions to a thousandth, so a larger distance
-/// would change nothing. The size of the scene is its largest extent in x, y or altitude.
+/// At this distance the interference differs by at most a thousandth between the relay positions, so that a larger
+/// distance would change nothing. The size of the scene is its largest extent in x, y or altitude.
 const FAR: f64 = 30.0;
 
 /// Grid step of the search for the lateral distance y_H of the interferer. The grid is even in u = asinh(y_H / lowest
 /// altitude), so its steps in y_H grow: far from the line each multiplies y_H by about 1.4.
 const RISE: f64 = 0.35;
 
-/// Largest number of local searches that start at local minima of the grid. Up to as many more start at true
-/// interferers.
+/// Largest number of local searches that start at local minima of the grid. At most the same number of further searches
+/// start at true interferers.
 const VALLEYS: usize = 6;
 
 const FINALISTS: usize = 3;
@@ -62,7 +62,7 @@ pub struct Hypothetical {
 }
 
 impl Hypothetical {
-    /// Mirrors the interferer to the other side of the line if its error is smaller there.
+    /// Returns this interferer, or its mirror image beyond the line if that has the smaller error.
     ///
     /// The error is the sum of |ln(I_H / I)| over relay positions with lateral offsets from `least_m` to `most_m`, m,
     /// where I_H is the interference from the hypothetical interferer and I the true one. Directly above the line,
@@ -268,8 +268,8 @@ impl Space {
         raster.best_power(x, y).error
     }
 
-    /// Returns the grid of x, m, for the search. The spacing is D / 16 halfway between Tx and Rx and grows with the
-    /// distance from there, where D is the distance from Tx to Rx.
+    /// Returns the grid of x, m, for the search. The spacing is D / 16 halfway between Tx and Rx, and grows toward both
+    /// ends of the grid. D is the distance from Tx to Rx.
     fn columns(&self) -> Vec<f64> {
         let half = 0.5 * self.distance_m;
         let middle = Centre {
@@ -286,7 +286,8 @@ impl Space {
     /// Minimises the error by the simplex method from `start`, a point (x, u) of the search space.
     ///
     /// `share` is the size of the first simplex as a fraction of the length over which the error changes noticeably.
-    /// The search ends at the relative `tolerance` of the error or after `most` steps.
+    /// The search ends when the errors at the simplex's corners agree to the relative `tolerance`, or after `most`
+    /// steps.
     fn descend(
         &self,
         raster: &Raster,
@@ -542,8 +543,9 @@ fn weighted_median(mut ratios: &mut [Ratio]) -> f64 {
     median
 }
 
-/// Coordinate of a grid near which the function sampled on the grid changes fastest. The grid's cells are smallest
-/// there, with a size that depends on `width`.
+/// Coordinate at which a sampled function changes fastest. A grid has its smallest cells there.
+///
+/// The size of these cells depends on `width`.
 #[derive(Debug, Clone, Copy)]
 pub struct Centre {
     /// Coordinate at which the sampled function changes fastest, m. It is an x or an altitude, like the other values
@@ -565,9 +567,9 @@ impl Centre {
 /// Returns the ends of the grid's cells from `low` to `high`, in increasing order. Cells are smaller near the
 /// `centres`.
 ///
-/// A cell is at most 1.5 times as wide as the smaller of `widest` and `step` (below 1) times the length over which
-/// the function changes there. There are about (high - low) / widest ends, and 2 ln(2 (high - low) / width) / step
-/// more for each centre.
+/// A cell is at most 1.5 times as wide as the smaller of two lengths: `widest`; and `step` (below 1) times the length
+/// over which the function changes at the cell. There are about (high - low) / widest ends, and
+/// 2 ln(2 (high - low) / width) / step more for each centre.
 pub fn graded(low: f64, high: f64, centres: &[Centre], step: f64, widest: f64) -> Vec<f64> {
     let mut ends = vec![low];
     let mut at = low;
@@ -646,7 +648,8 @@ fn minimise(
     best
 }
 
-/// Returns the point at the fraction `share` of the way from `from` to `to`. Above 1 it lies beyond `to`.
+/// Returns the point at the fraction `share` of the way from `from` to `to`. If `share` is above 1, the point lies
+/// beyond `to`.
 fn between(from: (f64, f64), to: (f64, f64), share: f64) -> (f64, f64) {
     (
         from.0 + share * (to.0 - from.0),

@@ -29,7 +29,8 @@ pub(super) enum Rule {
     NumberOrTwo(Range),
     /// List of exactly one number for each of these ranges.
     Numbers(&'static [Range]),
-    /// List of such lists, with the least and greatest number of lists.
+    /// List of such points, each a list with one number for each of these ranges. Also the least and greatest number of
+    /// points.
     Points(&'static [Range], [usize; 2]),
     Choice(&'static [&'static str]),
     Text,
@@ -53,7 +54,7 @@ pub(super) enum Need {
 pub(super) struct Key {
     pub(super) name: &'static str,
     pub(super) need: Need,
-    /// Other keys that may not be given beside this key, because their meanings overlap.
+    /// Other keys that are forbidden beside this key, because their meanings overlap.
     pub(super) without: &'static [&'static str],
     pub(super) rule: Rule,
 }
@@ -96,7 +97,7 @@ pub(super) const fn optional(name: &'static str, rule: Rule) -> Key {
     }
 }
 
-/// Creates a key that a table must have if it has none of the keys `others`. A table may not have both this key and one of `others`.
+/// Creates a key that a table must have if it has none of the keys `others`. A table with both this key and one of `others` is rejected.
 const fn unless(others: &'static [&'static str], name: &'static str, rule: Rule) -> Key {
     Key {
         need: Need::Unless(others),

@@ -53,10 +53,9 @@ impl Access {
         }
     }
 
-    /// Returns the number of time slots in which each hop sends once, or once per direction.
+    /// Returns the number of slots in which each hop sends once, or once per direction if `both_ways`.
     ///
-    /// The latter applies if `both_ways` is true. If every hop has its own frequency, all hops send in the same slot,
-    /// so that the number is 1 per direction.
+    /// If every hop has its own frequency, all hops send in the same slot: the number is then 1 per direction.
     pub const fn slots(self, relays: u16, both_ways: bool) -> u32 {
         let hops = match self {
             Self::Slots | Self::Fitted => relays as u32 + 1,
@@ -216,7 +215,7 @@ impl Radio {
 
     /// Returns the data rate of a chain in one direction, bit/s, from the linear SIR of each of its hops.
     ///
-    /// It is 0 without hops, and if the rate of any hop is 0.
+    /// The rate is 0 if `sirs` is empty, or if the rate of any hop is 0.
     pub fn chain_bps(&self, sirs: &[f64]) -> f64 {
         let rates = || sirs.iter().map(|sir| self.hop_bps(*sir));
         let worst = rates().reduce(f64::min).unwrap_or(0.0);
@@ -230,9 +229,9 @@ impl Radio {
 
     /// Returns the data rates to Rx and back to Tx, bit/s, of a chain that sends in both directions.
     ///
-    /// `there` and `back` are the linear SIRs of the hops in these directions. `reverse` above 0 is the planned rate
-    /// to Tx as a fraction of the rate to Rx; with fitted slots the rates then have this ratio. In all other cases
-    /// each direction has half of the time.
+    /// `there` and `back` are the linear SIRs of the hops in these directions. `reverse` is the planned rate to Tx
+    /// divided by the rate to Rx. With fitted slots and `reverse` above 0, the returned rates have this ratio.
+    /// Otherwise each direction has half of the time.
     pub fn both_bps(&self, there: &[f64], back: &[f64], reverse: f64) -> [f64; 2] {
         if reverse > 0.0 && self.link.access == Access::Fitted {
             let time = |sirs| match self.chain_bps(sirs) {
@@ -245,7 +244,7 @@ impl Radio {
         [there, back].map(|sirs| self.chain_bps(sirs) / 2.0)
     }
 
-    /// Returns a text that says how `hops` hops share the radio. It can begin a sentence.
+    /// Returns a description of how `hops` hops share the radio, without a full stop.
     pub fn sharing(&self, hops: usize) -> String {
         match self.link.access {
             Access::Slots => {

@@ -17,11 +17,13 @@ use crate::{Interference, Scenario, Source};
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The interferer with this index (from 0) has an area, with this middle, m.
+    /// An interferer may be anywhere in an area, but a mission needs a single position.
+    ///
+    /// Contains the index of the interferer, from 0, and the middle of the area, x and y in m.
     Area(usize, [f64; 2]),
     /// The scenario has several interferers, and no single hypothetical interferer can replace them.
     NoHypothetical,
-    /// The distance from Tx to Rx is too short for that number of relays at their minimum separation.
+    /// The distance from Tx to Rx is too short for the number of relays at their minimum separation.
     NoRoom {
         /// Number of relays for which the distance is too short.
         relays: u16,
@@ -30,7 +32,7 @@ pub enum Refusal {
         /// Distance from Tx to Rx, m.
         distance_m: f32,
     },
-    /// The scenario combines fitted slots with a table of rate steps, to which relays cannot fit slots.
+    /// The scenario has fitted slots and a table of rate steps: relays fit slots only to Shannon's formula.
     Steps,
     /// [`Mission`] rejects a value of the scenario.
     Mission(MissionError),
@@ -217,8 +219,8 @@ pub fn fixed_altitude_relays(scenario: &Scenario, uavs: u16) -> Vec<u16> {
 
 /// Returns the mission before the first measurements, with equal interference everywhere.
 ///
-/// In a random field, the mean of the inverse interference is set everywhere to the value that it has at Rx. A
-/// mission without a random field is returned unchanged.
+/// The mean of the inverse interference at Rx replaces the means at all other positions. A mission without a random
+/// field is returned unchanged.
 #[must_use]
 pub fn with_uniform_field(mission: &Mission) -> Mission {
     let config = mission.config();

@@ -61,14 +61,15 @@ pub struct Scene {
     pub reverse: f64,
     /// Interfering transmitters, at least one; their powers add up at a receiver.
     pub sources: Vec<Source>,
-    /// Areas of the sources that may be anywhere in them, by index in `sources`.
+    /// Areas of sources whose positions are uncertain, by index in `sources`.
     ///
-    /// Each receiver gets the interference from the nearest point of the area. The SIR of a hop is then its SIR for
-    /// the source's worst position for this hop.
+    /// Such a source may be anywhere in its area. Each receiver gets the interference from the area's point nearest to
+    /// it, so that the SIR of a hop is the SIR for the worst position of the source.
     pub areas: BTreeMap<usize, Area>,
     /// Least and greatest altitude of the sources, m, by index in `sources`.
     ///
-    /// It is 0 for a source that is not in the map. Each receiver gets the interference from the nearest altitude between the two.
+    /// The altitude of a source that is not in the map is 0. For each receiver, a source is at the altitude nearest to the receiver within
+    /// these limits.
     pub heights_m: BTreeMap<usize, [f64; 2]>,
     /// Path-loss factor mu between two relays, 1/m^2, > 0: the path loss at distance d is mu d^2.
     pub mu_los: f64,
@@ -168,7 +169,7 @@ impl Scene {
         .sum()
     }
 
-    /// Returns the altitude of a receiver at `h_m` above source `at`, m.
+    /// Returns the height of a receiver at the altitude `h_m` above the source with index `at`, m.
     fn climb_m(&self, at: usize, h_m: f64) -> f64 {
         let [low, high] = self.heights_m.get(&at).copied().unwrap_or_default();
         h_m - h_m.clamp(low, high)
@@ -190,7 +191,7 @@ impl Scene {
 
     /// Returns the power of each source, W, and the offset from it to (`x`, `y`), m.
     ///
-    /// A source that may be anywhere in an area is at its nearest point.
+    /// A source with an area is at the area's point nearest to (`x`, `y`).
     pub fn offsets(&self, x: f64, y: f64) -> impl Iterator<Item = (f64, [f64; 2])> {
         let each = self.sources.iter().enumerate();
         each.map(move |(at, source)| {
@@ -224,7 +225,8 @@ impl Scene {
     /// Returns the linear SIRs of the N + 1 hops from Rx to Tx, with relay k at `places[k - 1]`.
     ///
     /// Entry k - 1 is the SIR of the hop from node k to node k - 1, with the interference at node k - 1. Node 0 is Tx
-    /// and node N + 1 is Rx. The list is empty, and a SIR infinite, under the conditions of [`Scene::hop_sirs`].
+    /// and node N + 1 is Rx. A SIR is infinite if its two nodes share a position. The list is empty unless there is one
+    /// position per relay, and at least one relay.
     pub fn hop_sirs_back(&self, places: &[impl Copy + Into<Place>]) -> Vec<f64> {
         let (Some(&first), Some(relay)) = (places.first(), self.relays.first()) else {
             return Vec::new();
@@ -242,7 +244,7 @@ impl Scene {
 
     /// Returns the linear SIR of the worst hop from Tx to Rx; 0 if [`Scene::hop_sirs`] returns no hop.
     ///
-    /// If `self.reverse` is above 0, the hops from Rx to Tx count, too, with their SIRs divided by it.
+    /// If `self.reverse` is above 0, the hops from Rx to Tx count, too, with their SIRs divided by `reverse`.
     pub fn chain_sir(&self, places: &[impl Copy + Into<Place>]) -> f64 {
         let sirs = self.hop_sirs(places).into_iter();
         let there = sirs.reduce(f64::min).unwrap_or(0.0);

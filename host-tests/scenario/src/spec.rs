@@ -43,11 +43,14 @@ pub struct Scenario {
     pub channel: ChannelSpec,
     /// Interference: a list of interfering transmitters, or a random field.
     pub interference: Interference,
-    /// Areas of interferers that may be anywhere in them, by the index (from 0) of the interferer.
+    /// Areas of interferers whose positions are uncertain, by index (from 0) of the interferer.
+    ///
+    /// Such an interferer may be anywhere in its area.
     pub areas: BTreeMap<usize, SourceArea>,
     /// Heights of the interferers' antennas above the ground, m, 0 to 1000, by index (from 0).
     ///
-    /// It is 0 for an interferer that is not in the map. The planner uses them with elevation files.
+    /// The height is 0 for an interferer that is not in the map. The planner uses the heights if there are elevation
+    /// files.
     pub masts_m: BTreeMap<usize, f64>,
     /// Areas in which relays may not fly, for the planner.
     pub no_fly: Vec<NoFly>,
@@ -80,13 +83,13 @@ pub struct TerrainSpec {
     pub mast_m: f64,
     /// Least height of a relay above the ground, m, 0 (its default) to 1e4.
     ///
-    /// The highest ground within the relay's position error counts.
+    /// The height counts from the highest ground at the positions where the relay may be within its position error.
     pub above_ground_m: f64,
     /// Greatest height of a relay above the ground below it, m; `None` for no limit.
     pub above_ground_max_m: Option<f64>,
     /// Error of the heights in the elevation files, m, 0 (its default) to 100.
     ///
-    /// The ground between antennas counts as higher by this error.
+    /// The planner raises the ground between two antennas by up to this error.
     pub error_m: f64,
 }
 
@@ -281,8 +284,8 @@ pub struct BetaPoint {
 /// Altitude and power of one relay, if they differ from the common values. At least one is set if read from a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RelayOverride {
-    /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. It may be outside
-    /// `altitude_min_m` to `altitude_max_m`.
+    /// Fixed altitude of this relay, m, 0.1 to 1e4; `None` for the common altitude. Values outside of `altitude_min_m`
+    /// to `altitude_max_m` are allowed.
     pub altitude_m: Option<f64>,
     /// EIRP of this relay, W, 1e-6 to 1e6; `None` for the common EIRP.
     pub power_w: Option<f64>,
@@ -354,7 +357,8 @@ impl Scenario {
         link.is_some_and(|link| link.access == Access::Fitted)
     }
 
-    /// Returns true if the scenario gives the interference. It may be missing if the relays locate the interferer.
+    /// Returns true if the scenario gives the interference. False only if the relays have to locate an unknown
+    /// interferer.
     pub fn knows_interference(&self) -> bool {
         !matches!(&self.interference, Interference::Sources(sources) if sources.is_empty())
     }

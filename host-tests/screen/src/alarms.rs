@@ -5,7 +5,7 @@
 
 use crate::snapshot::{Alarm, Urgency};
 
-/// Number of alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
+/// Number of stored alarms above which ended alarms are dropped. The least urgent are dropped first; of equally urgent
 /// alarms the oldest. Alarms that still last are not dropped.
 pub const MOST: usize = 200;
 
@@ -129,7 +129,7 @@ pub struct Alarms {
 }
 
 impl Alarms {
-    /// Begins an alarm, or adds the reporter `by` to the same alarm that lasts already.
+    /// Begins an alarm, or adds `by` to its reporters if the same alarm lasts already.
     ///
     /// `subject` is the relay that the alarm is about; 0 if the alarm is about its reporters.
     pub fn begin(&mut self, time_s: f64, reason: Reason, subject: u16, by: u16) {
@@ -143,7 +143,7 @@ impl Alarms {
         self.put(time_s, (reason, subject, reporters, String::new()));
     }
 
-    /// Begins an alarm, or updates the one of the same reason and subject that lasts already.
+    /// Begins an alarm, or updates it if an alarm of the same reason and subject lasts already.
     fn put(&mut self, time_s: f64, (reason, subject, reporters, note): Lasting) {
         let text = reason.text(subject, &reporters) + &note;
         let mut entries = self.entries.iter_mut();
@@ -175,9 +175,10 @@ impl Alarms {
         }
     }
 
-    /// Ends the alarms of a reason about relay `subject`.
+    /// Ends the alarms for `reason` about relay `subject`.
     ///
-    /// `None` ends only the part that relay `by` has reported.
+    /// If `subject` is `None`, removes relay `by` from the reporters of all alarms for `reason`. Such an alarm ends
+    /// when it has no reporters left.
     pub fn end(&mut self, time_s: f64, reason: Reason, subject: Option<u16>, by: u16) {
         let lasting = self.entries.iter_mut().filter(|it| it.lasts());
         for entry in lasting.filter(|it| it.reason == reason) {
@@ -207,7 +208,7 @@ impl Alarms {
         }
     }
 
-    /// Returns the numbers of the relays that `by` has reported as lost and not found again.
+    /// Returns the numbers of the relays that relay `by` has reported as lost, and not as found since then.
     pub fn lost_for(&self, by: u16) -> Vec<u16> {
         let lost = self.lost().filter(|it| it.reporters.contains(&by));
         lost.map(|it| it.subject).collect()

@@ -40,11 +40,11 @@ pub struct Chain<'a> {
 }
 
 impl Chain<'_> {
-    /// Returns the state of the chain at the time `now`, from the newest report of each relay by number.
+    /// Returns the state of the chain at the time `now`, from the newest report of each relay.
     ///
-    /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
-    /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
-    /// beyond it [`SILENT_AFTER`] later.
+    /// A relay whose report is old counts as lost in two cases: another relay has reported it as lost, or it had neighbours, an alarm about
+    /// its missing reports lasts, and the chain has closed the gap. The gap is closed if a report at least [`SILENT_AFTER`] newer contains
+    /// a neighbour beyond the relay.
     pub fn snapshot(&self, now: Instant, reports: &[Report], alarms: &Alarms) -> Snapshot {
         let is_skipped = |report: &Report| {
             let mut later = reports
@@ -159,7 +159,7 @@ fn has_beyond(by: &Report, number: u16) -> bool {
         || after.is_some_and(|it| (by.relay + 1..it).contains(&number))
 }
 
-/// Returns true if relay `number` is between the two ends of a hop by its number.
+/// Returns true if relay `number` is between the two ends of a hop in the order of the relays' numbers.
 fn is_between(number: u16, hop: &Hop) -> bool {
     let of = |node| match node {
         Node::Tx => 0,
@@ -252,7 +252,7 @@ pub(crate) const fn control(state: State) -> &'static str {
     }
 }
 
-/// Returns the reason why a drone that is flown by its relay holds its position.
+/// Returns the reason why a drone holds its position; `None` if it moves or no relay controls it.
 pub(crate) fn hold_reason(report: &Report) -> Option<String> {
     let pairs = report.hold_reasons.into_iter().zip(report.neighbours);
     let mut reasons = pairs.filter(|_| is_flown(report));

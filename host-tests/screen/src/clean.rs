@@ -15,13 +15,13 @@ use crate::snapshot::{LogLine, Position, Snapshot};
 /// Largest coordinate, m.
 const FARTHEST_M: f64 = 1e7;
 
-/// Largest SIR, and with a minus sign the lowest, dB.
+/// Largest absolute value of a shown SIR, dB.
 const LIMIT_DB: f64 = 99.9;
 
 /// Largest number of characters of a text.
 const LONGEST_TEXT: usize = 300;
 
-/// Cleans all values of a snapshot but the log.
+/// Removes or limits all values of a snapshot that the page cannot show. The log lines stay as they are.
 pub fn clean(snapshot: &mut Snapshot) {
     for place in [&mut snapshot.tx, &mut snapshot.rx] {
         known(place);
@@ -64,7 +64,7 @@ pub fn clean(snapshot: &mut Snapshot) {
     snapshot.desk.as_mut().map(clean_value);
 }
 
-/// Cleans all texts of a value.
+/// Removes invisible characters from all texts of a JSON value, and shortens long texts.
 fn clean_value(value: &mut Value) {
     match value {
         Value::String(it) => text(it),
@@ -74,7 +74,7 @@ fn clean_value(value: &mut Value) {
     }
 }
 
-/// Cleans the text of a log line.
+/// Removes invisible characters from a log line, and shortens a long line.
 pub(crate) fn clean_line(line: &mut LogLine) {
     text(&mut line.text);
 }
@@ -88,7 +88,7 @@ fn is_shown(place: &Position) -> bool {
     [place.x_m, place.y_m, altitude_m].into_iter().all(is_near)
 }
 
-/// Makes a position unknown that the page cannot show.
+/// Replaces a position that is too far away for the page by `None`.
 fn known(place: &mut Option<Position>) {
     *place = place.filter(is_shown);
 }

@@ -36,8 +36,8 @@ pub fn hop_sirs(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> 
 
 /// Returns the linear SIR of every hop from Rx to Tx. Entry k - 1 is received by node k - 1; node 0 is Tx.
 ///
-/// The formulas and the limit are the same as in [`hop_sirs`]. Empty unless the mission has one known interferer, or
-/// a random field and a required SIR from Rx to Tx.
+/// The formulas and the limit are the same as in [`hop_sirs`]. The list is empty if the interferer is unknown, and in a
+/// random field if the mission requires no SIR from Rx to Tx.
 pub fn hop_sirs_back(mission: &Mission, places: &[(Placement, Profile)]) -> Vec<f64> {
     let is_known = mission.known_source().is_some();
     let is_both_ways = mission.config().reverse > 0.0 && mission.field().is_some();

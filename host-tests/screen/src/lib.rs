@@ -67,11 +67,11 @@ pub use snapshot::{
 /// Reason why a screen cannot be served.
 #[derive(Debug)]
 pub enum ScreenError {
-    /// Text that is not an address with a port.
+    /// The text is not an address with a port.
     Address,
-    /// The address, and the error of the system when it was bound.
+    /// The server cannot listen at this address, because of this error of the operating system.
     Bind(SocketAddr, io::Error),
-    /// A thread of the server cannot be started.
+    /// The operating system cannot start a thread for the server.
     Thread(io::Error),
 }
 
@@ -106,7 +106,7 @@ impl fmt::Display for ScreenError {
 
 impl std::error::Error for ScreenError {}
 
-/// Parses an address with a port, as `127.0.0.1:8080`. `localhost` is 127.0.0.1.
+/// Parses an address with a port, for example `127.0.0.1:8080`. `localhost` is 127.0.0.1.
 ///
 /// # Errors
 /// [`ScreenError::Address`] for other text.

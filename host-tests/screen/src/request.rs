@@ -22,7 +22,7 @@ const MAX_BODY: usize = 4 * 1024;
 /// Largest number of headers of a request.
 const MAX_HEADERS: usize = 64;
 
-/// Content security policy of the page: its own files, the style inside of it, and nothing else.
+/// Content security policy of the page: it permits only the page's own files and its embedded style.
 static POLICY: LazyLock<String> = LazyLock::new(|| {
     format!(
         "default-src 'none'; script-src 'self'; style-src 'nonce-{}'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
@@ -31,11 +31,13 @@ static POLICY: LazyLock<String> = LazyLock::new(|| {
     )
 });
 
-/// Random text that marks the page's own style.
+/// Random text by which the browser accepts the embedded style.
+///
+/// It is both in the page and in the content security policy.
 static NONCE: LazyLock<String> =
     LazyLock::new(|| format!("{:016x}", RandomState::new().hash_one(0)));
 
-/// Page with its style inside, so that the first paint does not wait for another request.
+/// The page with its style sheet embedded, so that the browser can draw it after a single request.
 static PAGE: LazyLock<String> = LazyLock::new(|| {
     let [(_, _, page), (_, _, style), ..] = FILES;
     let style = format!("<style nonce=\"{}\">\n{style}</style>", *NONCE);
@@ -89,30 +91,31 @@ pub const FILES: [(&str, &str, &str); 8] = [
 /// Path of the stream of snapshots.
 const EVENTS: &str = "/events";
 
-/// Begin of the path of a map tile; the rest is `ZOOM/X/Y`.
+/// Start of a map tile's path; the rest of the path is `ZOOM/X/Y`.
 const TILES: &str = "/tiles/";
 
 /// Largest zoom level of a map tile.
 const MAX_ZOOM: u8 = 24;
 
-/// Path of a POST, by its task.
+/// Paths to which a page sends POST requests, with the task of each path.
 const TASKS: [(&str, Task); 2] = [("/preview", Task::Preview), ("/upload", Task::Upload)];
 
 /// Task that a page gives to the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Task {
-    /// Compute where the relays would fly with the values in the body.
+    /// Computes where the relays would fly with the values in the request's body.
     Preview,
-    /// Upload the mission of the preview whose number and digest are in the body.
+    /// Uploads a mission that a preview has shown. The request's body contains the preview's number and digest.
     Upload,
 }
 
-/// Secrets that requests have to carry.
+/// Password and token that the server expects in requests.
 #[derive(Default)]
 pub(crate) struct Access {
-    /// Password of all requests, by HTTP basic authentication with any user name; `None` for none.
+    /// Password of all requests, with any user name; `None` if no password is needed. It is sent by HTTP basic
+    /// authentication.
     pub(crate) password: Option<String>,
-    /// Token of every POST; `None` if no POST is accepted.
+    /// Token that every POST request has to contain; `None` if the server accepts no POST request.
     pub(crate) token: Option<String>,
 }
 
@@ -127,21 +130,21 @@ impl fmt::Debug for Access {
 pub(crate) enum Answer {
     /// File of the page: media type and content.
     File(&'static str, &'static str),
-    /// Stream of snapshots, which lasts until the browser leaves.
+    /// Stream of snapshots, which lasts until the browser closes the connection.
     Events,
     /// Map tile: zoom level, column and row.
     Tile(u8, u32, u32),
-    /// Task with a body of this many bytes, which the program answers.
+    /// Task that the program answers, and the size of the request's body, bytes.
     Post(Task, usize),
-    /// Refusal: status and reason phrase.
+    /// Refusal: HTTP status and reason phrase.
     Refused(u16, &'static str),
 }
 
-/// Largest-size refusal of a request.
+/// Refusal of a request that is too large or has too many headers.
 pub(crate) const TOO_LARGE: Answer = Answer::Refused(431, "Request Header Fields Too Large");
 /// Refusal of a request that did not arrive in time.
 pub(crate) const TOO_SLOW: Answer = Answer::Refused(408, "Request Timeout");
-/// Refusal of a connection beyond the limit, and of a POST that the program does not answer.
+/// Refusal of a connection or a stream beyond a limit, and of a task that the program does not answer.
 pub(crate) const FULL: Answer = Answer::Refused(503, "Service Unavailable");
 /// Refusal of a request without a password.
 const NO_PASSWORD: Answer = Answer::Refused(401, "Unauthorized");
@@ -157,7 +160,7 @@ const BODY_TOO_LARGE: Answer = Answer::Refused(413, "Content Too Large");
 const MALFORMED: Answer = Answer::Refused(400, "Bad Request");
 const FOREIGN: Answer = Answer::Refused(403, "Forbidden");
 
-/// Returns the answer to the received bytes of a request, and its body; `None` while it is incomplete.
+/// Returns the answer to a request, and the request's body; `None` while `bytes` are incomplete.
 ///
 /// `own` is the address at which the request arrived.
 pub(crate) fn answer<'a>(
@@ -266,7 +269,7 @@ fn checked(request: &httparse::Request<'_, '_>, own: SocketAddr, access: &Access
     )
 }
 
-/// Parses `ZOOM/X/Y`; `None` if there is no such tile.
+/// Parses the rest of a map tile's path, `ZOOM/X/Y`; `None` if there is no such tile.
 fn tile(path: &str) -> Option<(u8, u32, u32)> {
     let whole = |part: &str| {
         let is_plain = part.bytes().all(|it| it.is_ascii_digit()) && part.len() <= 8;
@@ -291,7 +294,7 @@ fn has_password(header: &str, password: &str) -> bool {
     is_same(parts.next().unwrap_or_default(), password.as_bytes())
 }
 
-/// Decodes a base64 text; `None` if it has another character.
+/// Decodes a base64 text; `None` if it contains a character that is not base64.
 fn decoded(text: &str) -> Option<Vec<u8>> {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let (mut bits, mut count, mut bytes) = (0, 0, Vec::new());
@@ -306,7 +309,7 @@ fn decoded(text: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Returns true if a text is the secret. The time does not depend on how many of its bytes are right.
+/// Returns true if `given` is the secret. The time does not depend on the number of right bytes.
 fn is_same(given: &[u8], secret: &[u8]) -> bool {
     let pairs = given.iter().zip(secret);
     let wrong = pairs.fold(given.len() ^ secret.len(), |wrong, (one, other)| {
@@ -345,7 +348,7 @@ pub(crate) fn head(answer: Answer) -> String {
     }
 }
 
-/// Returns the response with a map tile: status 204 if there is none, which browsers do not log.
+/// Returns the response with a map tile. Without a tile its status is 204, which browsers do not log as an error.
 pub(crate) fn picture(tile: Option<(&str, Vec<u8>)>) -> Vec<u8> {
     let (status, reason, media, content) = match tile {
         Some((media, content)) => (200, "OK", media, content),
@@ -407,7 +410,7 @@ mod tests {
         status_of(&format!("{lines}\n\n"), &Access::default())
     }
 
-    /// Returns the HTTP status of the answer to `request`: 200 if it is accepted, 0 if it is incomplete.
+    /// Returns the HTTP status of the answer to `request`: 200 if accepted, 0 if `request` is incomplete.
     fn status_of(request: &str, access: &Access) -> u16 {
         let request = request.replace('\n', "\r\n");
         let own = ([127, 0, 0, 1], 8080).into();

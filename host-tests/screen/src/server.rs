@@ -28,49 +28,49 @@ use crate::snapshot::{LogLine, Snapshot};
 /// Largest number of open connections. Further connections get the status 503.
 pub const MAX_CONNECTIONS: usize = 64;
 
-/// Largest number of open connections from one other computer. Connections thus remain for other computers.
+/// Largest number of open connections from one other computer. Connections remain for further computers.
 pub const MAX_PER_ADDRESS: usize = 16;
 
-/// Largest number of streams of snapshots, so that they leave room for files and tasks.
+/// Largest number of open streams of snapshots, so that connections remain for files and tasks.
 pub const MAX_STREAMS: usize = 56;
 
-/// Number of connections that only this computer gets.
+/// Number of connections that are reserved for this computer.
 const OWN: usize = 8;
 
-/// Largest number of connections that have not yet given the password, from all other computers.
+/// Largest number of connections without a password yet, from all other computers together.
 const MAX_UNKNOWN: usize = 16;
 
-/// Largest number of connections that have not yet given the password, from this computer.
+/// Largest number of connections from this computer that have not sent the password yet.
 const MAX_UNKNOWN_OWN: usize = 32;
 
-/// Largest number of connections that have not yet given the password, from one other computer.
+/// Largest number of connections from one other computer that have not sent the password yet.
 const MAX_UNKNOWN_PER_ADDRESS: usize = 8;
 
 /// Number of log lines that the server keeps for browsers that open the page later.
 const LINES: usize = 1_000;
 
-/// Time in which a request has to arrive.
+/// Time within which a request has to arrive.
 const REQUEST_TIME: Duration = Duration::from_secs(5);
 
-/// Time in which a browser has to take one file or one snapshot.
+/// Time within which a browser has to receive one file or one snapshot.
 const WRITE_TIME: Duration = Duration::from_secs(10);
 
-/// Time for which the server waits for the end of a refused request, so that the refusal arrives.
+/// Time for which the server reads and ignores the rest of a request, so that its answer arrives.
 const LINGER_TIME: Duration = Duration::from_millis(200);
 
-/// Time between two snapshots that browsers get, however many the program shows.
+/// Least time between two snapshots that browsers receive. The program may show snapshots more often.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// Time without a new snapshot after which a comment is sent, to detect a browser that has left.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Number of tasks that wait for the program. Further tasks get the status 503.
+/// Largest number of tasks that wait for the program. Further tasks get the status 503.
 const TASKS: usize = 4;
 
-/// Time in which the program has to answer a task.
+/// Time within which the program has to begin a task. After this time it has the same time again for the answer.
 const REPLY_TIME: Duration = Duration::from_secs(5);
 
-/// Time for which a wrong password counts.
+/// Time for which the server remembers a wrong password.
 const TRIES_TIME: Duration = Duration::from_secs(60);
 
 /// Largest number of wrong passwords in [`TRIES_TIME`] from one address.
@@ -78,21 +78,21 @@ const MAX_TRIES: usize = 5;
 
 /// Largest number of wrong passwords in [`TRIES_TIME`] from all addresses.
 ///
-/// Beyond it all other computers are refused.
+/// From this number on, the server refuses requests of all other computers.
 const MAX_ALL_TRIES: usize = 100;
 
-/// Stack size of a connection's thread, bytes. A tile may have to be decompressed, and an overflow would end the program.
+/// Stack size of a connection's thread, bytes. It suffices to decompress a map tile; a stack overflow would end the program.
 const STACK: usize = 1024 * 1024;
 
 /// Pictures of the map below the chain: tiles of the Web Mercator projection from the program's file.
 pub struct Tiles {
-    /// Smallest and largest zoom level.
+    /// Smallest and largest zoom level of the map tiles.
     pub zooms: [u8; 2],
-    /// Text that names the source of the pictures, which the page shows. Empty without pictures.
+    /// Text that names the source of the pictures; the page shows it. Empty if no source has to be named.
     pub attribution: String,
     /// Returns media type and bytes of the tile at a zoom level, column and row; `None` if there is none.
     ///
-    /// Threads of several browsers call it at the same time.
+    /// Threads that serve different browsers call this function at the same time.
     pub read: Box<TileReader>,
 }
 
@@ -105,7 +105,7 @@ impl fmt::Debug for Tiles {
     }
 }
 
-/// Server of the page that shows a chain. It ends when it is dropped.
+/// Server of the page that shows a chain. The server ends when this value is dropped.
 #[derive(Debug)]
 pub struct Screen {
     shared: Arc<Shared>,
@@ -115,7 +115,7 @@ pub struct Screen {
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Random identifier of this run. The page forgets alarms and ways when it changes.
+    /// Random identifier of this run of the program. When it changes, the page clears its alarms and flown paths.
     run: String,
     inbox: Mutex<Inbox>,
     is_new: Condvar,
@@ -123,7 +123,7 @@ struct Shared {
     is_written: Condvar,
     access: Access,
     tiles: Option<Tiles>,
-    /// Program that does tasks of the page; `None` if the page only shows.
+    /// Channel to the program, which does the page's tasks; `None` if the page cannot give tasks.
     tasks: Option<SyncSender<Post>>,
     /// Addresses and times of wrong passwords in the last [`TRIES_TIME`].
     tries: Mutex<VecDeque<(IpAddr, Instant)>>,
@@ -135,14 +135,14 @@ struct Shared {
 /// State of a connection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Stage {
-    /// A request with the password, if there is one, has not arrived yet.
+    /// The connection has not sent a request with the right password yet. Does not occur without a password.
     Unknown,
     Known,
     /// Snapshots are being sent.
     Streaming,
 }
 
-/// Newest snapshot that is not yet written as JSON. Also the log lines since the last written snapshot.
+/// Newest snapshot that is not yet converted to JSON, and the log lines that are not yet converted.
 #[derive(Debug, Default)]
 struct Inbox {
     snapshot: Option<Snapshot>,
@@ -152,24 +152,24 @@ struct Inbox {
 /// Newest snapshot and log lines as JSON.
 #[derive(Debug, Default)]
 struct Outbox {
-    /// Number of snapshots written so far; 0 if none was written.
+    /// Number of snapshots converted to JSON so far.
     number: u64,
-    /// Newest snapshot, as an event of the stream.
+    /// Newest snapshot in JSON, as a server-sent event.
     event: Arc<str>,
-    /// Time when the newest snapshot was written.
+    /// Time when the newest snapshot was converted; `None` before the first snapshot.
     written: Option<Instant>,
     lines: VecDeque<Arc<str>>,
-    /// Number of log lines written so far, also those that are no longer kept.
+    /// Number of log lines converted to JSON so far, also those that are no longer stored.
     line_count: u64,
 }
 
-/// Snapshot as browsers get it.
+/// Snapshot and further data, as the server sends them to browsers in JSON.
 #[derive(Serialize)]
 struct Sent<'a> {
     run: &'a str,
-    /// Token of the page's tasks; `None` if the page only shows.
+    /// Token with which the page gives tasks; `None` if the page cannot give tasks.
     token: Option<&'a str>,
-    /// Map tiles of the page, if there are any.
+    /// Map tiles of the page; `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     tiles: Option<SentTiles<'a>>,
     #[serde(flatten)]
@@ -182,29 +182,29 @@ struct SentTiles<'a> {
     attribution: &'a str,
 }
 
-/// Task of a page, which the program has to [answer](Self::reply).
+/// Task that a page has given to the program. The program has to [answer](Self::reply) it.
 #[derive(Debug)]
 pub struct Post {
-    /// Task.
+    /// Kind of the task.
     pub task: Task,
     /// Body of the request, which should be JSON.
     pub body: String,
     /// Address of the browser.
     pub peer: IpAddr,
     reply: SyncSender<Result<String, String>>,
-    /// True once the program does the task, or the browser has got a refusal.
+    /// True once the program has begun the task, or the server has refused it because the program was late.
     is_settled: Arc<AtomicBool>,
 }
 
 impl Post {
-    /// Returns true if the program may do the task.
+    /// Marks the task as begun. Returns false if the program must not do it, because the server has refused it.
     ///
-    /// The browser still waits then, and from now on gets no refusal.
+    /// After true the server still waits for the program's answer.
     pub fn begin(&self) -> bool {
         !self.is_settled.swap(true, Ordering::SeqCst)
     }
 
-    /// Answers the task: with JSON, or with the reason why the program does not do the task. The call never waits.
+    /// Answers the task with JSON, or with the reason why the program does not do the task. The call never waits.
     pub fn reply(self, reply: Result<String, String>) {
         // A browser may have left.
         _ = self.reply.try_send(reply);
@@ -220,9 +220,10 @@ impl Screen {
         Self::serve(address, Access::default(), None, None)
     }
 
-    /// Starts a screen whose page can also give [tasks](Post) to the program. With a password, every request needs it.
+    /// Starts a screen whose page can also give [tasks](Post) to the program. If `password` is given, every request has
+    /// to contain it.
     ///
-    /// With `tiles` the page shows a map of their pictures below the chain.
+    /// If `tiles` are given, the page shows them as a map below the chain.
     ///
     /// # Errors
     /// [`ScreenError`] if the address cannot be bound.
@@ -281,11 +282,11 @@ impl Screen {
         Ok(())
     }
 
-    /// Passes a snapshot to the threads that serve the browsers, and does not wait for them. A snapshot that was not
-    /// sent yet is replaced; its log lines are kept.
+    /// Passes a snapshot to the threads that serve the browsers, and does not wait for them.
     ///
-    /// Values that the page cannot show are removed before the snapshot is sent: positions and SIRs that are not
-    /// finite or out of range, and invisible characters in texts.
+    /// It replaces an earlier snapshot that was not sent yet; the log lines of both are sent. Before sending, the
+    /// server removes positions and SIRs that are not finite, positions that are too far away, and invisible characters
+    /// in texts.
     pub fn show(&self, mut snapshot: Snapshot) {
         let lines = std::mem::take(&mut snapshot.log);
         let mut inbox = lock(&self.shared.inbox);
@@ -352,7 +353,7 @@ impl Shared {
         self.has_ended.load(Ordering::SeqCst)
     }
 
-    /// Moves new snapshots from the inbox to the outbox, as JSON, until the screen ends.
+    /// Converts new snapshots from the inbox to JSON in the outbox, until the server ends.
     fn write_snapshots(&self) {
         while let Some((mut snapshot, mut lines)) = self.next() {
             clean(&mut snapshot);
@@ -387,7 +388,7 @@ impl Shared {
         }
     }
 
-    /// Waits for the next snapshot in the inbox. `None` at the end of the screen.
+    /// Waits for the next snapshot, and returns it with its log lines; `None` if the server ends.
     fn next(&self) -> Option<(Snapshot, VecDeque<LogLine>)> {
         let mut inbox = lock(&self.inbox);
         loop {
@@ -402,10 +403,11 @@ impl Shared {
         }
     }
 
-    /// Counts a wrong password from `peer`, and returns the answer: a refusal after too many of them.
+    /// Returns `answer`, or a refusal after too many wrong passwords, from `peer` or from all addresses.
     ///
-    /// While an address is refused, the right password is refused, too, except for a task with the token, which cannot be guessed. Many
-    /// addresses can make all other computers wait, but not this one, from which a tunnel comes.
+    /// If `answer` refuses a wrong password, this password is counted. After too many, the server refuses requests with the right password,
+    /// too. It still accepts tasks, because their token cannot be guessed. It refuses this computer only for wrong passwords from this
+    /// computer, so that a tunnel to it still works.
     fn limited(&self, answer: Answer, peer: IpAddr) -> Answer {
         if self.access.password.is_none() || matches!(answer, Answer::Post(..)) {
             return answer;
@@ -456,7 +458,7 @@ impl Shared {
         }
     }
 
-    /// Sends snapshots and log lines to a browser until it leaves or is too slow, or the screen ends.
+    /// Sends snapshots and log lines to a browser, until it leaves, is too slow, or the server ends.
     fn stream(&self, stream: &mut TcpStream) -> io::Result<()> {
         let (mut sent, mut sent_lines) = (0, 0);
         while !self.has_ended() {
@@ -496,9 +498,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the address under which a computer is counted.
+/// Returns the address under which the connections and wrong passwords of a computer are counted.
 ///
-/// All loopback addresses count as one address, and so do all addresses of an IPv6 network of 64 bits.
+/// All loopback addresses count as one address. All IPv6 addresses with the same first 64 bits count as one address,
+/// too.
 fn counted_as(peer: IpAddr) -> IpAddr {
     let peer = peer.to_canonical();
     match peer {
@@ -508,11 +511,11 @@ fn counted_as(peer: IpAddr) -> IpAddr {
     }
 }
 
-/// Connection that counts toward the limits of connections until it is dropped.
+/// Connection with its address and state. It counts toward the limits of connections until it is dropped.
 struct Counted(Arc<Shared>, (IpAddr, Stage));
 
 impl Counted {
-    /// Counts a connection from `peer`; `None` beyond a limit.
+    /// Creates the entry of a connection from `peer`; `None` if this connection would exceed a limit.
     fn new(shared: &Arc<Shared>, peer: IpAddr) -> Option<Self> {
         let peer = counted_as(peer);
         let stage = match shared.access.password {
@@ -539,8 +542,7 @@ impl Counted {
         })
     }
 
-    /// Records that the request has been accepted. Returns false if it requests a stream, and too many streams are
-    /// open.
+    /// Records the state that follows from `answer`. Returns false if it is a stream, but too many are open.
     fn accept(&mut self, answer: Answer) -> bool {
         let stage = match answer {
             Answer::Events => Stage::Streaming,
@@ -569,7 +571,7 @@ impl Drop for Counted {
     }
 }
 
-/// Accepts connections until the screen ends, and starts a thread for each.
+/// Accepts connections until the server ends, and starts a thread for each.
 fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     loop {
         let accepted = listener.accept();
@@ -596,7 +598,7 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     }
 }
 
-/// Answers the request of one connection.
+/// Reads the request of a connection, and sends the response.
 fn serve(mut stream: TcpStream, counted: &mut Counted) -> io::Result<()> {
     let shared = Arc::clone(&counted.0);
     let (own, peer) = (stream.local_addr()?, stream.peer_addr()?.ip());
@@ -671,13 +673,13 @@ fn left(until: Instant) -> io::Result<Duration> {
     Ok(left)
 }
 
-/// Reads some bytes, and waits for them no longer than until `until`.
+/// Reads the next bytes that arrive; an error if none arrive before `until`. Returns their number.
 fn read_some(stream: &mut TcpStream, bytes: &mut [u8], until: Instant) -> io::Result<usize> {
     stream.set_read_timeout(Some(left(until)?))?;
     stream.read(bytes)
 }
 
-/// Writes all bytes within [`WRITE_TIME`], however few of them the browser takes at a time.
+/// Writes all bytes; an error if the browser does not receive all of them within [`WRITE_TIME`].
 fn write_all(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
     let until = Instant::now() + WRITE_TIME;
     while !bytes.is_empty() {

@@ -10,20 +10,20 @@ use serde::{Serialize, Serializer};
 
 /// State of a chain at one time.
 ///
-/// Texts are shown as plain text without control characters and direction marks, and end after 300 characters.
+/// The page shows texts as plain text, without control characters and direction marks, and cut at 300 characters.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct Snapshot {
     /// Time of the state, s since the start of the flight or the run.
     pub time_s: Option<f64>,
     /// Name of the chain, for the heading.
     pub name: Option<String>,
-    /// Place and direction of the coordinates on earth.
+    /// Origin and direction of the coordinates on earth.
     pub frame: Option<Frame>,
     /// Position of the transmitter.
     pub tx: Option<Position>,
     /// Position of the receiver.
     pub rx: Option<Position>,
-    /// Known relays, also lost ones.
+    /// Known relays, including lost relays.
     pub relays: Vec<RelaySnapshot>,
     /// Hops of the chain, from Tx to Rx.
     pub hops: Vec<Hop>,
@@ -31,25 +31,25 @@ pub struct Snapshot {
     pub interferers: Vec<InterfererSnapshot>,
     /// Geofence of the setpoints.
     pub geofence: Option<Fence>,
-    /// No-fly areas: corners of each, x and y in m.
+    /// No-fly areas, each as a list of its corners, x and y in m.
     pub no_fly: Vec<Vec<[f64; 2]>>,
     /// Ground below the line from Tx to Rx.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground: Option<GroundProfile>,
-    /// Alarms that last, and those that have ended, each with a number of its own.
+    /// Alarms, both lasting and ended. Each has a number of its own.
     pub alarms: Vec<Alarm>,
-    /// State of the program's tasks, for a page that can act: `desk.js` and the program define it.
+    /// State of the tasks that the page can give, for `desk.js`; `None` if it cannot give tasks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub desk: Option<serde_json::Value>,
-    /// Log lines that no earlier snapshot had. The server keeps the last 1000 lines.
+    /// Log lines since the previous snapshot. The server keeps the last 1000 lines.
     #[serde(skip)]
     pub log: Vec<LogLine>,
 }
 
-/// Place and direction of a snapshot's coordinates on earth.
+/// Origin and direction of a snapshot's coordinates on earth.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct Frame {
-    /// Latitude and longitude of the origin, which is Tx, degrees (WGS 84).
+    /// Latitude and longitude of Tx, the origin, degrees (WGS 84).
     pub origin_deg: Option<[f64; 2]>,
     /// Direction of the x axis, degrees clockwise from true north, 0 to 360.
     pub azimuth_deg: Option<f64>,
@@ -79,13 +79,13 @@ pub struct RelaySnapshot {
     pub position: Option<Position>,
     /// Setpoint that the relay gives to its autopilot now.
     pub setpoint: Option<Position>,
-    /// Position on which the chain has agreed, where the relay will be in the end.
+    /// Position on which the chain has agreed: the destination of the relay.
     pub agreed: Option<Position>,
-    /// Phase of the protocol, as "agreed" or "view change".
+    /// Phase of the protocol, for example "agreed" or "view change".
     pub phase: Option<String>,
-    /// State of the control of the drone, as "engaged" or "on the ground".
+    /// State of the control of the drone, for example "engaged" or "on the ground".
     pub control: Option<String>,
-    /// Reason why the drone holds its position before it has arrived.
+    /// Reason why the drone holds its position before it reaches the agreed position.
     pub hold_reason: Option<String>,
     /// Numbers of the neighbours that the relay reports as lost.
     pub lost_neighbours: Vec<u16>,
@@ -109,7 +109,7 @@ pub enum Condition {
     Normal,
     /// The relay waits: for its pilot, for an agreement or for a neighbour.
     Waiting,
-    /// The relay has a fault, as an autopilot without a position.
+    /// The relay has a fault, for example an autopilot without a position.
     Fault,
     /// The relay is lost: no member of the chain receives it.
     Lost,
@@ -180,7 +180,7 @@ pub struct InterfererSnapshot {
     pub position: Position,
     /// Transmit power, W.
     pub power_w: Option<f64>,
-    /// Radius around the position within which the interferer is believed to be, m.
+    /// Radius around the position within which the interferer is expected, m; `None` if unknown.
     pub uncertainty_m: Option<f64>,
     /// True if the relays estimate the interferer by measurements.
     pub is_estimated: bool,
@@ -197,14 +197,14 @@ pub struct Fence {
     pub altitude_m: Option<[f64; 2]>,
 }
 
-/// Ground below the line from Tx to Rx. Its heights are on the scale of the relays' altitudes.
+/// Ground below the line from Tx to Rx. Its heights and the relays' altitudes have the same zero.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GroundProfile {
     /// Distance from Tx to Rx, m.
     pub length_m: f64,
     /// Height of the antennas of Tx and Rx above the ground, m.
     pub mast_m: f64,
-    /// Heights of the ground at equal distances from Tx to Rx, at least two, m.
+    /// Heights of the ground at equally spaced points from Tx to Rx, both included, m. At least two heights.
     pub heights_m: Vec<f64>,
 }
 
@@ -220,7 +220,7 @@ pub enum Urgency {
     Critical,
 }
 
-/// Alarm for the operator. The page sounds until it is acknowledged or has ended.
+/// Alarm for the operator. The page gives a sound until the operator acknowledges the alarm or it has ended.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Alarm {
     /// Number of the alarm, from 1, which no other alarm of the flight has.
@@ -229,7 +229,7 @@ pub struct Alarm {
     pub time_s: f64,
     /// Urgency of the alarm.
     pub urgency: Urgency,
-    /// Text of the alarm, as "relay 3 lost: reported by relay 2".
+    /// Text of the alarm, for example "relay 3 lost: reported by relay 2".
     pub text: String,
     /// Time when the reason of the alarm ended; `None` while it lasts.
     pub cleared_s: Option<f64>,

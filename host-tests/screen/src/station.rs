@@ -25,22 +25,23 @@ use crate::alarms::{Alarms, Lasting, Reason, named};
 use crate::chain::{Chain, SILENT_AFTER, control, hold_reason, phase, seconds};
 use crate::snapshot::{LogLine, Snapshot};
 
-/// Time without any frame after which no alarm about a single relay begins: the station may be cut off.
+/// Time without any frame from which no alarm about a single relay begins. The station itself may be cut off then.
 const QUIET_AFTER: Duration = Duration::from_millis(2_000);
 
-/// Age of a nearer relay's report from which the reports of the relays behind it may have no way.
+/// Age of a relay's report from which reports of the relays behind it may no longer arrive.
 const UNSURE_AFTER: Duration = Duration::from_millis(2_500);
 
-/// Age of a nearer relay's report from which the relays behind it have found another way.
+/// Age of a relay's report from which reports of the relays behind it bypass the relay. The chain has closed the gap by
+/// then.
 const CLOSED_AFTER: Duration = SILENT_AFTER.times(2);
 
-/// Time for which the rejection of a frame is shown.
+/// Time for which the alarm about rejected frames lasts after the last rejected frame.
 const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 
-/// Time after which a drone that does not come nearer to its setpoint is reported.
+/// Time without approach to its setpoint after which a drone is reported.
 ///
-/// Reports have the setpoint every eighth time only: a drone on its way to a new setpoint may therefore seem to fly
-/// away from the previous setpoint for 10 s.
+/// Only every eighth report contains the setpoint: a drone on its way to a new setpoint may therefore seem to fly away
+/// from the previous setpoint for 10 s.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
 /// Distance from a setpoint below which a drone has reached it, m.
@@ -55,20 +56,23 @@ pub struct Frames {
     pub rejected: u32,
 }
 
-/// Newest report of a relay, and the past that its alarms depend on.
+/// Newest report of a relay, and the values from earlier reports that its alarms depend on.
 #[derive(Clone, Copy, Debug)]
 struct Known {
     report: Report,
-    /// True from the time when the relay takes control of the drone until the pilot takes control. Also true without
-    /// a link to the autopilot.
+    /// True from the time when the relay takes control of the drone until the pilot takes control. It stays true if the
+    /// link to the autopilot is lost.
     was_engaged: bool,
     is_released: bool,
     is_link_lost: bool,
-    /// Time of the first report of an agreed position without a lease; `None` while that is not so.
+    /// Time of the first of the latest reports with an agreed position but no lease.
+    ///
+    /// `None` if the newest report has no agreed position or has a lease.
     unleased_at: Option<Instant>,
-    /// Slowly decaying maximum of the age that a report of this relay has when the next report arrives.
+    /// Slowly decaying maximum of the time between two reports of this relay.
     longest_age: Duration,
-    /// Least distance from the setpoint, m, and its time. `None` while the drone need not fly to the setpoint.
+    /// Time when the drone came nearest to its setpoint, and the distance then, m. `None` while the relay does not move
+    /// the drone, or the drone has arrived.
     nearest: Option<(Instant, f32)>,
 }
 
@@ -85,7 +89,7 @@ impl Known {
         }
     }
 
-    /// Replaces the stored report of the relay by a newer report. The first report is stored, too.
+    /// Stores a newer report of the relay, or its first one, and updates the history.
     fn take(&mut self, now: Instant, report: Report) {
         let before = std::mem::replace(&mut self.report, report);
         let decayed = Duration::from_micros(self.longest_age.as_micros() * 7 / 8);
@@ -113,10 +117,10 @@ impl Known {
         });
     }
 
-    /// Returns the age of its last report from which the relay counts as silent. If the reports of this relay often
-    /// take long, the result is longer.
+    /// Returns the age of the relay's newest report from which the relay counts as silent.
     ///
-    /// Before a relay's first agreement its reports may be delayed by 6 s.
+    /// The age is longer if the times between this relay's reports are often long. Before a relay's first agreement its
+    /// reports may be delayed by 6 s.
     fn silent_after(&self) -> Duration {
         let Report { phase, agreed, .. } = self.report;
         let is_idle = matches!(phase, Phase::Holding | Phase::Infeasible | Phase::NoQuorum);
@@ -132,7 +136,7 @@ impl Known {
         self.nearest.is_some_and(is_long)
     }
 
-    /// Returns true if the lease has expired. A new view has no lease before its agreement.
+    /// Returns true if the relay has had an agreed position without a lease for at least [`SILENT_AFTER`].
     fn has_expired(&self) -> bool {
         let is_long = |at: Instant| self.report.at.since(at) >= SILENT_AFTER;
         self.unleased_at.is_some_and(is_long)
@@ -148,20 +152,23 @@ impl Known {
     }
 }
 
-/// View of a chain by the reports of its relays, with the history that alarms and log lines need.
+/// State of a chain according to its relays' reports, with the history for alarms and log lines.
 #[derive(Debug, Default)]
 pub struct StationView {
     alarms: Alarms,
     known: BTreeMap<u16, Known>,
-    /// Neighbours that have reported a relay as silent, by relay, and the time of their last such report.
+    /// Neighbours that have reported a relay as silent, with the time of each one's last such report.
+    ///
+    /// The key of the outer map is the silent relay, the key of the inner map the neighbour.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     frames: Frames,
     /// Time of the last accepted frame; before the first frame it is the time of the start.
     frame_at: Instant,
-    /// Time of the last frame that ended a silence of the whole chain. The ages of reports count from this time.
+    /// Time of the first frame after the last silence of the whole chain. Alarms measure a relay's silence from this
+    /// time at the earliest.
     resumed_at: Instant,
     rejected_at: Option<Instant>,
-    /// Newest version of the mission that is flown, and the time when it became known.
+    /// Newest version of the mission that relays fly, and the time when the station first received it.
     version: Option<(u16, Instant)>,
 }
 
@@ -173,7 +180,7 @@ impl StationView {
 
     /// Returns the state of `chain` at the time `now`, its alarms, and the log since the last call.
     ///
-    /// `reports` are the relays' newest reports. Those about relays that the chain does not list are ignored.
+    /// `reports` are the relays' newest reports. Reports of relays with a number above `chain.relays` are ignored.
     pub fn snapshot<'a>(
         &mut self,
         now: Instant,
@@ -230,7 +237,7 @@ impl StationView {
         true
     }
 
-    /// Updates the newest version of the mission that relays report now.
+    /// Updates the newest version of the mission according to the relays' recent reports.
     fn follow_version(&mut self, now: Instant) {
         let reports = self.known.values().map(|it| it.report);
         let fresh = reports.filter(|it| now.since(it.at) < SILENT_AFTER && has_details(it));
@@ -254,9 +261,9 @@ impl StationView {
         self.frames = frames;
     }
 
-    /// Drops the statements of neighbours about relays that have sent a report since then.
+    /// Drops each neighbour's claim that a relay is silent, once that relay has sent a newer report.
     ///
-    /// A statement that the newest report of a neighbour still contains is kept.
+    /// A claim that is still part of the neighbour's newest report is kept, unless this report is old.
     fn drop_answered_claims(&mut self, now: Instant) {
         let known = &self.known;
         for (number, claims) in &mut self.claims {
@@ -361,7 +368,10 @@ impl StationView {
         all
     }
 
-    /// Returns true if a relay nearer to the station, on the way of reports, has just become silent.
+    /// Returns true if reports of relay `number` may be missing because a nearer relay is silent.
+    ///
+    /// The nearer relay, on the way to the station, has been silent for a short time only: the chain has not closed the
+    /// gap yet.
     fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
         let all = self.known.values().map(|it| &it.report);
         let mut nearer = all.filter(|it| match end {
@@ -371,7 +381,7 @@ impl StationView {
         nearer.any(|it| (UNSURE_AFTER..CLOSED_AFTER).contains(&now.since(it.at)))
     }
 
-    /// Returns the gaps that relays report now, for an alarm about relays that may be behind one.
+    /// Describes which relays do not receive a neighbour now, for an alarm about relays without reports.
     fn gaps(&self, now: Instant) -> String {
         let fresh = self.known.values().map(|it| &it.report);
         let fresh = fresh.filter(|it| now.since(it.at) < SILENT_AFTER);
@@ -381,8 +391,8 @@ impl StationView {
     }
 }
 
-/// Returns the distance of a drone from its setpoint, m. `None` if the relay does not control the drone, or has to
-/// wait.
+/// Returns the distance of a drone from its setpoint, m. `None` if the relay does not control the drone, or if the
+/// drone waits.
 fn distance_to_fly_m(report: &Report) -> Option<f32> {
     let flies = report.control == Some(State::Engaged) && report.hold_reasons == [None; 2];
     let (at, to) = (report.position?, report.setpoint?);
@@ -390,7 +400,7 @@ fn distance_to_fly_m(report: &Report) -> Option<f32> {
     flies.then(|| way_m.hypot(at.altitude_m - to.altitude_m))
 }
 
-/// Returns true if a report has more than position and control: relays report the rest less often.
+/// Returns true if the report is a full one. Most reports contain only position and control state.
 fn has_details(report: &Report) -> bool {
     report.agreed.is_some() || report.neighbours.iter().any(Option::is_some)
 }
@@ -401,7 +411,7 @@ fn silent(report: &Report) -> impl Iterator<Item = u16> {
     pairs.filter_map(|(beside, is_silent)| beside.filter(|_| is_silent))
 }
 
-/// Returns a line for each difference of a relay's report from the previous report.
+/// Returns a log line for each difference between two reports, or one line for the first report.
 fn changes(before: Option<&Report>, new: &Report) -> Vec<String> {
     let Some(old) = before else {
         let words = |it| format!(", {}", control(it));

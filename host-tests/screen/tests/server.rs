@@ -21,10 +21,11 @@ use uav_relay_screen::{
     Task,
 };
 
-/// Time in which `Screen::show` has to return. A busy machine may take the processor away at any time, so 1 % of the calls may be late.
+/// Time within which 99 % of the calls of `Screen::show` have to return. The others may be late, because a busy machine may take the
+/// processor away at any time.
 const SHOW_TIME: Duration = Duration::from_millis(1);
 
-/// Time that no call of `Screen::show` may take: far less than a browser's time limits.
+/// Time within which all calls of `Screen::show` have to return: far less than a browser's time limits.
 const NEVER: Duration = Duration::from_millis(500);
 
 fn started() -> Screen {
@@ -68,7 +69,9 @@ fn connect(screen: &Screen) -> TcpStream {
     stream
 }
 
-/// Sends `request` and returns the response. Empty if the server closed the connection without a response.
+/// Sends `request` and returns the response.
+///
+/// The response is empty if the server closes the connection without a response.
 fn asked(screen: &Screen, request: &[u8]) -> String {
     let mut stream = connect(screen);
     _ = stream.write_all(request);
@@ -103,7 +106,7 @@ fn until(reader: &mut BufReader<TcpStream>, time_s: f64) -> serde_json::Value {
     }
 }
 
-/// A chain that shows snapshots of 100 relays until it is stopped, and measures each call.
+/// Simulated flight: a thread that shows snapshots of 100 relays and measures the time of each call.
 struct Flight {
     has_ended: Arc<AtomicBool>,
     thread: thread::JoinHandle<Vec<Duration>>,
@@ -129,7 +132,7 @@ impl Flight {
         Self { has_ended, thread }
     }
 
-    /// Ends the flight, and checks that it did not wait for anybody.
+    /// Stops the thread, and asserts that no call of `Screen::show` waited for a browser.
     fn end(self, what: &str) {
         self.has_ended.store(true, Ordering::Relaxed);
         let mut took = self.thread.join().unwrap();
@@ -147,7 +150,7 @@ impl Flight {
     }
 }
 
-/// Returns the memory of this process that is in use, bytes.
+/// Returns the memory that this process uses, bytes.
 fn memory() -> usize {
     let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     let pages = text.split(' ').nth(1).and_then(|it| it.parse().ok());
@@ -302,7 +305,7 @@ fn other_hosts_origins_and_methods_are_refused() {
     }
 }
 
-/// Returns pseudorandom numbers (an xorshift generator), for requests that differ.
+/// Returns pseudorandom numbers (an xorshift generator), so that the requests differ.
 fn random(state: &mut u64) -> usize {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -446,7 +449,7 @@ fn an_address_that_cannot_be_bound_is_named() {
     assert_eq!(Screen::start(address).unwrap().address(), address);
 }
 
-/// Returns a task as the page sends it.
+/// Returns a POST request for a task, as the page sends it.
 fn post(screen: &Screen, path: &str, token: &str, body: &str) -> Vec<u8> {
     let (own, length) = (screen.address(), body.len());
     format!("POST {path} HTTP/1.1\r\nHost: {own}\r\nOrigin: http://{own}\r\nX-Relay-Token: {token}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{body}").into_bytes()

@@ -26,7 +26,7 @@ mod paper {
 
 const RELAYS: u16 = 5;
 
-/// Returns the report of a relay of a chain without faults.
+/// Returns the report of a relay in a chain without faults.
 fn healthy(relay: u16) -> Report {
     let place = Some(Placement::on_line(160.0 * f32::from(relay), 20.0));
     let next = Some(relay + 1).filter(|it| *it <= RELAYS);
@@ -48,7 +48,7 @@ fn healthy(relay: u16) -> Report {
     }
 }
 
-/// Chain whose relays report every second, and the station that watches it.
+/// Simulated chain whose relays report every second, and the station that receives the reports.
 struct Watched {
     view: StationView,
     relays: BTreeMap<u16, Report>,
@@ -74,7 +74,7 @@ impl Watched {
         }
     }
 
-    /// Lets a second pass, in which the relays that are not off report.
+    /// Advances the time by one second. All relays that are not off report.
     fn second(&mut self) {
         self.second += 1;
         let now = Instant::from_millis(1_000 * self.second);
@@ -142,7 +142,9 @@ impl Watched {
         }
     }
 
-    /// Makes the changes of a line of the script, as `12:ok 3:off`.
+    /// Makes the changes in one line of the script.
+    ///
+    /// For example, `12:ok 3:off` makes relays 1 and 2 healthy and switches relay 3 off.
     fn changes(&mut self, changes: &str) {
         for change in changes.split_whitespace() {
             if let Some((relays, state)) = change.split_once(':') {
@@ -155,7 +157,7 @@ impl Watched {
         }
     }
 
-    /// Returns the lasting alarms, as the script has them.
+    /// Returns the lasting alarms in the form of the script.
     fn lasting(&self) -> String {
         let lasting = self.last.alarms.iter().filter(|it| it.cleared_s.is_none());
         let mut lasting: Vec<String> = lasting

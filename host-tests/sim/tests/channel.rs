@@ -92,7 +92,7 @@ fn a_hundred_agree_at_the_least_baud_with_30_percent_loss() {
     agree_and_hold(100, 0.3, 2);
 }
 
-/// Returns the largest number of claims and echoes of claims that a relay may send until `ended`.
+/// Returns the largest permitted number of claims, and echoes of claims, of a relay until `ended`.
 ///
 /// A claim is a message to find out if two relays use one number; its receiver sends it back as an echo.
 fn most_claims(ended: Instant) -> u64 {

@@ -284,7 +284,8 @@ fn count() -> u64 {
     std::env::var("COUNT").map_or(20, |text| text.parse().unwrap())
 }
 
-/// Checks that of two relays with one number the later relay gets no setpoint. Both relays must report the duplicate.
+/// Checks that of two relays with the same number the later one gets no setpoint. Both relays must report the
+/// duplicate.
 ///
 /// Runs `COUNT` chains for each loss rate; `COUNT` is an environment variable.
 #[test]
@@ -543,8 +544,8 @@ fn station(base: &Mission, epoch: u32) -> Ground {
 
 /// Returns a chain of relays that fly the mission `base`, and the withheld offers of an upload.
 ///
-/// An attacker has withheld them from the relays. The upload has version 1. The ground station is gone. `loss` is the
-/// probability that a receiver loses a frame.
+/// An attacker has kept these offers from the relays. The upload has version 1. The ground station has been switched
+/// off. `loss` is the probability that a receiver loses a frame.
 fn caught(base: &Mission, loss: f64) -> (Air, Vec<Vec<u8>>) {
     let mut air = Air::of(base, |_| auth(KEY, 1), loss);
     air.run(60);

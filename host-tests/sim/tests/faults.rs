@@ -209,7 +209,7 @@ fn after_two_cuts_all_relays_return_to_one_view() {
 
 /// Duration of a run with a one-way link, s.
 const ONE_WAY_S: u64 = 400;
-/// Period at the end of a run with a one-way link, s, in which the chain may not change any more.
+/// Period at the end of a run with a one-way link, s, in which the chain must not change any more.
 const STILL_S: u64 = 120;
 
 /// Returns the setups of runs with each possible one-way link in chains of 4 and 8 relays.

@@ -13,7 +13,7 @@ use uav_relay_tools::provision::config;
 
 use super::{MISSING, QEMU};
 
-/// Speed of an emulated drone's clock relative to the wall clock, unless slowed down.
+/// Speed of an emulated drone's clock relative to the wall clock, with [`Life::Fast`].
 ///
 /// QEMU's `SysTick` counts at 168 MHz, and the firmware assumes 16 MHz.
 pub const SPEED: f64 = 168.0 / 16.0;
@@ -55,7 +55,7 @@ pub enum Uart {
 
 const UARTS: [Uart; 4] = [Uart::Usart1, Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
-/// Initial flash content of an emulated drone: an address, and the bytes stored from there.
+/// Part of the initial flash content of an emulated drone: an address, and the bytes at this address.
 pub type Kept = (u32, Vec<u8>);
 
 /// Running emulated drone: a QEMU process, and the folder with its files.

@@ -11,7 +11,7 @@ pub const PROFILE: &str = "firmware";
 
 /// Builds the firmware `examples` and returns the folder of their images, valid until the next build.
 ///
-/// The only feature is the log if `smallest`; otherwise all features are built.
+/// If `smallest` is true, the images are built with the log as the only feature, otherwise with all features.
 ///
 /// # Errors
 /// The output of cargo, if it fails.

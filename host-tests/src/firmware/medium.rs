@@ -11,7 +11,7 @@ use uav_relay::MAX_FRAME;
 use super::emulator::SPEED;
 use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 
-/// Maximum number of bytes without a frame delimiter that the links collect before they forward them.
+/// Maximum number of bytes that a link collects while it waits for a frame delimiter.
 const LONGEST: usize = 2 * MAX_FRAME;
 
 #[derive(Clone, PartialEq, Eq, Debug)]

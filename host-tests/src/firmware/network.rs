@@ -18,7 +18,7 @@ use uav_relay_sim::simulator::faults::Injected;
 /// Timeout of a write to a drone's socket that has accepted only the first bytes of a frame.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Size of the kernel's send buffer of a drone's port, bytes: some four frames with their overhead.
+/// Size of the kernel's send buffer of a drone's port, bytes. It holds about four frames.
 const WAITING: usize = 16_384;
 
 /// Running network of emulated drones. It ends on drop, or when the drones' sockets are closed.
@@ -110,7 +110,7 @@ impl Drop for Network {
     }
 }
 
-/// Reads the bytes that have arrived at a port, and returns those of the last, incomplete frame.
+/// Reads the bytes that have arrived at a port, and returns the bytes of the last, incomplete frame.
 fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     port.set_nonblocking(true)?;

@@ -24,7 +24,7 @@ const HEIGHTS: std::ops::RangeInclusive<f64> = -500.0..=9000.0;
 /// Largest relative difference of two files' cell sizes with which they still belong to one grid.
 const SAME_CELL: f64 = 1e-6;
 
-/// Largest deviation of a file's heights from the nodes of the grid, as a fraction of a cell.
+/// Largest distance of a file's grid points from those of the common grid, as a fraction of a cell.
 const ALIGNED: f64 = 0.02;
 
 /// Metres per degree of latitude, for the size of cells and the text of errors.
@@ -48,7 +48,7 @@ pub enum System {
 }
 
 impl System {
-    /// Returns the coordinate system with this EPSG code, and `None` for all but the supported codes.
+    /// Returns the coordinate system with this EPSG code; `None` if the code is not supported.
     fn of_epsg(code: u16) -> Option<Self> {
         let utm = |zone: u16, south| {
             let zone = u8::try_from(zone)
@@ -95,9 +95,9 @@ struct Tile {
     system: System,
     /// Size of a cell, in the units of the coordinate system: to the east and to the south.
     cell: [f64; 2],
-    /// Coordinates of the tile's north-west height, east then north.
+    /// Coordinates of the tile's north-west grid point, east then north.
     corner: [f64; 2],
-    /// Column and row of the north-west height in the whole grid.
+    /// Column and row of the tile's north-west grid point in the whole grid.
     at: [i64; 2],
     columns: usize,
     rows: usize,
@@ -109,7 +109,7 @@ struct Tile {
 /// Height at one node (point) of the terrain grid, or the reason why it is unknown.
 enum Node<'a> {
     Height(f64),
-    /// The node is in this file, which has this invalid value instead of a height there.
+    /// No height: at this node the file has an invalid value. The fields are the file and the value.
     Hole(&'a Tile, f32),
     Outside,
 }
@@ -244,8 +244,8 @@ impl Tile {
         read.map_err(|problem| format!("{name}: {problem}"))
     }
 
-    /// Returns column and row of this tile's north-west height in the grid of another tile. The error is the property
-    /// in which the two grids differ.
+    /// Returns column and row of this tile's north-west grid point in the grid of another tile. The error names the property in which the
+    /// two grids differ.
     fn place_in(
         &self,
         system: System,
@@ -299,7 +299,7 @@ impl Tile {
         Node::Height(height)
     }
 
-    /// Returns the coordinates of the tile's north-west and south-east heights.
+    /// Returns the coordinates of the tile's north-west and south-east grid points.
     fn corners(&self) -> [[f64; 2]; 2] {
         let [west, north] = self.corner;
         let east = west + self.cell[0] * (self.columns - 1) as f64;
@@ -327,7 +327,7 @@ impl Tile {
     }
 }
 
-/// Reads an SRTM tile, whose place is in its name.
+/// Reads an SRTM tile. The name of its file states the position of the tile.
 fn srtm(path: &Path) -> Result<Tile, String> {
     let name = path
         .file_stem()

@@ -26,7 +26,7 @@ const MOST_POINTS: f64 = 20_000.0;
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
 pub const SITE_ERROR_M: f64 = 15.0;
 
-/// Distance from a site over which the error of the heights grows, m.
+/// Distance from Tx or Rx at which the assumed error of the heights reaches its full value, m.
 const GROWTH_M: f64 = 100.0;
 
 /// Terrain along the line from Tx to Rx.
@@ -130,15 +130,14 @@ impl<'a> Ground<'a> {
 
     /// Returns the terrain with an assumed error of its heights: the ground counts as higher by `error_m`.
     ///
-    /// The error is 0 at Tx and at Rx, because their antennas stand on the same ground. It grows to `error_m` over
-    /// 100 m from there.
+    /// The error is 0 at Tx and at Rx, because their antennas stand on the same ground. Within 100 m from Tx or Rx it grows to `error_m`.
     #[must_use]
     pub const fn with_error_m(self, error_m: f64) -> Self {
         Self { error_m, ..self }
     }
 
-    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by
-    /// this amount. It is 0 at Tx and Rx, and grows over 100 m from them.
+    /// Returns the assumed error of the terrain's heights at `x_m` along the line, m. The ground counts as higher by this amount. The
+    /// amount is 0 at Tx and Rx, and has its full value 100 m away from them.
     pub fn raise_m(&self, x_m: f64) -> f64 {
         let from_site_m = x_m.min(self.axis.distance_m() - x_m);
         self.error_m * (from_site_m / GROWTH_M).clamp(0.0, 1.0)
@@ -162,7 +161,8 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns the point of the earth's surface at `x_m` along the line and `y_m` beside it. Its height is that of the datum.
+    /// Returns the point at `x_m` along the line and `y_m` beside it, at altitude 0. Altitude 0 is the straight line from the ground at Tx
+    /// to the ground at Rx.
     ///
     /// # Errors
     /// A line that names the position, if it is too far from the line.
@@ -203,7 +203,7 @@ impl<'a> Ground<'a> {
     /// Returns the highest ground within `radius_m` of a position, m above the mean sea level.
     ///
     /// # Errors
-    /// Those of [`height_m`](Self::height_m).
+    /// A line that names a position: the elevation files do not cover it, or have no height there.
     pub fn highest_m(&self, node: Node, radius_m: f64) -> Result<f64, String> {
         let rings = (radius_m / self.step_m).ceil().min(64.0);
         let mut highest = self.height_m(node.x_m, node.y_m)?;
@@ -229,7 +229,7 @@ impl<'a> Ground<'a> {
     /// Returns the profile of the hop between two antennas.
     ///
     /// # Errors
-    /// Those of [`height_m`](Self::height_m).
+    /// A line that names a position: the elevation files do not cover it, or have no height there.
     pub fn profile(&self, nodes: [Node; 2]) -> Result<Profile, String> {
         let [from, to] = nodes;
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);

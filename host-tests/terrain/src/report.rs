@@ -56,7 +56,7 @@ pub struct InterfererHeight {
     pub index: usize,
     /// Least and greatest altitude of its antenna above the straight line between the sites, m.
     ///
-    /// Absent if the files do not cover it. They differ for an interferer with an area.
+    /// Absent if the elevation files do not cover the interferer. The two values differ if the interferer's position is an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub altitude_m: Option<[f64; 2]>,
 }
@@ -73,7 +73,7 @@ pub struct TerrainReport {
     pub interferers: Vec<InterfererHeight>,
     /// Position error within which obstacles below a relay count, m.
     pub position_error_m: f64,
-    /// SIR of the worst hop with the diffraction losses, linear, as `sir` is without them.
+    /// SIR of the worst hop with the diffraction losses, linear. The plan's `sir` is without these losses.
     pub terrain_sir: f64,
     /// SIR of the worst hop with the diffraction losses, dB.
     pub terrain_sir_db: f64,
@@ -97,7 +97,7 @@ impl TerrainReport {
     /// Creates the report of a chain with relays at `places`.
     ///
     /// # Errors
-    /// A line that names the place: a part of the terrain is not covered by the elevation files, or a hole.
+    /// A line that names the position: the elevation files do not cover it, or have no height there.
     pub fn new(
         ground: &Ground<'_>,
         places: &[Placement],

@@ -23,7 +23,8 @@ pub struct Limits {
     pub wavelength_m: f64,
 }
 
-/// Node of the chain: the interval of its x, and its altitude above the datum, m.
+/// Node of the chain: the interval of its x, and its altitude above the datum, m. The datum is the straight line from the ground at Tx to
+/// the ground at Rx.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     x_m: [f64; 2],
@@ -40,7 +41,8 @@ struct Ridge {
 }
 
 impl Ridge {
-    /// Samples the ground. The relays are up to `off_m` beside the line, with an error of `error_m`.
+    /// Samples the ground. The relays are up to `off_m` beside the line, with a position error of up to `error_m`. Also returns the
+    /// altitudes of the antennas of Tx and Rx above the datum, m.
     fn new(ground: &Ground<'_>, [off_m, error_m]: [f64; 2]) -> Result<(Self, [f64; 2]), String> {
         let [tx, rx] = ground.ends;
         let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
@@ -115,7 +117,7 @@ fn steps(length_m: f64, step_m: f64) -> (f64, u32) {
     (step, steps.max(1))
 }
 
-/// Returns the equal steps of at most `step_m` that make up a length, and their number.
+/// Divides a length into the fewest equal steps of at most `step_m`. Returns the size of a step and their number.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -126,13 +128,13 @@ fn steps_of(length_m: f64, step_m: f64) -> (f64, u32) {
     (length_m / steps.max(1.0), steps as u32)
 }
 
-/// Returns the interval of x, m, in which each relay's hops stay as clear as they are in `report`.
+/// Returns each relay's interval of x, m, in which all hops stay as clear as they are in `report`.
 ///
-/// While all relays are in their intervals, within the position error, no hop gets worse than that, and each relay keeps its height above
-/// the ground. `None` for a relay for which that does not hold within the position error of its position.
+/// This holds while all relays are in their intervals, within the position error. Each relay also keeps its height above the ground. `None`
+/// for a relay without such an interval around its position.
 ///
 /// # Errors
-/// A line that names the place: it is not covered by the elevation files, or a hole.
+/// A line that names the position: the elevation files do not cover it, or have no height there.
 pub fn rooms(
     ground: &Ground<'_>,
     places: &[Placement],

@@ -99,10 +99,9 @@ fn availability_in_an_hour_on_a_bad_channel() {
 
 /// Random seeds of simulated hours in which one relay repeatedly loses the links to both neighbours.
 ///
-/// These runs test that the relay gets its links back. Half of the frames are lost, in runs of 20. If each silence
-/// between the relay's own rare requests counted as one more loss, its links would never be used again, and the chain
-/// would be complete for only 4, 2, 11 and 28 % of the hour. The environment variable `SEEDS` (as `201-800`)
-/// overrides the seeds.
+/// These runs test that the relay gets its links back. Half of the frames are lost, in runs of 20. Each silence between the relay's own
+/// rare requests must not count as another loss. Otherwise the relay would never use its links again, and the chain would be complete for
+/// only 4, 2, 11 and 28 % of the hour. The environment variable `SEEDS` (as `201-800`) overrides the seeds.
 const LONG_SEARCHES: [u64; 4] = [519, 625, 777, 1_030];
 
 #[test]

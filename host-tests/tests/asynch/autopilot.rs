@@ -309,7 +309,7 @@ impl Scene {
     }
 }
 
-/// Checks that the autopilot link flies the drone to the position of a single relay. The firmware may or may not pass
+/// Checks that the autopilot link flies the drone to the position of a single relay. This must hold with and without a firmware that passes
 /// the relay's events to the link.
 #[test]
 fn the_drone_is_engaged_and_led_to_its_position() {

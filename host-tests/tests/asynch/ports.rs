@@ -24,7 +24,7 @@ struct Taker {
     taken: Rc<RefCell<Vec<u8>>>,
     /// Number of further writes that complete; the next one after them blocks for ever.
     writes: Rc<Cell<usize>>,
-    /// Interval of failing writes: every n-th write fails, n is this number. 0 if no write fails.
+    /// Number n such that every n-th write fails; 0 if no write fails.
     fails: usize,
     done: usize,
 }

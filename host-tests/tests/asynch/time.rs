@@ -17,7 +17,7 @@ pub(crate) struct Time(Rc<Inner>);
 #[derive(Default)]
 struct Inner {
     now: Cell<Instant>,
-    /// Wakers of waiting tasks by wake-up time. A serial number separates equal times: the latest task wakes first.
+    /// Wakers of waiting tasks by wake-up time. Of tasks with equal times, the last task that began to wait wakes first.
     sleepers: RefCell<BTreeMap<(Instant, Reverse<u64>), Waker>>,
     asked: Cell<u64>,
 }

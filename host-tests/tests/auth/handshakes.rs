@@ -68,7 +68,7 @@ fn replayed_handshakes_change_no_position() {
     }
 }
 
-/// Checks that a booted relay accepts each recorded handshake at most once, and then a genuine one.
+/// Checks that a booted relay accepts each replayed handshake at most once. After that it accepts a genuine handshake.
 #[test]
 fn replayed_handshakes_are_answered_once_and_superseded() {
     let mut net = Net::new(2, Wiring::Pair, &[]);
@@ -110,8 +110,8 @@ fn replayed_handshakes_are_answered_once_and_superseded() {
     assert!(net.stats(2).received > 0);
 }
 
-/// Checks that a relay deceived by a replayed handshake authenticates its neighbour all the same. The relay has
-/// answered the replay, and its answer is lost.
+/// Checks that a relay authenticates its neighbour even after it was deceived by a replayed handshake. The relay has answered the replay,
+/// and the answer is lost.
 #[test]
 fn a_relay_recovers_from_a_replayed_handshake() {
     let mut net = Net::new(2, Wiring::Pair, &[]);

@@ -79,7 +79,7 @@ impl Kind {
     }
 }
 
-/// Frame that the attacker sends, with its receiver and the receiver's counter that it must increment.
+/// Frame that the attacker sends, its receiver, and the receiver's counter that it must increment.
 pub(crate) struct Attack {
     pub(crate) to: u16,
     pub(crate) port: Port,

@@ -71,7 +71,7 @@ pub(crate) struct Net {
     pub(crate) proven: BTreeMap<(u16, u16), (u32, u32)>,
     /// Start counts of sender and receiver when a frame last arrived, by link (sender, receiver).
     ///
-    /// The sender's count is that of the time when it sent the frame.
+    /// The count of the sender is from the time when the frame was sent.
     learned: BTreeMap<(u16, u16), (u32, u32)>,
     /// Indices of recorded frames that were signed before their sender knew of the receiver's last start.
     outdated: BTreeSet<usize>,

@@ -9,7 +9,7 @@ use super::*;
 
 const RUNS: u64 = 300;
 
-/// Draws a coordinate of a position in m, which may be not finite or far too large.
+/// Draws a coordinate of a position, m: also infinities, NaN and numbers that are far too large.
 fn number(rng: &mut ChaCha8Rng) -> f32 {
     match rng.random_range(0..8) {
         0 => f32::NAN,

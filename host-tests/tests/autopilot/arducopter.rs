@@ -38,7 +38,7 @@ fn an_ignored_target_is_repeated_and_then_reported() {
     assert!(vehicle.events.contains(&AutopilotEvent::Refused));
 }
 
-/// Checks that a silent autopilot is not reported as one that refuses targets. Its messages about the present target stop in the test.
+/// Checks that an autopilot is not reported as refusing targets if its messages about the target stop.
 #[test]
 fn stopped_streams_do_not_count_as_a_refused_target() {
     let mut vehicle = Vehicle::flying(Kind::ArduCopter);
@@ -82,7 +82,7 @@ fn the_target_is_sent_again_after_a_mode_change() {
     assert!((vehicle.place.x_m - 120.0).abs() < 0.05);
 }
 
-/// Checks that the last target of a flight has no velocity, whenever the autopilot confirms it.
+/// Checks that the last target of a flight has no velocity, no matter when the autopilot confirms it.
 ///
 /// Each of the 100 flights has another time of confirmation.
 #[test]

@@ -10,7 +10,7 @@ use crate::exchange::of;
 use crate::vehicle::{SYSTEM, axis};
 
 impl Vehicle {
-    /// Sends BATTERY_STATUS of battery `id` with the field `time_remaining`, an extension.
+    /// Sends BATTERY_STATUS of battery `id`, with the optional MAVLink field `time_remaining`.
     fn battery(&mut self, id: u8, percent: i8, time_s: i32) {
         let data = BATTERY_STATUS_DATA {
             id,
@@ -49,10 +49,10 @@ impl Vehicle {
     }
 }
 
-/// Time of the way home of these drones, s: 200 m at 5 m/s, 10 m down at 1.5 m/s.
+/// Flight time of these drones to their home position, s: 200 m at 5 m/s, 10 m down at 1.5 m/s.
 const HOME_S: u16 = 46;
 
-/// Relay and vehicle that exchange data once a second.
+/// Relay and its vehicle. They exchange data in every step of the simulation.
 struct Pair {
     vehicle: Vehicle,
     relay: Relay,
@@ -93,14 +93,15 @@ impl Pair {
             .exchange(&mut self.relay, self.vehicle.now);
     }
 
-    /// Returns the endurance and its limit after an exchange, s.
+    /// Returns the relay's endurance and its limit, s; `None` if unknown. Below the limit the relay requests to leave.
     fn told(&mut self) -> [Option<u16>; 2] {
         self.exchange();
         let now = self.vehicle.now;
         [self.relay.endurance_s(now), self.relay.endurance_limit_s()]
     }
 
-    /// Runs for `seconds`, each after `send`. Returns the second at which `until` is true, if any.
+    /// Runs for up to `seconds`, and calls `send` before each second. Returns the second in which `until` becomes true. `None` if it does
+    /// not become true.
     fn run(
         &mut self,
         seconds: u16,
@@ -138,7 +139,7 @@ impl Pair {
         self.relay.departure(self.vehicle.now) != Departure::Member
     }
 
-    /// Returns the times at which the pilot read `text`, s.
+    /// Returns the times at which the pilot received the status text `text`, s.
     fn read(&self, text: &str) -> Vec<f64> {
         let said = self.vehicle.received.iter();
         let said = said.filter(|(_, said)| *said == LinkMessage::Text(text.to_owned()));
@@ -151,7 +152,8 @@ impl Pair {
     }
 }
 
-/// Checks the time of a PX4: nine tenths of it count, and only in flight.
+/// Checks that a relay's endurance is nine tenths of the remaining time that a flying PX4 reports. Only BATTERY_STATUS of the first battery
+/// counts.
 #[test]
 fn the_time_of_a_px4_counts_in_flight() {
     let mut pair = Pair::flying(Kind::Px4);
@@ -168,7 +170,7 @@ fn the_time_of_a_px4_counts_in_flight() {
     assert_eq!(told, Some(360 + 110), "200 m at 2 m/s, 10 m at 1 m/s");
 }
 
-/// Checks that patient relays do not leave sooner: the time of a replacement is at most 4 min.
+/// Checks that a relay reserves twelve times `dead_after` for its replacement, but at most 4 min.
 #[test]
 fn the_time_of_a_replacement_is_capped() {
     for (dead_after_ms, replacement_s) in [(5_000, 60), (15_000, 180), (20_000, 240), (75_000, 240)]
@@ -187,7 +189,7 @@ fn the_time_of_a_replacement_is_capped() {
     }
 }
 
-/// Checks that an unknown home, and one far from the line, make the endurance unknown.
+/// Checks that the endurance is unknown if the home position is unknown or far from the line.
 #[test]
 fn without_a_home_the_endurance_is_unknown() {
     let mut pair = Pair::new(Vehicle::flying(Kind::Px4), 1, 1);
@@ -223,7 +225,7 @@ fn an_invalid_percentage_is_unknown() {
     }
 }
 
-/// Checks a percentage without a time, as ArduCopter reports it.
+/// Checks that without a reported time the endurance is a percentage of the configured flight time. ArduCopter reports only the percentage.
 #[test]
 fn a_percentage_counts_by_the_time_of_a_full_battery() {
     let send: [fn(&mut Vehicle, i8); 2] = [
@@ -242,7 +244,7 @@ fn a_percentage_counts_by_the_time_of_a_full_battery() {
     }
 }
 
-/// Checks that no value counts before take-off and after landing: there a PX4 reports an assumed time.
+/// Checks that battery values on the ground do not count, because a PX4 reports an assumed time there.
 #[test]
 fn on_the_ground_no_endurance_counts() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -293,7 +295,7 @@ fn a_relay_with_a_low_battery_requests_to_leave() {
     assert_eq!(pair.relay.endurance_s(pair.vehicle.now), None);
 }
 
-/// Checks an endurance that was never known: it is reported once, when the relay takes control.
+/// Checks that an unknown endurance is reported when the relay takes control, and then once a minute. The endurance was never known here.
 #[test]
 fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -311,7 +313,8 @@ fn an_endurance_that_was_never_known_is_told_at_the_start_of_control() {
     }
 }
 
-/// Checks the pilot's text at the last reserve of a refused departure: every 5 s until he takes over.
+/// Checks that the pilot is told to leave every 5 s when only the reserve is left. The chain has refused the departure. The text stops when
+/// the pilot takes control.
 #[test]
 fn the_pilot_is_told_to_leave_at_the_last_reserve() {
     const LEAVE: &str = "battery: leave now";
@@ -361,7 +364,7 @@ fn shared(relays: u16, index: u16) -> Relay {
     Pair::new(Vehicle::new(Kind::Px4), relays, index).relay
 }
 
-/// Checks that an unknown endurance counts down, and that each invalid value makes it unknown.
+/// Checks that the last endurance counts down without new values. An invalid value makes the endurance unknown.
 #[test]
 fn the_last_endurance_counts_down() {
     let mut silent = shared(1, 1);
@@ -394,9 +397,10 @@ fn the_last_endurance_counts_down() {
     }
 }
 
-/// Checks a silence: the last value that agreed with the one before counts down.
+/// Checks that without new messages the endurance counts down from the last confirmed value. A value is confirmed if it agrees with the
+/// value before it.
 ///
-/// A single value does if there is no other.
+/// If there is only one value, the countdown starts from that value.
 #[test]
 fn the_last_confirmed_endurance_counts_down() {
     // Seconds at which the relay requests to leave, and reaches its reserve.
@@ -429,7 +433,7 @@ fn the_last_confirmed_endurance_counts_down() {
     assert_eq!(silence(relay, 61), [Some(916), Some(1_095)]);
 }
 
-/// Checks that each decision needs 15 s, and that repeated orders do not delay the reserve.
+/// Checks that a relay acts on a low or high endurance only after 15 s. Repeated operator orders do not delay the detection of the reserve.
 #[test]
 fn each_decision_takes_its_time() {
     let mut relay = shared(1, 1);
@@ -455,7 +459,7 @@ fn each_decision_takes_its_time() {
     }
 }
 
-/// Checks that an order to stay holds until half of the time beyond the way home has passed.
+/// Checks that an order to stay holds until half of the endurance beyond the way home is used up.
 #[test]
 fn the_operators_order_to_stay_holds() {
     let mut relay = shared(1, 1);
@@ -483,7 +487,7 @@ fn the_operators_order_to_stay_holds() {
     assert_eq!(fly(&mut relay, 903, 904), None);
 }
 
-/// Runs `relay` from second `from` to `to` with `left_s` beyond its way home. Returns its last departure.
+/// Runs `relay` from second `from` to `to`. Returns its departure state at the end. The endurance is `left_s`, the way home takes no time.
 fn fly(relay: &mut Relay, from: u64, to: u64, left_s: f32) -> Departure {
     for s in from..to {
         relay.handle_timeout(at(s));
@@ -494,9 +498,9 @@ fn fly(relay: &mut Relay, from: u64, to: u64, left_s: f32) -> Departure {
     relay.departure(at(to))
 }
 
-/// Checks that a low endurance decides only after 15 s, for a spare and for a relay after its start.
+/// Checks that a spare or a just started relay stays outside of the chain after 15 s of low endurance.
 ///
-/// Then it is outside. It returns to where it was once the endurance has recovered for 15 s.
+/// The relay returns to its former state once the endurance has been high for 15 s.
 #[test]
 fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
     for is_spare in [true, false] {
@@ -544,7 +548,7 @@ fn a_low_battery_keeps_a_spare_and_a_restarted_relay_outside() {
     }
 }
 
-/// Checks that a relay outside of the chain at its reserve returns only after 15 s of high values.
+/// Checks that a relay that left the chain at its reserve returns only after 15 s of high endurance.
 #[test]
 fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     let mut relay = shared(3, 2);
@@ -562,9 +566,9 @@ fn one_high_value_does_not_return_a_relay_at_its_reserve() {
     assert!(!relay.is_at_reserve());
 }
 
-/// Checks a spent relay that lands outside of the chain, and flies again.
+/// Checks that a landing and a take-off do not bring a relay with a low battery back into the chain.
 ///
-/// It returns only after 15 s of high values.
+/// The relay rejoins only after 15 s of high endurance.
 #[test]
 fn a_landing_does_not_return_a_spent_relay() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -596,7 +600,7 @@ fn a_landing_does_not_return_a_spent_relay() {
     }
 }
 
-/// Checks that a restart of the autopilot forgets the place to return to.
+/// Checks that the home position becomes unknown if the autopilot restarts.
 #[test]
 fn a_restarted_autopilot_has_no_home() {
     let mut pair = Pair::flying(Kind::Px4);
@@ -614,7 +618,7 @@ fn a_restarted_autopilot_has_no_home() {
     assert!(pair.relay.endurance_s(pair.vehicle.now).is_some());
 }
 
-/// Checks that messages that arrive are not requested again, and that they are once they stop.
+/// Checks that the link requests battery messages only while none arrive, at first or later.
 #[test]
 fn messages_of_the_battery_are_requested_while_they_are_missing() {
     let mut pair = Pair::flying(Kind::ArduCopter);
@@ -639,7 +643,7 @@ fn messages_of_the_battery_are_requested_while_they_are_missing() {
     assert!(then[0] > first[0] && then[1] > first[1], "{then:?}");
 }
 
-/// Checks an order to stay at the reserve: the pilot is told once a minute, in any mode.
+/// Checks that despite an order to stay, the pilot is told of the reserve once a minute.
 #[test]
 fn an_order_to_stay_does_not_silence_the_reserve() {
     const RESERVE: &str = "battery: at the reserve";
@@ -671,7 +675,7 @@ fn an_order_to_stay_does_not_silence_the_reserve() {
     }
 }
 
-/// Checks that a drone is landed once it is disarmed, or has reported that for 2 s.
+/// Checks that a drone counts as landed when it is disarmed, or has reported the landed state for 2 s.
 #[test]
 fn a_drone_is_landed_by_its_own_report() {
     for kind in [Kind::Px4, Kind::ArduCopter] {
@@ -695,7 +699,7 @@ fn a_drone_is_landed_by_its_own_report() {
     }
 }
 
-/// Checks that a single report of the ground in flight does not forget the endurance.
+/// Checks that the endurance stays known if the autopilot reports the landed state only once in flight.
 #[test]
 fn a_flicker_of_the_landed_state_forgets_nothing() {
     let mut pair = Pair::flying(Kind::Px4);
@@ -708,7 +712,7 @@ fn a_flicker_of_the_landed_state_forgets_nothing() {
     assert!(pair.relay.endurance_s(pair.vehicle.now).is_some());
 }
 
-/// Checks that a way home from an old position is unknown.
+/// Checks that the endurance becomes unknown if the position is too old to compute the way home.
 #[test]
 fn a_way_home_from_an_old_position_is_unknown() {
     let mut pair = Pair::flying(Kind::Px4);
@@ -722,7 +726,8 @@ fn a_way_home_from_an_old_position_is_unknown() {
     assert_eq!(pair.told()[0], None);
 }
 
-/// Checks that messages of the battery hide no silence after which a PX4 may be in its failsafe.
+/// Checks that setpoint control ends if a PX4 sends only battery messages for 0.84 s. After such a silence the PX4 may be in a failsafe, so
+/// the pilot must choose the mode once more.
 #[test]
 fn messages_of_the_battery_hide_no_silence_of_a_px4() {
     // In some phases of the link's time stamps only the silence is noticed, no late reply to a time stamp.
@@ -748,7 +753,8 @@ fn messages_of_the_battery_hide_no_silence_of_a_px4() {
     }
 }
 
-/// Checks that a request ends once the endurance has recovered by 30 s for 15 s. That of the firmware does not end.
+/// Checks that a relay cancels its request to leave after 15 s of sufficient endurance. Sufficient is 30 s above the limit. A request by
+/// the firmware is not cancelled.
 #[test]
 fn a_request_ends_once_the_endurance_has_recovered() {
     let mut relay = shared(1, 1);
@@ -763,7 +769,7 @@ fn a_request_ends_once_the_endurance_has_recovered() {
     assert_ne!(fly(&mut relay, 77, 200, 900.0), Departure::Member);
 }
 
-/// Checks values that alternate with unknown ones, and values that no drone has.
+/// Checks that an endurance that is unknown every second time is reported once a minute. A value of six hours or more counts as unknown.
 #[test]
 fn alternating_values_are_told_once_a_minute() {
     let mut relay = shared(1, 1);
@@ -782,7 +788,7 @@ fn alternating_values_are_told_once_a_minute() {
     assert_eq!(relay.endurance_s(at(242)), Some(21_500));
 }
 
-/// Checks a relay without a reserve: its endurance is shown, and nothing else happens.
+/// Checks that a relay without a reserve never leaves by itself. Its endurance is shown; an unknown endurance is not reported.
 #[test]
 fn without_a_reserve_the_endurance_is_only_shown() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

@@ -15,14 +15,12 @@ use mavlink::dialects::common::{
 use super::*;
 use crate::vehicle::{Target, axis};
 
-/// Creates the only relay of a chain, with a motion guard. The mission has the distance between the Tx and Rx of
-/// `vehicle::sites`.
+/// Creates the only relay of a chain, with a motion guard. The mission's Tx and Rx are as far apart as those of `vehicle::sites`.
 fn relay(settings: Settings) -> Relay {
     of(1, 1, settings)
 }
 
-/// Creates relay `index` of `relays` relays with a motion guard. The mission has the distance between the Tx and Rx
-/// of `vehicle::sites`.
+/// Creates relay `index` of `relays` relays with a motion guard. The mission's Tx and Rx are as far apart as those of `vehicle::sites`.
 pub(crate) fn of(relays: u16, index: u16, settings: Settings) -> Relay {
     let mut config = fixtures::paper(relays);
     config.distance_m = 1343.795;

@@ -97,7 +97,7 @@ struct Flight {
     companion: Option<Companion>,
     /// Time at which the companion program was last started.
     started: Instant,
-    /// Time at which the companion starts again; `None` while it runs.
+    /// Time at which the companion restarts; `None` while it runs.
     starts_at: Option<Instant>,
     /// Time until which the companion is paused and does not run.
     paused_until: Instant,

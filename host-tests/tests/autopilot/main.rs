@@ -256,7 +256,7 @@ fn a_drone_without_a_setpoint_holds_until_the_next_one() {
     }
 }
 
-/// Checks that targets have no yaw if the bearing to be pointed at is not a valid angle.
+/// Checks that targets have no yaw if the bearing for the antenna is not a valid angle.
 #[test]
 fn a_bearing_of_none_is_left_out() {
     use uav_relay::pointing::Bearing;

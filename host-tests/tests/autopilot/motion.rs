@@ -202,8 +202,7 @@ fn a_drone_has_stopped_after_the_stopping_time() {
     }
 }
 
-/// Checks that a restarted companion takes over no drone that is in OFFBOARD, GUIDED or a failsafe. The pilot must
-/// choose another mode first.
+/// Checks that a restarted companion does not control a drone in OFFBOARD, GUIDED or a failsafe. The pilot must choose another mode first.
 #[test]
 fn a_restarted_companion_engages_no_drone() {
     for (kind, away_ms) in [
@@ -370,7 +369,7 @@ fn a_fence_breach_by_a_moving_target_is_named() {
     assert_eq!(rig.text_count("relay: released, returns (RTL): fence"), 1);
 }
 
-/// Checks that a drone whose pilot hands over at full speed overshoots by less than 40 m and stops.
+/// Checks that a drone flies on by less than 40 m if its pilot gives up control at full speed. Then the drone must stop.
 #[test]
 fn a_drone_handed_back_at_full_speed_stops() {
     for kind in [Kind::Px4, Kind::ArduCopter] {

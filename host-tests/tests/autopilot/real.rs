@@ -25,7 +25,7 @@ const KNOWN_WITHIN: Duration = Duration::from_millis(1_300);
 
 /// Time for which an ArduCopter keeps flying at its target velocity without new targets.
 const VELOCITY: Duration = Duration::from_millis(3_000);
-/// Time for which an ArduCopter navigates after the loss of GPS.
+/// Time for which an ArduCopter continues to navigate after the loss of GPS.
 const RECKONS: Duration = Duration::from_millis(8_000);
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -149,7 +149,7 @@ pub(crate) struct Real {
     pub(crate) echoes: bool,
     /// True while the autopilot sends no positions.
     pub(crate) is_mute_of_positions: bool,
-    /// Number of simulation steps by which positions are older than their time stamps.
+    /// Number of simulation steps by which positions are older than their time stamps state.
     pub(crate) hidden_lag: usize,
     track: Vec<Point>,
     rates: Vec<(u32, Duration, Instant)>,

@@ -13,8 +13,8 @@ use super::shares::Shares;
 
 const KINDS: [&str; 3] = ["even", "random points", "interferers"];
 
-/// Checks that positions agreed on in random interference fields are as good as a reference search's. At least 99.5 %
-/// of their SIRs must be within 1e-4 of the reference, and all within 1 %.
+/// Checks that agreed positions in random fields of interference match those of a reference search. At least 99.5 % of the SIRs must be
+/// within 1e-4 of the reference search's SIR, and all within 1 %.
 #[test]
 fn the_best_places_in_a_field_are_found() {
     let mut rng = generator(3321);

@@ -9,7 +9,7 @@ pub(crate) struct Chain {
     pub(crate) powers_w: Vec<f64>,
     /// Altitude of all relays, m; used if `altitudes_m` is empty.
     pub(crate) altitude_m: f64,
-    /// Altitudes of the relays from Tx on, m. Empty if all have the common one.
+    /// Altitudes of the relays from Tx on, m. Empty if all relays have the common altitude.
     pub(crate) altitudes_m: Vec<f64>,
     /// Least distance between two neighbouring relays, m.
     pub(crate) apart_m: f64,
@@ -175,7 +175,7 @@ impl Chain {
         points
     }
 
-    /// Improves the positions `start` by grid searches around each. The grids become finer when they no longer help.
+    /// Improves the positions `start` by grid searches around each position. When a grid gives no improvement, a finer grid follows.
     ///
     /// Returns the SIR of the worst hop, and the positions. The SIR of a hop is the smaller of forward SIR and
     /// backward SIR / `reverse`.

@@ -24,8 +24,8 @@ type Draw<R> = fn(&mut R, [f64; 2], f64) -> Chain;
 
 /// Checks in random scenes that the relays' agreed positions are as good as the best of a grid search.
 ///
-/// The SIR of a scene counts the worse direction of each hop. At least 99.5 % of the SIRs are within 1e-4 of the best
-/// one, and none is below 0.99 of it.
+/// The SIR of a scene is that of its worst hop, in the worse direction. At least 99.5 % of the scenes must be within 1e-4 of the best SIR
+/// of the grid search, and all within 1 %.
 fn as_good_as_the_judge(seed: u64, scenes: usize, noisy: bool, draw: Draw<ChaCha8Rng>) {
     let mut rng = generator(seed);
     for ends in ENDS {

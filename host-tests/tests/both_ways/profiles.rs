@@ -53,8 +53,8 @@ fn with_separation(rng: &mut impl Rng, mut chain: Chain) -> Chain {
     chain
 }
 
-/// Counts of scenes: all, and those with an SIR within 1e-4 and within 5 % of the reference search's. `worst` is the
-/// smallest ratio to it.
+/// Numbers of scenes: all, and those with an SIR within 1e-4 or 5 % of that of the reference search. `worst` is the smallest ratio of an
+/// SIR to that of the reference search.
 #[derive(Debug, Default)]
 struct Tally {
     all: usize,
@@ -64,8 +64,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Adds a scene: compares the SIR at the relays' agreed positions with that of the reference search. The mission
-    /// has one direction if `one_way`.
+    /// Adds a scene: compares the SIR at the relays' agreed positions with that of the reference search. If `one_way`, only the direction
+    /// from Tx to Rx counts.
     fn add(&mut self, chain: &Chain, one_way: bool) {
         let (mut chain, mut known) = (chain.clone(), chain.clone());
         if one_way {
@@ -105,12 +105,10 @@ impl Tally {
     }
 }
 
-/// Compares Algorithm 1 with the reference search (the judge) in random scenes. Some scenes are for both directions,
-/// others for one direction. `change` modifies each scene; `what` names the change in the output. The judge is an
-/// independent search.
+/// Checks Algorithm 1 against an independent search (the judge) in random scenes. Each scene is solved for both directions and for one
+/// direction. `change` modifies each scene; `what` names the change in the output.
 ///
-/// For both directions the scenes must be within 1e-4 of the judge's SIR if `is_exact`, else at least 80 % of them
-/// within 5 %.
+/// For both directions all SIRs must be within 1e-4 of the judge's SIR if `is_exact`; otherwise at least 80 % of them within 5 %.
 fn best_places(seed: u64, what: &str, is_exact: bool, change: fn(&mut ChaCha8Rng, Chain) -> Chain) {
     let mut rng = generator(seed);
     let draws: [(&str, Draw); 2] = [("usual", usual), ("near an interferer", adversarial)];
@@ -158,10 +156,10 @@ fn best_places_of_own_relays_with_a_separation_that_binds() {
     });
 }
 
-/// Checks a chain in which relay 8 stays short of the farthest x of relay 7.
+/// Checks that the SIR is within 1e-4 of the optimum if relay 8 stays short of relay 7's farthest x.
 ///
-/// Between the two are 65 m of altitude, so that they must be far from the interferer. A search that allows a hop
-/// from a sender beyond its receiver finds a wrong x for relay 8.
+/// Relays 7 and 8 differ by 65 m in altitude, so that both must be far from the interferer. A search that allows a sender with a larger x
+/// than its receiver finds a wrong x for relay 8.
 #[test]
 fn a_relay_that_stays_short_of_the_previous_ones_reach() {
     let chain = Chain {
@@ -203,9 +201,10 @@ fn a_relay_that_stays_short_of_the_previous_ones_reach() {
     assert_eq!(tally.tight, 1);
 }
 
-/// Checks four relays, of which three stay next to Tx and the fourth is beyond the interferer.
+/// Checks that the SIR is within 1e-4 of the optimum if only the fourth relay leaves Tx.
 ///
-/// The fourth goes farthest if the third is at x = 0, where the first two have no x of their own.
+/// The interferer is between the third and the fourth relay. The fourth relay has its largest x if the third is at x = 0. Then the first
+/// two have to be at x = 0, too.
 #[test]
 fn three_relays_next_to_tx_before_an_interferer() {
     let chain = Chain {

@@ -111,9 +111,8 @@ pub(crate) fn adversarial(rng: &mut impl Rng, ends: [f64; 2], reverse: f64) -> C
     chain
 }
 
-/// Draws a scene with a field of interference, given at points along the line. `kind` is 0 for the same interference
-/// everywhere, 1 for random interference that varies by a factor of up to 25, and 2 for that of one to three
-/// interferers.
+/// Draws a scene with a field of interference, given at points along the line. `kind` is 0 for the same interference everywhere, 1 for
+/// random interference that varies by a factor of up to 25, and 2 for the interference of one to three interferers.
 pub(crate) fn in_field(rng: &mut impl Rng, ends: [f64; 2], reverse: f64, kind: usize) -> Chain {
     let mut chain = usual(rng, ends, reverse);
     let points: usize = [1, rng.random_range(2..=9), 41][kind];

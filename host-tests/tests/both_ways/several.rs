@@ -63,7 +63,7 @@ fn draw(rng: &mut impl Rng, round: usize) -> (Scenario, Chain, u16) {
     (scenario, chain, relays)
 }
 
-/// Checks two-way chains that are placed for one hypothetical interferer in place of several real ones.
+/// Checks two-way chains whose positions are computed for one interferer that stands for several.
 ///
 /// With positions chosen for both directions, the median SIR must be higher than with positions chosen for one direction.
 #[test]
@@ -93,7 +93,8 @@ fn places_for_both_directions_beat_one_way_ones_against_several() {
 
 /// Checks that the planner's positions for both directions are as good as the judge's.
 ///
-/// The judge knows all interferers. The SIRs are within 1e-4, or within 1 % where the planner keeps the positions for the hypothetical interferer.
+/// The judge, an independent search, knows all interferers. The planner's SIRs are within 1e-4 of the judge's. They are within 1 % in
+/// scenes where the planner keeps the positions for the hypothetical interferer.
 #[test]
 fn the_planner_places_relays_for_the_sum_of_several() {
     let mut rng = generator(3326);

@@ -10,7 +10,7 @@ impl Shares {
         self.0.push(share);
     }
 
-    /// Returns the ratio that `percent` per cent of the scenes do not reach.
+    /// Returns a percentile of the ratios: `percent` per cent of them are below it.
     pub(crate) fn percentile(&self, percent: f64) -> f64 {
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
@@ -25,7 +25,7 @@ impl Shares {
         self.percentile(0.0)
     }
 
-    /// Prints the worst, the 1 % and the median ratio as a table row with the label `what`.
+    /// Prints the worst ratio, the first percentile and the median as a table row with the label `what`.
     pub(crate) fn report(&self, what: &str) {
         let [worst, first, median] = [0.0, 1.0, 50.0].map(|percent| self.percentile(percent));
         println!(

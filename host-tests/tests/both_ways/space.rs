@@ -126,8 +126,8 @@ fn table(shares: &mut BTreeMap<String, Vec<f64>>) {
     }
 }
 
-/// Returns the joint method's SIR over that of a reference search, for random scenes, worst first. The interferer is
-/// near the line Tx-Rx if `wild`.
+/// Returns the ratios of the joint method's SIR to that of a reference search, in ascending order. There is one ratio for each random
+/// scene. The interferer is near the line Tx-Rx if `wild`.
 fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut seeds = generator(seed);
@@ -150,8 +150,8 @@ fn compared(seed: u64, scenes: usize, wild: bool) -> Vec<f64> {
     shares.remove("all").unwrap()
 }
 
-/// Checks that the joint method reaches 0.999 of the judge's SIR in 99.5 % of scenes, and 0.98 in all. The judge is an
-/// independent search. The interferer is near the line Tx-Rx if `wild`.
+/// Checks that the joint method reaches 0.999 of the judge's SIR in 99.5 % of scenes, and 0.98 in all. The judge is an independent search.
+/// In these scenes the interferer is near the line Tx-Rx if `wild`.
 fn near_the_best_places(seed: u64, scenes: usize, wild: bool) {
     let shares = compared(seed, scenes, wild);
     let short = shares.iter().filter(|share| **share < 0.999).count();
@@ -169,9 +169,9 @@ fn the_joint_method_is_near_the_best_places_next_to_an_interferer() {
     near_the_best_places(3311, 12, true);
 }
 
-/// Checks that the joint method finds the better of two local optima of relay 1. They are above the interferer and
-/// beyond it. The judge found the SIR of each; without an initial chain that keeps relay 1 above the interferer the
-/// method misses it by up to 10 %.
+/// Checks that the joint method finds the better of two local optima. In one optimum relay 1 is above the interferer, in the other beyond
+/// it. The expected SIRs come from an independent search. For the better optimum the method needs a start with relay 1 above the
+/// interferer; without this start its SIR is up to 10 % lower.
 #[test]
 fn the_joint_method_finds_the_chain_above_the_interferer() {
     type Scene = (u16, f64, f64, f64, [f64; 3], f64);

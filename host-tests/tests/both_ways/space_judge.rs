@@ -48,8 +48,8 @@ impl Space {
         power_w / (loss * ((x - xi).powi(2) + (y - yi).powi(2) + h * h)) + self.chain.noise_w
     }
 
-    /// Returns a hop's two-way SIR: the smaller of its forward SIR and its backward SIR / r. r is the required ratio
-    /// of backward to forward SIR. The hop leads from `from` to `to`, where `node` is (0 is Tx, N + 1 is Rx).
+    /// Returns a hop's two-way SIR: the smaller of its forward SIR and its backward SIR / r. r is the required ratio of backward to forward
+    /// SIR. The hop leads from `from` to `to`, the position of `node` (0 is Tx, N + 1 is Rx).
     fn hop(&self, node: usize, from: Place, to: Place) -> f64 {
         let squared: f64 = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum();
         let gain = 1.0 / (self.chain.loss[0] * squared.max(1e-9));
@@ -145,9 +145,9 @@ impl Space {
         points
     }
 
-    /// Improves the positions `start` by searches in a window around each. Returns the worst hop's two-way SIR
-    /// (smaller of forward SIR and backward SIR / r), and the positions. The first windows extend `width` metres to
-    /// each side. They shrink when they no longer help.
+    /// Improves the positions `start` by searches in a window around each. Returns the worst hop's two-way SIR (smaller of forward SIR and
+    /// backward SIR / r), and the positions. The first windows extend `width` metres to each side. When windows give no improvement,
+    /// smaller windows follow.
     pub(crate) fn refined(
         &self,
         start: &[Place],

@@ -13,7 +13,7 @@ use uav_relay_oracle::reference::{Link, Relay as ReferenceRelay};
 use uav_relay_sim::simulator::chain::Chain as SimulatedChain;
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Tag bytes of the messages of a pass.
+/// Message types (first bytes of the body) of the messages of a sweep.
 const SWEEP: u8 = 0;
 const VERDICT: u8 = 1;
 const ASIDE: u8 = 5;
@@ -121,7 +121,8 @@ fn turns_of_one_direction_are_equal_to_the_bit() {
     assert_eq!(hash, RECORDED, "{hash:#018x}");
 }
 
-/// Checks the joint method. In every second scene the relays also have room to the side.
+/// Checks that the joint method still gives the recorded positions for missions of one direction. In every second scene the relays may also
+/// have lateral offsets.
 #[test]
 fn joint_places_of_one_direction_are_equal_to_the_bit() {
     const RECORDED: u64 = 0xf047_a192_5366_f9f4;
@@ -181,8 +182,8 @@ fn places_in_a_field_of_one_direction_are_equal_to_the_bit() {
 
 /// Adds the bodies of the Sweeps, Verdicts and Asides that the relays of a run send to the hash `hash`.
 ///
-/// Left out is the digest in bytes 3 and 4 of each body, which covers `reverse` in one version and not in the other. The
-/// sequence on each link is compared, not the times: the lengths of other messages differ between the versions.
+/// The digest in bytes 3 and 4 of each body is left out, because older versions of the crate computed it without `reverse`. The hash
+/// depends on the sequence on each link, but not on times, because other messages had other lengths in older versions.
 fn add_passes(hash: &mut u64, mut setup: Setup) -> usize {
     setup.record = true;
     let mut chain = SimulatedChain::new(setup).unwrap();
@@ -211,7 +212,8 @@ fn add_passes(hash: &mut u64, mut setup: Setup) -> usize {
     count
 }
 
-/// Checks that relays of one direction send the same Sweeps, Verdicts and Asides as before.
+/// Checks that relays with a mission of one direction send the recorded Sweeps, Verdicts and Asides. They were recorded before missions of
+/// two directions existed.
 #[test]
 fn passes_of_one_direction_are_equal_byte_for_byte() {
     const RECORDED: u64 = 0xdeb4_11e3_1ec0_46b1;

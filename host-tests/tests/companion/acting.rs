@@ -55,7 +55,7 @@ impl Page {
         self.sends(path, &body, ["", ""])
     }
 
-    /// Checks that an upload that was held on the way, or is without the time of the page, is refused.
+    /// Checks that the station refuses an upload request that is more than 5 s old or states no time.
     fn refuses_old_times(&self, request: &Value) {
         let refused = self.sends("/upload", request, ["", ""]);
         assert!(refused.1.contains("missing field `time_s`"), "{refused:?}");
@@ -68,7 +68,7 @@ impl Page {
         );
     }
 
-    /// Waits until the tasks are at `stage`, and returns their state.
+    /// Waits until the page shows the task at stage `stage`, and returns the state of the task.
     fn until(&self, stage: &str) -> Value {
         let begun = Instant::now();
         let mut states = snapshots(&self.address).map(|mut it| it["desk"].take());

@@ -114,9 +114,9 @@ fn an_arducopter_far_from_a_swapped_line_is_reported() {
     is_off_a_swapped_line("arducopter");
 }
 
-/// Checks that the report of a drone far from its line suggests swapped coordinates only with reason.
+/// Checks that the report of a drone far from its line does not always suggest swapped coordinates.
 ///
-/// Here Tx and Rx are configured 0.1 degrees too far south, so that nothing is swapped.
+/// Here Tx and Rx are configured 0.1 degrees too far south, so the report must not suggest a swap.
 #[test]
 fn a_drone_far_from_its_line_is_reported_without_a_guess() {
     let moved = |[lat, lon, amsl]: Site| [lat - 0.1, lon, amsl];

@@ -12,19 +12,19 @@ use crate::medium::{Medium, QUIET};
 use crate::peer::{self, Peer, ReceivedMessage};
 use crate::process::Relay;
 
-/// Options of relays that a loaded computer does not make lose each other.
+/// Relay options with long timeouts, so that relays on a busy computer do not lose each other.
 const PATIENT: &str = "--probe-after-ms 1000 --dead-after-ms 5000";
 
-/// Chain on a channel: one relay has an autopilot, and the others hover by hand.
+/// Chain on a shared channel. One relay has an autopilot; the other drones hover, flown by their pilots.
 struct Pair {
     chain: Chain,
     drone: Peer,
-    /// Relay with the autopilot, its number and its options.
+    /// Relay with the autopilot; `None` while it is restarted.
     relay: Option<Relay>,
     index: usize,
     own: String,
     _others: Vec<Relay>,
-    /// Thread that reports the positions of the other drones until the flag is true. Without it their guards hold them.
+    /// Thread that reports the positions of the other drones until the flag is true. The motion guards of these drones need the positions.
     hover: (Arc<AtomicBool>, Option<JoinHandle<()>>),
 }
 
@@ -36,7 +36,7 @@ impl Drop for Pair {
 }
 
 impl Pair {
-    /// Starts relay `index` of `of`, its drone on the ground with a battery at `battery`, and the others.
+    /// Starts all relays of a chain of `of`. The drone of relay `index` is on the ground; `battery` is the command that sets its battery.
     fn grounded([index, of]: [usize; 2], kind: &str, more: &str, battery: &str) -> Self {
         let chain = Chain::on_channel(of, Medium::new(of, QUIET));
         let link = chain.files.text("autopilot");
@@ -83,14 +83,14 @@ impl Pair {
         pair
     }
 
-    /// Stops the companion, and starts it again after `between`.
+    /// Stops the relay's companion program, calls `between`, and starts the program again.
     fn restart(&mut self, between: impl FnOnce(&mut Peer)) {
         drop(self.relay.take());
         between(&mut self.drone);
         self.relay = Some(self.chain.relay(self.index, &self.own));
     }
 
-    /// Checks that the relay has gone outside of the chain, and stays there.
+    /// Checks that the relay has left the chain, and does not rejoin it within 12 s.
     fn stays_outside(&mut self) {
         let line = self.line("departure: ");
         // The others may have said at once that they do not need it.
@@ -106,7 +106,7 @@ impl Pair {
         assert!(!self.relay.as_mut().unwrap().has_printed("converged: "));
     }
 
-    /// Takes off, and gives the relay the control of its drone.
+    /// Takes off and starts setpoint control. Waits until the relay has a setpoint.
     fn engage(&mut self, kind: &str) {
         self.drone.takes_off();
         self.line("autopilot: in the air, and not controlled by the relay");
@@ -141,9 +141,9 @@ fn is_command(heard: &ReceivedMessage) -> bool {
     heard.is("COMMAND_LONG") && heard.0["command"] != 511 || heard.is("SET_MODE")
 }
 
-/// Checks a drone whose battery falls: on the ground nothing counts, in flight the relay leaves.
+/// Checks that a relay with a low battery leaves the chain in flight, but not on the ground.
 ///
-/// The pilot flies the drone home. The relay starts again while he does so. It does not join the chain.
+/// The relay restarts while the pilot flies the drone home. The restarted relay must not join the chain.
 fn a_low_battery_leads_it_out_of_the_chain(kind: &str, more: &str, [full, low]: [&str; 2]) {
     let mut pair = Pair::grounded([2, 2], kind, more, low);
     // A member requests to leave after 15 s.
@@ -197,9 +197,9 @@ fn a_low_battery_leads_an_arducopter_out_of_the_chain() {
     a_low_battery_leads_it_out_of_the_chain("arducopter", "--flight-time 1500", batteries);
 }
 
-/// Checks a first leader that restarts with a low battery and a slow autopilot: it stays outside.
+/// Checks that relay 1, the initial leader, stays outside if it restarts with a low battery.
 ///
-/// The first landed state comes after 3 s, and the next message of the battery is lost.
+/// The autopilot is slow: its first message with the landed state comes after 3 s, and its next battery message is lost.
 #[test]
 fn a_leader_with_a_slow_autopilot_restarts_outside_of_the_chain() {
     let mut pair = Pair::grounded([1, 3], "px4", "", "battery 80 1200");
@@ -220,7 +220,8 @@ fn a_leader_with_a_slow_autopilot_restarts_outside_of_the_chain() {
     pair.stays_outside();
 }
 
-/// Checks the lines of `--positions`: an endurance, and an invalid one. Then the operator's commands.
+/// Checks that a relay reads its endurance from lines of `--positions`. An invalid line makes it unknown. Then the relay must obey the
+/// operator's commands `stay` and `leave`.
 #[test]
 fn endurance_is_read_from_the_positions() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));
@@ -273,7 +274,7 @@ fn endurance_is_read_from_the_positions() {
     assert!(!line.contains("\"departure\":\"member\""), "{line}");
 }
 
-/// Writes `line` once a second for 18 s. A low endurance decides after 15 s.
+/// Writes `line` to the FIFO once a second for 18 s. This is longer than the 15 s after which a low endurance counts.
 fn flows(fifo: &str, line: &str) {
     for _ in 0..18 {
         write(fifo, line);
@@ -281,7 +282,7 @@ fn flows(fifo: &str, line: &str) {
     }
 }
 
-/// Checks a relay without `--reserve`: its endurance is shown, and it does not leave by itself.
+/// Checks that a relay without `--reserve` does not leave by itself. Invalid endurances are counted but not reported.
 #[test]
 fn without_a_reserve_no_endurance_counts() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));
@@ -299,7 +300,7 @@ fn without_a_reserve_no_endurance_counts() {
     assert!(!relay.has_printed("\"event\":\"endurance unknown\""));
 }
 
-/// Checks a reserve and positions whose writer never sends an endurance.
+/// Checks that a relay with `--reserve` logs an unknown endurance if it receives only positions.
 #[test]
 fn an_endurance_that_never_comes_is_told() {
     let chain = Chain::on_channel(2, Medium::new(2, QUIET));

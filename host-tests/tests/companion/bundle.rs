@@ -19,10 +19,10 @@ use crate::process::{Relay, bits};
 /// Text in the udev rules of a new bundle.
 const FILL_IN: &str = "FILL-IN-SERIAL-NUMBER";
 
-/// Planned places of three relays, m along the line.
+/// Planned positions of three relays, m along the line.
 const PLACES: [f64; 3] = [343.5, 380.9, 417.4];
 
-/// Scenario of `examples/drone.toml` without ports and files, with short times.
+/// Returns the scenario of `examples/drone.toml` without ports and files, and with short timeouts.
 fn scenario() -> String {
     let example = include_str!("../../../examples/drone.toml");
     let text = example.split("[companion]").next().unwrap();
@@ -31,7 +31,7 @@ fn scenario() -> String {
         .replace("dead_after_ms = 90000", "dead_after_ms = 3000")
 }
 
-/// Runs `cargo provision` with the scenario `text`, a bundle in `out` and `more` options.
+/// Runs `cargo provision` with the scenario `text` and `more` options. It writes a bundle (a folder for each computer) to the folder `out`.
 fn bundle(files: &Files, text: &str, more: &str) -> Output {
     let scenario = files.write("scenario.toml", text);
     let mut command = Command::new(provision());
@@ -39,7 +39,7 @@ fn bundle(files: &Files, text: &str, more: &str) -> Output {
     command.args(more.split_whitespace()).output().unwrap()
 }
 
-/// Computers of three relays and a ground station on one channel, with the folders of a bundle.
+/// Test setup: three relays and a ground station on one channel, each with its folder of a bundle.
 struct Bench {
     files: Files,
     channel: Medium,
@@ -47,7 +47,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Makes the bundle, and enters what its pages ask for: serial numbers, autopilot parameters.
+    /// Creates the bundle. Then fills in serial numbers and loads the autopilot parameters.
     fn new() -> Self {
         let files = Files::new();
         let made = bundle(&files, &scenario(), "");
@@ -84,7 +84,7 @@ impl Bench {
         self.files.path("out").join(name)
     }
 
-    /// Changes the paths of a computer to those of this bench, and fills in the serial number.
+    /// Changes the paths in the file `config` to those of this test. Fills in the radio's serial number.
     fn installs(&self, config: &str, port: &str) {
         let (path, folder) = (self.path(config), self.path(config));
         let folder = folder.parent().unwrap();
@@ -112,7 +112,7 @@ impl Bench {
         std::fs::write(path, text).unwrap();
     }
 
-    /// Starts the companion of relay `index` with the file of its folder and `more` options.
+    /// Starts the companion of relay `index` with the configuration file in its folder and `more` options.
     fn companion(&self, index: usize, more: &str) -> Relay {
         let config = self.path(&format!("relay{index}/drone.toml"));
         Relay::start(&format!("--config {} {more}", config.display()))
@@ -127,7 +127,8 @@ impl Bench {
         relays
     }
 
-    /// Checks the computer of relay 2 and returns the failed (red) checks. Fails if the exit status contradicts these results.
+    /// Runs `--check` for relay 2 and returns the lines of failed checks, which begin with `red`. Panics if the exit status contradicts
+    /// these lines.
     fn reds(&self, more: &str, seconds: u64) -> Vec<String> {
         let ended = self
             .companion(2, &format!("--check={seconds} {more}"))
@@ -148,7 +149,7 @@ impl Bench {
         lines
     }
 
-    /// Checks that exactly the red lines with `parts` appear.
+    /// Checks that the check of relay 2 reports exactly the failures that contain `parts`, in this order.
     fn finds(&self, more: &str, parts: &[&str]) {
         let reds = self.reds(more, 4);
         println!("{more}: {reds:#?}");
@@ -251,7 +252,7 @@ fn a_bundle_is_green_and_its_relays_agree() {
     }
 }
 
-/// Checks that the drone of every folder flies to the place on its page.
+/// Checks that each drone flies to the position that the page of its folder states.
 #[test]
 fn every_folder_of_a_bundle_flies() {
     let mut bench = Bench::new();
@@ -285,7 +286,7 @@ fn every_folder_of_a_bundle_flies() {
     }
 }
 
-/// Checks that a check beside a flying chain refuses, and that the chain does not notice it.
+/// Checks that `--check` fails while other relays of the chain fly, and does not disturb these relays.
 #[test]
 fn a_check_does_not_disturb_a_chain_that_flies() {
     let mut bench = Bench::new();
@@ -332,7 +333,7 @@ fn a_check_does_not_disturb_a_chain_that_flies() {
     }
 }
 
-/// Checks that a neighbour that falls silent in the course of a check is red.
+/// Checks that `--check` reports a failure if a neighbour falls silent during the check.
 #[test]
 fn a_neighbour_that_falls_silent_is_red() {
     let mut bench = Bench::new();
@@ -604,7 +605,7 @@ fn a_check_names_planted_faults_of_the_radio() {
     bench.finds(&port(2), &[damaged; 2]);
 }
 
-/// Checks that a relay on two wires is green beside running relays, which form no view with it.
+/// Checks that `--check` of a relay on two wires succeeds. Its running neighbours must form no view with it.
 #[test]
 fn a_relay_on_wires_is_checked() {
     let chain = Chain::on_wires(3, QUIET).with(QUICK);
@@ -630,7 +631,8 @@ fn a_relay_on_wires_is_checked() {
     }
 }
 
-/// Checks that the positions that are checked are those to which companions fly.
+/// Checks that `cargo provision --bundle` refuses any tolerance but that of the companions. With another tolerance the positions in the
+/// bundle would differ from those to which the companions fly.
 #[test]
 fn a_bundle_has_the_tolerance_of_the_companions() {
     let files = Files::new();

@@ -14,18 +14,20 @@ use crate::reported::{Flown, Page, alarms, relays, restart};
 /// Number of faults that the test in `cargo ci` injects; the variable COUNT replaces it.
 const FEW: usize = 7;
 
-/// Permitted time until an alarm beyond the time in which the chain itself notices the fault, s.
+/// Longest permitted time from the chain's own detection of a fault to the alarm, s.
 const SOON_S: f64 = 2.0;
 
-/// Time after which the station misses the reports of a lost relay, s. They may have gone through another lost relay.
+/// Time after which the station notices that a relay's reports are missing, s. The reports may have gone through another lost relay.
 const LOST_S: f64 = 10.0;
 
 /// Time after which a fault that neither a companion nor the page has noticed is a failure.
 const MOST: Duration = Duration::from_secs(90);
 
-/// Fault: command, relay (0: the chain), alarm, and log line of a companion that has noticed it. `#` is the relay's number.
+/// Fault: the command that causes it, the relay, the alarm, and a log line. Relay 0 stands for the whole chain. The log line is from a
+/// companion that has noticed the fault. `#` stands for the relay's number.
 ///
-/// A line that does not begin with `relay` is of that relay itself, or of any relay for 0.
+/// A log line that begins with `relay` may come from any companion. Other lines come from the relay's own companion, or from any companion
+/// if the relay is 0.
 type Fault = (&'static str, usize, &'static str, &'static str);
 
 const RELEASED: &str = "warning relay # released";
@@ -94,7 +96,7 @@ const SCRIPT: [&[Fault]; 14] = [
     &[("no quorum", 0, "critical no quorum", "no quorum  ")],
 ];
 
-/// Prints the times of faults: until a companion notices them, and until their alarm, s. Returns texts of late alarms.
+/// Prints the times from each fault until a companion notices it, and until its alarm, s. Returns a text for each late alarm.
 fn late(group: &[Fault], times: &[[Option<f64>; 2]]) -> Vec<String> {
     let mut failures = Vec::new();
     for ((what, relay, alarm, _), [own, shown]) in group.iter().zip(times) {
@@ -337,7 +339,7 @@ impl Stage {
         self.flown[relay - 1].relay = restart(&self.chain, relay, more);
     }
 
-    /// Lets the pilot engage the relay's control repeatedly, until the page shows it.
+    /// Chooses OFFBOARD or GUIDED repeatedly, until the page shows that setpoint control is engaged.
     fn engage(&mut self, relay: usize) {
         let begun = Instant::now();
         let mut turn = 0;
@@ -384,7 +386,7 @@ fn subject(text: &str) -> Option<u64> {
     rest[..end.unwrap_or(rest.len())].parse().ok()
 }
 
-/// Returns true if an alarm begins with `start`, and no digit follows.
+/// Returns true if an alarm begins with `start` and no digit follows. So an alarm about relay 10 is not taken for one about relay 1.
 fn is_of(alarm: &str, start: &str) -> bool {
     let rest = alarm.strip_prefix(start);
     rest.is_some_and(|rest| !rest.starts_with(|it: char| it.is_ascii_digit()))

@@ -73,7 +73,8 @@ fn three_relays_with_one_file_settle_like_the_simulation() {
     assert_ne!(settled[..], simulated(&Scenario::default(), 3));
 }
 
-/// Checks that relays fly a file's fitted slots and fixed altitudes, with both names of `joint`.
+/// Checks that relays use the fitted slots and the fixed altitudes that a scenario file demands. Fitted slots are time slots as long as
+/// each hop needs. The joint method has two names, `joint` and `altitude`; both are tested.
 #[test]
 fn fitted_slots_and_fixed_altitudes_of_a_file_are_flown() {
     let folder = Files::new();
@@ -242,7 +243,7 @@ fn overrides_by_the_command_line_are_logged_once() {
     }
 }
 
-/// Stops a relay. Returns the values of the scenario file that options have replaced, by its log.
+/// Stops a relay. Returns the values of the scenario file that options have replaced, from the relay's log.
 fn overrides(mut relay: Relay) -> Vec<String> {
     relay.line("unguarded: ");
     let lines = relay.stopped().into_iter();

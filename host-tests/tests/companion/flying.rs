@@ -6,7 +6,7 @@ use crate::files::Files;
 use crate::peer::{Peer, ReceivedMessage, Site, agreed, apart_m, relay};
 use crate::process::Relay;
 
-/// Messages requested by the companion (position, landed state, target), and their intervals, µs.
+/// Ids and intervals, µs, of the messages that the companion requests: position, landed state, target.
 pub(crate) const ASKED: [(u64, u64); 3] = [(33, 200_000), (245, 500_000), (87, 500_000)];
 
 /// Take-off position along the line, m: about 20 m from the setpoint.

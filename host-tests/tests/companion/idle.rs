@@ -34,8 +34,7 @@ fn the_process_sleeps_while_a_tty_accepts_no_bytes() {
     wait_until(|| pty.read(&mut buffer).contains(&0));
 }
 
-/// Asserts that each of `relays` is idle for 2 s. It uses almost no processor time, and wakes up at most `at_most`
-/// times.
+/// Asserts that each of `relays` is idle for 2 s. An idle relay uses almost no processor time, and wakes up at most `at_most` times.
 fn assert_idle(relays: &[Relay], at_most: u64) {
     // Activity of the start has ended by then.
     std::thread::sleep(Duration::from_millis(500));

@@ -24,7 +24,7 @@ pub(crate) struct Noise {
     pub(crate) seed: u64,
 }
 
-/// Maximum time by which a channel with a data rate makes up for a late wake-up of its thread.
+/// Maximum delay of the channel's thread that the channel makes up for by sending faster.
 const LATEST: Duration = Duration::from_millis(20);
 
 pub(crate) const QUIET: Noise = Noise {
@@ -165,7 +165,7 @@ impl Medium {
         self.ptys.lock().unwrap()[index] = Some(Arc::new(pty));
     }
 
-    /// Loses all bytes that the ttys of the bit mask `ttys` send from now on; 0 ends it.
+    /// Loses all bytes that the ttys of the bit mask `ttys` send from now on; 0 ends all losses.
     pub(crate) fn cut(&self, ttys: u16) {
         self.cut.store(ttys, Ordering::Relaxed);
     }

@@ -119,7 +119,7 @@ impl ReceivedMessage {
         self.is("STATUSTEXT") && self.0["text"] == text
     }
 
-    /// Returns the id and interval in µs of the message that this one requests; `None` if it is no request.
+    /// Returns the id and interval, µs, of the requested message; `None` if this message is no request.
     pub(crate) fn requested_interval(&self) -> Option<(u64, u64)> {
         let asks = self.is("COMMAND_LONG") && self.0["command"] == 511;
         let number = |name: &str| self.0[name].as_f64().unwrap() as u64;

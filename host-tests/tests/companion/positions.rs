@@ -7,7 +7,7 @@ use crate::files::{Files, write};
 use crate::medium::QUIET;
 use crate::process::{LIMIT, Relay, bits};
 
-/// Checks that the first setpoint of each relay is its drone's position. A drone must not be moved by a jump.
+/// Checks that the first setpoint of each relay is its drone's position, so that no drone must jump.
 ///
 /// The last setpoints must be those of a chain without motion guards.
 #[test]

@@ -48,7 +48,7 @@ pub(crate) fn has_all(snapshot: &Value) -> bool {
     relays(snapshot).iter().all(|it| it["age_s"].is_number())
 }
 
-/// Returns the texts of the lasting alarms in a page's snapshot, with their urgency.
+/// Returns the urgency and the text of each alarm in a page's snapshot that has not been cleared.
 pub(crate) fn alarms(snapshot: &Value) -> Vec<String> {
     let all = snapshot["alarms"].as_array().unwrap().iter();
     let lasting = all.filter(|it| it["cleared_s"].is_null());
@@ -79,7 +79,7 @@ impl Page {
         }
     }
 
-    /// Returns the next snapshot of the page, and the time of its arrival, s.
+    /// Returns the next snapshot (state of the chain) that the page receives, and its time of arrival, s.
     pub(crate) fn next(&mut self) -> (f64, Value) {
         let next = self.arriving.recv_timeout(LIMIT).unwrap();
         self.last = next.1.clone();

@@ -189,7 +189,7 @@ fn seconds_from_now(text: &str) -> u64 {
     now.abs_diff(then.trim().parse().unwrap())
 }
 
-/// Keeps all files of process `relay` from growing, as on a full disk, or permits it again.
+/// Simulates a full disk for the process `relay` if `full` is true: its files cannot grow. Otherwise ends the simulation.
 pub(crate) fn fill_disk(relay: Pid, full: bool) {
     let limit = Rlimit {
         current: full.then_some(0),

@@ -105,8 +105,7 @@ fn an_unreachable_udp_port_is_logged_once() {
     unanswered.relay.stopped();
 }
 
-/// Checks that a relay reports once that an autopilot at a UDP port does not answer it. A PX4 that answers only
-/// another program behaves so.
+/// Checks that a relay reports once that the autopilot at a UDP port does not answer. For example, a PX4 may answer only another program.
 #[test]
 fn a_silent_udp_port_is_logged_once() {
     let ports = Ports::apart(1_000);

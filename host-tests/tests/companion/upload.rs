@@ -114,8 +114,7 @@ enum Wire {
     Cut,
 }
 
-/// Creates a wire that is cut by a decision on a membership view if `state` is [`Wire::Armed`] then. The relay that
-/// decides has tty 1.
+/// Creates a wire that is cut when tty 1 sends a decision on a membership view. This happens only while `state` is [`Wire::Armed`].
 fn cut_by_a_decision(state: &Arc<Mutex<Wire>>) -> Medium {
     let state = Arc::clone(state);
     let mut deframer = Deframer::new();

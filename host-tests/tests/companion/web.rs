@@ -35,7 +35,7 @@ fn get(address: &str, path: &str) -> TcpStream {
     connect(address, request.as_bytes())
 }
 
-/// Returns the snapshots of a stream of events.
+/// Returns the snapshots of the page from the station's event stream.
 pub(crate) fn snapshots(address: &str) -> impl Iterator<Item = Value> {
     let lines = BufReader::new(get(address, "/events")).lines();
     let data = lines.map_while(Result::ok).filter_map(|line| {

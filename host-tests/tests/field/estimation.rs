@@ -16,11 +16,11 @@ const I_MAX_W: f32 = 3.476_175_5e-7;
 /// Statistics of the estimates of Upsilon, the mean inverse interference, for one pair of Beta shapes.
 #[derive(Default, Debug)]
 struct EstimateStatistics {
-    /// Number of samples sets from which an estimate could be made.
+    /// Number of sample sets that were sufficient for an estimate.
     made: u32,
-    /// Number of estimates within 5 % of the truth.
+    /// Number of estimates within 5 % of the true value.
     close: u32,
-    /// Number of estimates within two of their standard errors of the truth.
+    /// Number of estimates that differ from the true value by at most two standard errors.
     covered: u32,
     worst: f64,
     /// Largest standard error, as a fraction of the estimate.

@@ -34,7 +34,7 @@ fn setup(case: &Case) -> Setup {
     setup
 }
 
-/// Checks that the slots of all relays together fill one frame: in order, without overlap and gap.
+/// Checks that the time slots of all relays fill the TDMA frame: in order, without overlaps and gaps.
 fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     let flying = outcome.relays.iter().filter(|relay| relay.killed.is_none());
     let shares: Vec<_> = flying.map(|relay| relay.slot_shares.unwrap()).collect();
@@ -59,7 +59,7 @@ fn check_shares(outcome: &Outcome, reverse: f32, what: &str) {
     assert_eq!(at, 1.0, "{what}: {slots:?}");
 }
 
-/// Checks that each time slot is as long as its hop needs. The time that a hop needs for its data follows from its true SINR.
+/// Checks that each time slot is as long as the hop needs for its data at the hop's true SINR.
 fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
     let places: Vec<Placement> = solved.iter().map(|(at, _)| *at).collect();
     let time = case.time(&places);
@@ -82,7 +82,7 @@ fn check_lengths(case: &Case, solved: &[(Placement, SlotShares)], what: &str) {
     }
 }
 
-/// Checks that simulated relays agree on the solver's positions, and on its time slots in the frame.
+/// Checks that simulated relays agree on the positions and the time slots that the solver finds.
 #[test]
 fn a_chain_agrees_on_fitted_places_and_shares() {
     let first = number("SEED", 1);
@@ -108,7 +108,7 @@ fn a_chain_agrees_on_fitted_places_and_shares() {
     }
 }
 
-/// Checks that after the loss of a relay the time slots of the remaining relays fill the frame again.
+/// Checks that after the loss of a relay the time slots of the other relays fill the whole TDMA frame.
 #[test]
 fn the_remaining_relays_share_the_frame_after_a_loss() {
     let case = Case::draw(1);
@@ -130,7 +130,7 @@ fn the_remaining_relays_share_the_frame_after_a_loss() {
     check_shares(&outcome, case.mission().config().reverse, "relay 3 lost");
 }
 
-/// Checks that after the restart of a relay the slots of the next agreement fill the frame.
+/// Checks that the time slots of the agreement after a relay's restart fill the whole TDMA frame.
 #[test]
 fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
     let case = Case::draw(1);
@@ -154,9 +154,9 @@ fn a_restarted_relay_has_the_slots_of_the_next_agreement() {
     }
 }
 
-/// Checks that relays agree first with the common power, and then with all powers.
+/// Checks that relays agree first for the common power, and a second time for their own powers.
 ///
-/// If the leader itself has another power, it gathers the powers first.
+/// There is only one agreement if no relay has another power, or if the leader has: then the leader gathers all powers first.
 #[test]
 fn the_first_agreement_is_for_the_common_power() {
     let case = Case {

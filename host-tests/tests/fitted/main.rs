@@ -96,8 +96,8 @@ fn places_on_the_line_carry_what_the_shortest_path_carries() {
     assert!(short * 200 <= shares.len() && shares[0] >= 0.98);
 }
 
-/// Checks that the rate with free altitudes and offsets is not below that at the common altitude. It must not be below
-/// that at the positions of the best SIR, either.
+/// Checks that the data rate with free altitudes and offsets is at least that at the common altitude. It must also be at least the rate at
+/// the positions of the best SIR.
 #[test]
 fn free_places_carry_no_less() {
     let first = number("SEED", 1);
@@ -162,7 +162,7 @@ fn free_places_carry_no_less() {
     }
 }
 
-/// Checks that long chains are placed, up to the number of relays that just fit on the line.
+/// Checks that the solver finds positions for as many relays as the minimum separation permits.
 #[test]
 fn a_full_line_is_placed() {
     for (relays, min_separation_m) in [(50, 4.0), (100, 4.0), (100, 10.0), (100, 10.1), (2, 999.9)]
@@ -180,7 +180,8 @@ fn a_full_line_is_placed() {
     }
 }
 
-/// Checks that fitted slots are refused with another method, `listen` or an unknown interferer.
+/// Checks that relays refuse fitted slots without the joint method, or with an unknown interferer. They also refuse fitted slots with the
+/// setting `listen`.
 #[test]
 fn fitted_slots_need_the_joint_method() {
     let config = MissionConfig {

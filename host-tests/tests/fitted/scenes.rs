@@ -102,8 +102,8 @@ impl Case {
         }
     }
 
-    /// Returns the times of the hops for one bit to Rx and `reverse` bits back, in 1 / bandwidth. The
-    /// second list is empty in one direction.
+    /// Returns the times of the hops for one bit to Rx and `reverse` bits to Tx, in units of 1 / bandwidth. The second list is empty if the
+    /// chain has only the direction to Rx.
     pub(crate) fn times(&self, places: &[Placement]) -> [Vec<f64>; 2] {
         let scene = Scene::new(&self.scenario, self.relays).unwrap();
         let places: Vec<Place> = places.iter().map(|at| (*at).into()).collect();
@@ -121,8 +121,7 @@ impl Case {
         [there, Vec::new()]
     }
 
-    /// Returns the total time of one bit through all hops, in units of 1 / bandwidth. The relays are at `places`; the true SINR of each hop
-    /// determines the time.
+    /// Returns the sum of the times of all hops, see [`times`](Self::times), with the relays at `places`.
     pub(crate) fn time(&self, places: &[Placement]) -> f64 {
         self.times(places).iter().flatten().sum()
     }

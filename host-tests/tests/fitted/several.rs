@@ -33,8 +33,8 @@ fn draw(seed: u64) -> Case {
 
 /// Checks that plans against several interferers are compared by their true rates, not by SIRs.
 ///
-/// No plan carries less than 0.99 of the positions for the hypothetical interferer, or of those of the largest SIR.
-/// `plan --out` accepts the positions of the relays if they carry at least 0.99 of the plan's rate.
+/// A plan's rate is at least 0.99 of two other rates: at the positions for the hypothetical interferer, and at those of the largest SIR.
+/// `plan --out` accepts the relays' own positions if their rate is at least 0.99 of the plan's rate.
 #[test]
 fn plans_against_several_interferers_are_compared_by_their_rates() {
     let (first, all) = (number("SEED", 1), number("COUNT", 12));

@@ -36,7 +36,7 @@ fn no_epoch_follows_the_last_one() {
     assert_eq!(start(&mut Ram::blank(7 * ENTRY, 1), u32::MAX), None);
 }
 
-/// Checks that no used epoch comes again, at whatever moment the power fails, even during an erase.
+/// Checks that no epoch is used twice, no matter when the power fails, even during an erase.
 #[test]
 fn no_epoch_comes_twice_whenever_power_fails() {
     let mut rng = ChaCha8Rng::seed_from_u64(seed(31));

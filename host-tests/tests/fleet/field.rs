@@ -157,7 +157,8 @@ fn the_fewest_in_a_field_are_those_of_a_grid_search() {
 
 /// Checks that the best target SIR of N identical relays in a field is the known optimum.
 ///
-/// The closed form gives it for a constant field, and Algorithm 4 for other fields.
+/// In a constant field the target must equal the closed form. In other fields it must be at least that of Algorithm 4, and a slightly
+/// higher target must be impossible on a grid.
 #[test]
 fn identical_relays_in_a_field_are_optimal() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(605));
@@ -200,7 +201,7 @@ fn identical_relays_in_a_field_are_optimal() {
     assert!(above > 5);
 }
 
-/// Checks that the fewest relays in a field of interference are not called proven if powers differ.
+/// Checks that the least number of relays in a field is not reported as proven if their powers differ.
 ///
 /// Algorithm 4, which finds this number, may then miss a chain with fewer relays.
 #[test]

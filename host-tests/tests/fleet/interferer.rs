@@ -13,7 +13,7 @@ use super::{ROUNDING, chain, round};
 
 /// Returns the mission of `link`, and a function from a relay's index to its altitude and power.
 ///
-/// A relay beyond those of `link` has the common profile of the mission.
+/// A relay with a larger index than those of `link` has the common profile of the mission.
 pub(crate) fn briefed(link: &Link) -> (Mission, impl Fn(u16) -> Profile + use<>) {
     let (mission, own) = of_link(link, 1e-4).unwrap();
     let of = move |index: u16| profile_of(&mission, &own, index);

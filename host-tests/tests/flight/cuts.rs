@@ -8,9 +8,9 @@ use super::*;
 /// Longest time from the last repair of the chain until all relays are in one membership view, s.
 const SOON_S: f64 = 120.0;
 
-/// Returns all pairs of different links to cut, each given by the index of the relay before it.
+/// Returns all pairs of different links to cut. A link is given by the index of the relay before it.
 ///
-/// The first cut of a pair is also the first to heal.
+/// The first link of a pair is cut first.
 fn pairs() -> impl Iterator<Item = (u16, u16)> {
     (1..8)
         .flat_map(|first| (1..8).map(move |second| (first, second)))

@@ -62,8 +62,8 @@ fn a_relay_rebooted_in_a_pass_gets_a_position_in_a_new_view() {
     }
 }
 
-/// Checks that a relay that reboots in a settled chain gets a position by a new membership view. It requests the view
-/// when it receives a lease renewal that it does not know, or else after a time by itself.
+/// Checks that a relay that reboots in a settled chain gets a position by a new membership view. The relay requests the view when it
+/// receives an unknown lease renewal. Without such a renewal it requests the view after a timeout.
 #[test]
 fn a_relay_rebooted_later_gets_a_position_in_a_new_view() {
     for rebooted in 1..4 {

@@ -32,8 +32,7 @@ fn bytes(rng: &mut impl Rng) -> Vec<u8> {
     bytes
 }
 
-/// Returns a corpus input with up to four changes. Each changes, removes or doubles a byte, or appends the end of
-/// another input.
+/// Returns a corpus input with one to four changes. A change alters, removes or doubles a byte, or appends the end of another input.
 fn changed(rng: &mut impl Rng, inputs: &[(String, Vec<u8>)]) -> Vec<u8> {
     let pick = |rng: &mut dyn Rng| inputs[rng.random_range(0..inputs.len())].1.clone();
     let mut input = pick(rng);

@@ -22,7 +22,7 @@ pub(crate) enum FlightEvent {
     Mute(usize),
     Unmute(usize),
     Vanish(usize),
-    /// The drone's relay links to another relay past a silent one. The third field is the silent relay, the last one
+    /// The drone's relay passes over a silent neighbour and links to the next relay. The third field is the silent relay, the last field
     /// the new neighbour, if any.
     Around(usize, Side, usize, Option<usize>),
     Back(usize, Side, usize),
@@ -150,7 +150,8 @@ pub(crate) fn pilots(
     plan
 }
 
-/// Plans the silence of relay `k`, and when its neighbours link past it. The relay returns unless it is `gone`.
+/// Plans that relay `k` falls silent at `at_s`, and that its neighbours then link to each other. The relay's radio works again later,
+/// except if the drone is `gone`.
 pub(crate) fn around(
     rng: &mut ChaCha8Rng,
     plan: &mut Vec<(f64, FlightEvent)>,

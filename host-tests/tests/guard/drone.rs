@@ -44,7 +44,7 @@ pub(crate) struct Drone {
     pub(crate) latency_s: f64,
     /// Motion guard of the drone; `None` while the relay is switched off.
     pub(crate) guard: Option<Guard>,
-    /// First setpoint that the guard has given since it last had none; `None` while the guard has none.
+    /// First setpoint of the guard after a time without setpoint; `None` while the guard has no setpoint.
     begun: Option<Placement>,
     /// Indices of the drones with which the relay has links, toward Tx and toward Rx. `None` stands for no link.
     pub(crate) links: [Option<usize>; 2],

@@ -169,8 +169,8 @@ impl World {
     }
 
     /// Moves drone `k` along the line, clear of its neighbours, as its pilot does. `share` is the fraction of the
-    /// permitted range of x, counted from Tx. Returns false if a neighbour does not know of the pilot yet, or if no
-    /// range is left.
+    /// permitted range of x, counted from Tx. Returns false if a neighbour has not yet received that the pilot flies
+    /// this drone, or if no range is left.
     pub(crate) fn along(&mut self, k: usize, share: f64) -> bool {
         if !self.drones[k].taken || self.drones[k].told != [true; 2] {
             return false;

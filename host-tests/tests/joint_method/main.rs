@@ -112,8 +112,8 @@ fn random_results(count: usize, seed: u64, apart: (f64, f64)) -> Vec<Result> {
     results
 }
 
-/// Returns the scenario of results in the documentation, with the interferer at (`x_m`, `y_m`). Lateral offsets are
-/// up to `lateral_m` to either side, altitudes 20 m to `most_m`.
+/// Returns a scenario for which the documentation states results. The interferer is at (`x_m`, `y_m`), m. Lateral offsets are up to
+/// `lateral_m` to either side, altitudes 20 m to `most_m`.
 fn roomy(relays: usize, x_m: f64, y_m: f64, lateral_m: f64, most_m: f64) -> (Link, Corridor) {
     let link = Link {
         x_i: x_m,

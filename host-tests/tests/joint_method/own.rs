@@ -143,9 +143,8 @@ fn one_relay_may_have_a_fixed_altitude() {
 
 /// Checks the number of round trips if some relays have a power or altitude of their own.
 ///
-/// The first round trip computes and finds that relays differ. Each further round trip collects the data of up to
-/// eight of these relays, and the last one computes again. If the leader is one of these relays, the first round trip
-/// is omitted.
+/// In the first round trip the relays find that some of them differ. Each further round trip collects the data of up to eight of these
+/// relays. The last round trip confirms the new solution. If the leader is one of the different relays, there is no first round trip.
 #[test]
 fn different_relays_take_three_round_trips_or_more() {
     for (relays, own, trips) in [
@@ -215,8 +214,8 @@ fn a_band_of_one_altitude_is_algorithm_1() {
     assert_eq!(outcome.bits(), settle(align).bits());
 }
 
-/// Checks that message faults do not change the positions, for both joint methods. Some relays have powers or
-/// altitudes of their own.
+/// Checks that message faults do not change the positions by the methods Joint and Adjust. Some relays have powers or altitudes of their
+/// own.
 #[test]
 fn faults_change_nothing_on_random_links() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(44));

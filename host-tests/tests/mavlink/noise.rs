@@ -54,7 +54,7 @@ fn every_complete_frame_is_found_in_noise() {
     assert!(extra < FRAMES / 100, "{extra} more than were whole");
 }
 
-/// Checks that a frame that is carried in another frame's payload is not read.
+/// Checks that the parser does not read a frame in the payload of another frame.
 #[test]
 fn frames_nested_in_a_message_are_not_parsed() {
     let inner = by_the_crate(&random_message(&mut rng(5)).0, 1);
@@ -90,8 +90,8 @@ fn an_unknown_message_costs_only_its_bytes() {
     assert_eq!(parser.counters().broken, 0);
 }
 
-/// Checks the costliest known input: five bytes of it cause a checksum over 260 bytes. Each sixteen bytes have three
-/// false frame starts.
+/// Checks that the costliest known input causes only one checksum for each five to six bytes. In this input each sixteen bytes have three
+/// false frame starts, each of which costs a checksum over 260 bytes.
 #[test]
 fn adversarial_bytes_cost_one_checksum_per_five_bytes() {
     let made = [

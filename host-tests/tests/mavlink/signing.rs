@@ -51,7 +51,7 @@ fn signed(key: [u8; 32], from: Address, link: u8, stamp: u64) -> Vec<u8> {
     frame
 }
 
-/// Returns the signer's verdict on the only frame in `bytes`.
+/// Returns the signer's result for the only frame in `bytes`: accepted, or the flaw of the frame.
 fn checked(signing: &mut Signing, now: Instant, bytes: &[u8]) -> Result<(), Flaw> {
     let mut parser = Parser::new();
     let mut all = Vec::new();

@@ -7,10 +7,11 @@ use uav_relay_sim::simulator::drones::FlightSpec;
 use super::leaves::{AT_S, departing, freed, on_line, times};
 use super::*;
 
-/// Reserve of all relays in these tests, s; the time of a replacement is 180 s.
+/// Reserve of all relays in these tests, s. In addition, 180 s are reserved for the replacement of a relay.
 const RESERVE_S: u16 = 180;
 
-/// Returns a chain of `relays` with a reserve, for `seconds_s`. Drone `relay` has `left_s` of (relay, time in s) beyond its way home.
+/// Returns the setup of a simulation of `seconds_s` whose relays have a reserve. `left_s` returns a drone's endurance without the way home,
+/// s; its arguments are the relay and the time in s. `None` stands for no new value.
 fn drained(relays: u16, seconds_s: u16, left_s: impl Fn(u16, u16) -> Option<u16>) -> Setup {
     let mut setup = departing(relays, &[]);
     setup.reserve = Some(Duration::from_millis(1_000 * u64::from(RESERVE_S)));
@@ -26,7 +27,7 @@ fn drained(relays: u16, seconds_s: u16, left_s: impl Fn(u16, u16) -> Option<u16>
     setup
 }
 
-/// Returns the first time at which each pilot is told to leave, s, by relay; `None` if he is not.
+/// Returns the first time at which each relay's pilot is told to leave, s; `None` if never.
 fn told(outcome: &Outcome, relays: u16) -> Vec<Option<f64>> {
     let told = |relay| times(outcome, relay, |what| what == TimelineEvent::MustLeave);
     (1..=relays)
@@ -34,9 +35,9 @@ fn told(outcome: &Outcome, relays: u16) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// Checks a fleet that took off together: all reach the limit at the same time, and leave one by one.
+/// Checks that relays leave one by one if all reach the limit of the endurance at the same time.
 ///
-/// The last one is told at its reserve.
+/// The pilot of the last relay is told to leave when only the reserve is left.
 #[test]
 fn a_fleet_of_equal_endurance_leaves_one_by_one() {
     let end_s = 2 * RESERVE_S + AT_S as u16;
@@ -63,7 +64,8 @@ fn a_fleet_of_equal_endurance_leaves_one_by_one() {
     }
 }
 
-/// Checks a fleet whose departures take long: no two pilots are told at once. No drone arrives at its place.
+/// Checks that no two pilots are told to leave within 3 s, although departures take long. They take long because no drone arrives at its
+/// position.
 #[test]
 fn a_slow_fleet_of_equal_endurance_leaves_one_by_one() {
     let end_s = 2 * RESERVE_S + AT_S as u16;
@@ -90,7 +92,8 @@ fn a_slow_fleet_of_equal_endurance_leaves_one_by_one() {
     );
 }
 
-/// Checks a fleet without a guard, whose departures are refused: its pilots are told one by one.
+/// Checks that pilots are told to leave one by one if the chain refuses all departures. The chain refuses them because the relays have no
+/// motion guard.
 #[test]
 fn a_refused_fleet_is_told_one_by_one() {
     let end_s = 2 * RESERVE_S + AT_S as u16;
@@ -109,7 +112,7 @@ fn a_refused_fleet_is_told_one_by_one() {
     assert!((15.0..17.0).contains(&(order[7] - floor_s)), "{order:?}");
 }
 
-/// Checks that a request that is granted is not withdrawn, and that one that waits is.
+/// Checks that a relay withdraws its request to leave when its endurance recovers. A granted request is not withdrawn.
 #[test]
 fn a_request_is_withdrawn_until_it_is_granted() {
     // Relays 3 and 6 are low; 3 has the lower number and leaves first. Both recover right after the request.
@@ -125,7 +128,7 @@ fn a_request_is_withdrawn_until_it_is_granted() {
     assert_eq!(outcome.relays[5].killed, None);
 }
 
-/// Checks that one low value, and an endurance that is low for less than 15 s, cause no departure.
+/// Checks that an endurance that is low for less than 15 s causes no departure.
 #[test]
 fn a_short_low_endurance_causes_nothing() {
     for low_s in [1, 5, 10, 14] {
@@ -145,7 +148,7 @@ fn a_short_low_endurance_causes_nothing() {
     }
 }
 
-/// Checks without a reserve: no endurance makes a relay leave.
+/// Checks that relays without a reserve never leave because of their endurance.
 #[test]
 fn without_a_reserve_no_relay_leaves_by_itself() {
     let mut setup = drained(8, 200, |_, at_s| Some(100_u16.saturating_sub(at_s)));
@@ -155,7 +158,7 @@ fn without_a_reserve_no_relay_leaves_by_itself() {
     assert!(told(&outcome, 8).iter().all(Option::is_none));
 }
 
-/// Checks that a first leader that restarts and asks to leave at once stays outside.
+/// Checks that the initial leader stays outside if it restarts and requests to leave at once.
 #[test]
 fn a_first_leader_that_restarts_and_leaves_stays_outside() {
     let mut setup = departing(8, &[]);
@@ -178,7 +181,8 @@ fn a_first_leader_that_restarts_and_leaves_stays_outside() {
     assert!(taken.iter().all(|at| *at < since), "{taken:?}");
 }
 
-/// Checks that a first leader joins again by `stay`, at the chain's start and after its own restart.
+/// Checks that the initial leader rejoins the chain by `stay` after a request to leave. It stays outside if it was already permitted to
+/// leave. The request comes at the chain's start or after a restart of the leader.
 #[test]
 fn a_first_leader_that_left_joins_again() {
     for at_s in [0, AT_S - 3] {
@@ -206,7 +210,7 @@ fn a_first_leader_that_left_joins_again() {
     }
 }
 
-/// Checks that a restarted relay that asks to leave returns if the others have no quorum without it.
+/// Checks that a restarted relay that requests to leave rejoins if the others need it for a quorum.
 #[test]
 fn a_restarted_relay_that_is_needed_returns() {
     let mut setup = departing(4, &[]);

@@ -7,8 +7,8 @@ use uav_relay_oracle::reference::stochastic::StochasticLink;
 
 use super::*;
 
-/// Returns the time from the last detection of a lost relay until the chain has settled, and a count. It counts the
-/// passes (messages along the chain) after the first `sweeps_before`.
+/// Returns the time from the last report of a lost relay to the settled chain, and a number of passes. Passes are messages along the chain;
+/// the first `sweeps_before` of them do not count.
 fn recovery(outcome: &Outcome, sweeps_before: u32) -> (Duration, u32) {
     let lost = |what| matches!(what, TimelineEvent::Lost(_));
     let last = outcome

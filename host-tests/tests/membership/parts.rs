@@ -67,8 +67,8 @@ fn a_split_chain_heals() {
 /// Returns the largest number of views that one relay accepts while a link goes down and up. A view is a membership
 /// of the chain.
 ///
-/// The link is that from relay `after` to the next relay toward Rx. It changes its state every `half` seconds, for ten
-/// minutes of simulated time.
+/// The link leads from relay `after` to the next relay toward Rx. Its state changes every `half` seconds, for ten minutes of simulated
+/// time.
 fn flaps(half: u64, after: u16) -> usize {
     let mut setup = paper(8);
     for n in 0..600 / (2 * half) {

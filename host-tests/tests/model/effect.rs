@@ -47,8 +47,8 @@ impl World<'_> {
         }
     }
 
-    /// Delivers a frame in transit on `line`, one direction of a link, `times` times; 0 times loses it. The frame
-    /// overtakes `behind` frames in transit; with 0 it is the next frame to arrive.
+    /// Delivers a frame in transit on `line`, one direction of a link, `times` times; with 0 it is lost. The frame overtakes `behind`
+    /// frames in transit; with 0 it is the next frame to arrive.
     fn deliver(&mut self, line: u8, behind: u8, times: usize) -> Checked {
         let Some(line) = self.wires.pick(line) else {
             return Ok(());

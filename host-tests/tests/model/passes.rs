@@ -18,15 +18,15 @@ use super::wires::Pass;
 /// that travels along the chain. No other pass has a multiple of this number.
 const FIRST: u16 = 64;
 
-/// Largest difference by which the number of a late pass is below that of the last pass.
+/// Largest amount by which the number of a late pass can be below the number of the last pass.
 ///
-/// A pass is a round of messages along the chain. A pass whose number is farther below counts as one from before a
-/// reboot. A leader's next number is above its last one by at most this difference.
+/// A pass is a round of messages along the chain. A pass whose number is farther below counts as a pass from before a reboot. A leader's
+/// next number is above its last number by at most this amount.
 const NEAR: u16 = 32;
 
 /// Returns the mark of a membership view: passes carry the mission digest plus this mark.
 ///
-/// It is the lower half of the view's 32-bit name plus the byte-swapped upper half.
+/// The mark is the lower half of the view's 32-bit name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))
@@ -117,9 +117,9 @@ impl Ledger {
         Ok(met)
     }
 
-    /// Returns true if the relay takes part in its membership view's first pass again, after a reboot.
+    /// Returns true if the relay takes part in its view's first pass a second time, after a reboot.
     ///
-    /// A pass is a round of messages along the chain.
+    /// A pass is a round of messages along the chain. A view is a membership of the chain.
     pub(crate) fn repeats_first_pass(&self) -> bool {
         self.pass
             .is_some_and(|pass| pass.is_multiple_of(FIRST) && self.passes_before.contains(&pass))

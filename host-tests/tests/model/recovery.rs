@@ -92,7 +92,7 @@ impl World<'_> {
         Ok(())
     }
 
-    /// Waits for membership views that were requested before the agreement. The chain agrees again after each.
+    /// Waits for membership views that were requested before the agreement. After each view the chain agrees once more.
     fn settle(&mut self, at_most: Duration) -> Checked {
         for _ in 0..MOST_VIEWS {
             let views: Vec<ViewId> = self.relays.iter().map(Relay::view).collect();

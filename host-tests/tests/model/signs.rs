@@ -22,7 +22,7 @@ pub(crate) struct Signs {
     pub(crate) asked: Vec<(u16, Instant)>,
     /// Last time at which the neighbour was certainly alive.
     pub(crate) certainly_alive: Instant,
-    /// Last time at which the neighbour may have been alive, by replies and messages that may be late.
+    /// Last time at which the neighbour was possibly alive. Replies and messages count even if they are late.
     pub(crate) possibly_alive: Instant,
     /// Time at which the last message was received that may prove the neighbour alive.
     pub(crate) last: Instant,

@@ -16,8 +16,7 @@ pub(crate) struct Tally {
     sequences: BTreeMap<(Kind, bool), u64>,
 }
 
-/// Events that must occur. Each has a number of test sequences; at least one of so many sequences must have the
-/// event.
+/// Events that must occur, each with a number n. On average, n test sequences must have at least one such event.
 const EXPECTED: [(&str, u64); 18] = [
     ("frames in bursts", 1),
     ("frames delayed", 1),

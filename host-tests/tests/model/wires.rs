@@ -130,8 +130,7 @@ impl Wires {
         }
     }
 
-    /// Returns one of the recorded frames of `line`, one direction of a link. `which` selects it. Returns `None` if
-    /// there is no such frame.
+    /// Returns one of the recorded frames of `line`, one direction of a link. `which` selects the frame. `None` if no frame is recorded.
     pub(crate) fn recorded(&self, line: usize, which: u8) -> Option<Flying> {
         let recorded = &self.lines[line].recorded;
         let at = usize::from(which) % recorded.len().max(1);

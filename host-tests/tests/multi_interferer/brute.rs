@@ -5,7 +5,7 @@ use uav_relay_scenario::scene::Scene;
 /// Number of grid cells along the line in the first search.
 const CELLS: u32 = 600;
 
-/// Number of segments of the line from Tx to Rx. For each the best chain with relay 1 in it is a candidate.
+/// Number of segments of the line from Tx to Rx. For each segment, the best chain with relay 1 in this segment is a candidate.
 const PARTS: f64 = 16.0;
 
 /// Number of the best candidates that are refined.

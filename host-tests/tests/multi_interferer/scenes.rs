@@ -109,7 +109,7 @@ pub(crate) fn scene(
     Scene::new(&scenario, n).unwrap()
 }
 
-/// Returns the scene of a chain of the reference model. All relays may only have the first relay's altitude.
+/// Returns the scene of a chain of the reference model. The only permitted altitude is that of the first relay.
 pub(crate) fn of_link(link: &Link) -> Scene {
     scene_of(link).unwrap()
 }

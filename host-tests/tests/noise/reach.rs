@@ -4,7 +4,7 @@ use host_tests::placing::{DrawnHop, SINGLE, drawn_hop, generator, reaches_agree}
 use rand::{Rng, RngExt};
 use uav_relay_oracle::random::{count, log_uniform};
 
-/// Draws a target SIR for a hop. Some positions meet the target, or it is near the hop's gain.
+/// Draws a target SIR for a hop: just above the SIR at a random position, or near the hop's gain.
 ///
 /// The gain is the SIR if the hop's sender and the interferer are equally far from the receiver.
 fn target(rng: &mut impl Rng, of: &DrawnHop) -> f32 {

@@ -46,7 +46,8 @@ fn ratio(number: u64) -> Option<f64> {
     Some(target / best.sir)
 }
 
-/// Checks that 95 % of the scenes are within 0.1 % of the recorded optimum, and few are above it.
+/// Checks that 95 % of the target SIRs are at least 0.999 of the recorded optimum. At most 2 % may be more than 0.1 % above it, because the
+/// recorded search may miss the optimum.
 #[test]
 fn the_joint_optimum_is_found_in_noise() {
     let count = count(60) as u64;

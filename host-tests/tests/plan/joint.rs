@@ -105,7 +105,7 @@ fn of_link(link: &Link, corridor: Corridor) -> Scenario {
     }
 }
 
-/// Returns the fraction by which a plan's SIR is below that of the simulated relays' positions.
+/// Returns the fraction by which a plan's SIR is below the SIR at the simulated relays' positions.
 ///
 /// The result is -inf without an agreement.
 fn short(scenario: &Scenario, relays: u16) -> f64 {
@@ -170,8 +170,8 @@ fn a_plan_for_different_relays_is_what_they_agree_on() {
     }
 }
 
-/// Checks that the relays reach the SIR of the plan if one of them keeps a high altitude. The others may have to take
-/// another side of the interferer.
+/// Checks that the relays reach the SIR of the plan if one of them keeps a high altitude. For this the other relays may have to move to the
+/// other side of the interferer.
 #[test]
 fn the_others_take_the_side_of_a_fixed_altitude() {
     for altitude_m in [60.0, 120.0, 200.0, 300.0] {
@@ -213,8 +213,8 @@ fn over_the_judge(number: u32, optimum: f64) -> f64 {
 
 /// Checks that plans for forty scenarios of up to 30 relays come near the stored optima.
 ///
-/// `COUNT=2000` runs all scenarios, with up to 100 relays. No plan reaches less than 0.98 of the optimum, and these are short
-/// of it by more than a thousandth:
+/// `COUNT=2000` runs all scenarios, with up to 100 relays. Every plan reaches at least 0.98 of the optimum. Only these plans are more than
+/// a thousandth below the optimum:
 ///
 /// | number | relays | reached | why |
 /// | --- | --- | --- | --- |

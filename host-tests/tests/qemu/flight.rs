@@ -45,7 +45,7 @@ fn wait_for_line(fleet: &mut Fleet, text: &str) {
     fleet.wait(text, |lines| lines.iter().any(|line| line.text == text));
 }
 
-/// Checks a flight from the start, through setpoint control, until the pilot takes control again.
+/// Checks that a drone flies to its position under setpoint control. When the pilot takes control, the relay must no longer move the drone.
 fn flies_to_its_place(image: Image, kind: Kind) {
     let to = agreed();
     // A PX4's mode choice expires after 0.8 s of silence, and at ten times the speed this process may be delayed for as long.

@@ -14,7 +14,7 @@ use crate::fleet::{PATIENCE, image};
 #[expect(unreachable_pub, reason = "as in the image")]
 mod answer;
 
-/// Returns the answers to each frame in `heard` by the firmware's code, compiled for this computer.
+/// Returns the answers of the firmware's code to the frames in `heard`. The code is compiled for this computer.
 fn here(heard: &[u8]) -> Vec<Vec<u8>> {
     let mut answerer = answer::Answerer::new();
     let mut answers = vec![Vec::new()];

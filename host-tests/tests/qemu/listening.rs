@@ -42,7 +42,7 @@ fn scene() -> Scene {
     Scene::new(&known, RELAYS).unwrap()
 }
 
-/// Returns the three positions at which a drone measures, to which its pilot flies it.
+/// Returns the three positions to which a drone's pilot flies it for measurements.
 fn places(drone: u16) -> [Placement; 3] {
     let x_m = 336.0 * f32::from(drone);
     [[-60.0, 70.0, 30.0], [20.0, -50.0, 45.0], [90.0, 10.0, 60.0]].map(|[x, y_m, altitude_m]| {

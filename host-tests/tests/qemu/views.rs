@@ -22,7 +22,7 @@ fn blocks(flight: &Flight) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Returns a flash with the voting records `said`, the last of which a power failure has truncated.
+/// Returns a flash with the voting records `said`. A power failure has truncated the last record.
 fn flash(block: &[u8], said: &[ViewRecord]) -> Vec<Kept> {
     let check = u32::from_le_bytes(*block.last_chunk().unwrap());
     let mut flash = Ram::blank(SMALL, 1);

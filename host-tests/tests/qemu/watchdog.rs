@@ -8,10 +8,12 @@ use uav_relay_tools::provision::config;
 use crate::chain::paper;
 use crate::fleet::{Image, PATIENCE, image};
 
-/// Trace prefix of QEMU's device at the watchdog's address.
+/// First words of QEMU's trace line for a write to the watchdog.
+///
+/// QEMU has no watchdog: its device `I2S2ext` covers the address of the watchdog.
 const DEVICE: &str = "I2S2ext: unimplemented device write (size 4, ";
 
-/// Register writes that start, unlock and set the watchdog to 6 s, and feed it.
+/// Register writes that start the watchdog, unlock it, set it to 6 s and feed it, in this order.
 const BEGINS: [&str; 5] = [
     "offset 0x000, value 0x0000cccc)",
     "offset 0x000, value 0x00005555)",

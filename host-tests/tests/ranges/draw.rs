@@ -195,7 +195,7 @@ pub(crate) fn settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     }
 }
 
-/// Draws settings that all relays of a chain share. With them an agreement may take arbitrarily long.
+/// Draws settings that all relays of a chain share. With these settings an agreement can take arbitrarily long.
 pub(crate) fn slow_settings(rng: &mut impl Rng, mission: &Mission) -> Settings {
     let usual = settings(rng, mission);
     let micros = |most: f64, rng: &mut _| f64::from(scaled(rng, 3e4, 1e3, 1e13)).min(most) as u64;

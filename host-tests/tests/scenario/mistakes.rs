@@ -240,7 +240,7 @@ fn noise_out_of_range_is_refused_with_its_range() {
     ));
 }
 
-/// Checks that a wrong UDP address of the autopilot is refused in the file, before any flight.
+/// Checks that a scenario file with a wrong address of the autopilot is refused.
 #[test]
 fn an_autopilot_at_no_udp_port_is_refused() {
     let file = |autopilot: &str| small(&format!("[companion]\nautopilot = {autopilot}\n"));

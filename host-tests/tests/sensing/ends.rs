@@ -80,8 +80,8 @@ fn measurements_at_rx_reach_all_relays_by_radio() {
     }
 }
 
-/// Checks that the measurements of Tx and Rx more than double the SIR of each scene. Without them the last hop is
-/// planned with the mission's wrong path loss on the ground.
+/// Checks that the measurements of Tx and Rx more than double the SIR of each scene. Without these measurements the last hop is planned
+/// with the mission's wrong path loss on the ground.
 #[test]
 fn measurements_of_tx_and_rx_raise_the_sir() {
     let told = flown(|_| {});

@@ -130,7 +130,7 @@ fn one_wrong_sensor_of_tx_or_rx_costs_little_sir() {
 /// Checks that chains of one or two relays never report a correct sensor as wrong. Instead these chains report that no single interferer
 /// fits.
 ///
-/// Chains of three or four relays may report a correct sensor as wrong in 2 % of the scenes.
+/// Chains of three or four relays may report a correct sensor as wrong in at most 2 % of the scenes.
 #[test]
 fn a_short_chain_seldom_accuses_a_correct_sensor() {
     for relays in [1, 2, 3, 4] {

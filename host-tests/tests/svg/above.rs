@@ -150,7 +150,7 @@ fn an_interferer_far_beside_the_line_is_an_arrow_at_the_edge() {
     }
 }
 
-/// Checks that the side view draws an interferer hollow beside the line, and filled on the line. The legend explains
+/// Checks that in the side view the marker of an interferer beside the line is hollow. On the line it is filled. The legend must explain
 /// each marker.
 #[test]
 fn from_the_side_an_interferer_beside_the_line_is_hollow() {

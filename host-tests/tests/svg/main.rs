@@ -35,7 +35,7 @@ fn level(relays: usize) -> Picture {
     chain(relays, 1000.0, |_| 20.0)
 }
 
-/// Returns pictures of chains that together have every possible content.
+/// Returns pictures of chains that together contain every kind of drawn object.
 fn gallery() -> Vec<Picture> {
     let mut pictures: Vec<Picture> = [1, 2, 8, 20, 21, 50, 100, 1000].map(level).into();
     pictures.push(chain(5, 10.0, |_| 20.0));

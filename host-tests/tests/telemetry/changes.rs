@@ -38,7 +38,7 @@ fn place(rng: &mut ChaCha8Rng) -> Placement {
     }
 }
 
-/// Checks that a position reaches the station right after a report without a position.
+/// Checks that a position that a relay receives only once still reaches the station.
 #[test]
 fn a_position_that_is_given_once_reaches_the_station() {
     for (relays, access) in [(2, None), (4, None), (8, Some(Access::Ideal))] {
@@ -74,7 +74,7 @@ fn a_position_that_is_given_once_reaches_the_station() {
     }
 }
 
-/// Checks that the station knows every relay's last state in time after the last change.
+/// Checks that the station knows the last state of every relay within seconds after the last change.
 #[test]
 fn the_last_state_reaches_the_station() {
     for seed in 0..40 {
@@ -148,8 +148,8 @@ fn begins_alarm(before: State, now: State) -> bool {
     before != now && (matches!(now, State::Silent | State::Blind) || before == State::Engaged)
 }
 
-/// Checks the time until the station knows that an alarm has begun. Missions are uploaded, so that the chain often agrees
-/// on new positions meanwhile.
+/// Checks that the station knows of each new alarm in time. Missions are uploaded, so that the chain often agrees on new positions
+/// meanwhile.
 #[test]
 fn alarms_are_known_in_time() {
     let (mut delays_s, mut ages_s, mut most) = (Vec::new(), Vec::new(), 0.0_f64);

@@ -42,7 +42,7 @@ fn setup(relays: u16, access: Option<Access>, from: Instant, until: Instant) -> 
     setup.soaked(until)
 }
 
-/// Returns places of the drones, evenly spaced on the line from Tx to Rx.
+/// Returns positions of the drones, evenly spaced on the line from Tx to Rx.
 fn evenly(setup: &Setup) -> Vec<Point> {
     let (relays, config) = (setup.mission.relays(), setup.mission.config());
     let place = |index: u16| -> Point {
@@ -109,13 +109,13 @@ impl Figures {
         }
     }
 
-    /// Returns the age that the worst relay's reports do not exceed for the fraction `share` of the time.
+    /// Returns the quantile `share` of the age of a relay's reports, s, for the worst relay.
     fn age_s(&self, share: f64) -> f64 {
         let all = self.ages_s.iter().map(|ages| quantile(ages, share));
         all.fold(0.0, f64::max)
     }
 
-    /// Returns the bytes per second of Watches and Reports on the most loaded link, in any 30 s.
+    /// Returns the highest rate of Watches and Reports on one link, bytes/s, as a mean over any 30 s.
     fn most_bytes(&self, between: [Instant; 2]) -> f64 {
         let mut most: f64 = 0.0;
         let links: std::collections::BTreeSet<String> = self
@@ -334,7 +334,7 @@ fn a_lost_relay_and_a_restarted_one() {
     assert!(later.age_s(0.95) <= 10.0, "{}", later.age_s(0.95));
 }
 
-/// Checks that relays report to a station again after their restart. A restarted relay has a new session with the station.
+/// Checks that relays resume their reports to a station after their restart. A restarted relay has a new session with the station.
 #[test]
 fn relays_next_to_the_station_report_again_after_a_restart() {
     for (access, relay) in [(Some(Access::Csma), 1), (Some(Access::Csma), 2), (None, 1)] {

@@ -181,8 +181,7 @@ fn one_relay_aside_has_the_recorded_optimum() {
     );
 }
 
-/// Checks that the solution without lateral offsets agrees with Theorems 1 and 3. If lateral offsets are permitted,
-/// the solution never is worse.
+/// Checks that the solution without lateral offsets agrees with Theorems 1 and 3. With lateral offsets its SIR must be at least as high.
 #[test]
 fn without_lateral_range_it_is_theorems_1_and_3() {
     let mut rng = ChaCha8Rng::seed_from_u64(random::seed(514));

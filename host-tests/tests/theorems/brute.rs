@@ -3,8 +3,7 @@
 use super::scene::Scene;
 
 impl Scene {
-    /// Returns the best SIR over a box of x and altitude, by brute force. The search is along lines, then around the
-    /// best points.
+    /// Returns the best SIR in ranges of x and altitude, by brute force. The search is along lines first, then around the best points.
     pub(crate) fn brute(&mut self, x: (f64, f64), h: (f64, f64)) -> f64 {
         let lines = |(low, high): (f64, f64)| {
             if low < high {

@@ -97,8 +97,8 @@ impl LateralScene {
         [(0.0, self.scene.link.distance_m), self.lateral, band]
     }
 
-    /// Returns the best SIR over a box of x, y and altitude, by brute force: a grid, then random searches. These
-    /// begin at the best points of the grid that are far from each other.
+    /// Returns the best SIR in ranges of x, y and altitude, by brute force: a grid, then random searches. The random searches begin at the
+    /// best points of the grid that are far from each other.
     pub(crate) fn brute(&self, ranges: [(f64, f64); 3]) -> f64 {
         let link = &self.scene.link;
         let of = [

@@ -202,8 +202,8 @@ fn an_upload_outside_the_geofence_is_refused_and_reported() {
 
 /// Checks that a relay with its own altitude refuses an upload as the other relays do.
 ///
-/// The uploaded altitude is outside the permitted range. It is within that relay's geofence only because the geofence
-/// includes the relay's own altitude.
+/// The uploaded altitude is outside the permitted range of all relays. The geofence of this relay includes its own
+/// altitude, and therefore the uploaded altitude as well. The relay must refuse the upload nevertheless.
 #[test]
 fn a_relay_with_its_own_altitude_refuses_like_the_others() {
     let base = at_120(3, Band::at(120.0));

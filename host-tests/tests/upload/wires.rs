@@ -99,7 +99,7 @@ impl Wires {
             .collect();
     }
 
-    /// Returns true if every relay has once agreed on its position.
+    /// Returns true if every relay has agreed on a position at least once.
     pub(crate) fn has_converged(&self) -> bool {
         let all = 0..self.bench.relays.len();
         all.into_iter()

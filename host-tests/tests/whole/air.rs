@@ -138,9 +138,9 @@ pub(crate) struct Air {
     pub(crate) whole_since_us: Option<u64>,
     /// Number of relays that may lack an agreed position while the chain counts as flying (`flown_us`).
     pub(crate) spare: usize,
-    /// Total time in which at most `spare` relays had no position of the common agreement, µs.
+    /// Total time in which all relays, except up to `spare`, had a position of one agreement, µs.
     pub(crate) flown_us: u64,
-    /// Time at which at most `spare` relays had no position of the common agreement for the first time, µs.
+    /// First time at which all relays, except up to `spare`, had a position of one agreement, µs. `None` before then.
     pub(crate) first_us: Option<u64>,
     /// Longest time in which more than `spare` relays lacked an agreed position, µs.
     pub(crate) longest_us: u64,

@@ -18,8 +18,8 @@ fn event_count(air: &Air, name: &str) -> u32 {
     air.events.iter().filter_map(of).sum()
 }
 
-/// Checks that relays have agreed positions nearly all the time although one link is one-way. The chain may leave out
-/// one of the four relays.
+/// Checks that a chain of four with a one-way link has agreed positions nearly all the time. The chain is permitted to
+/// leave one relay out.
 #[test]
 fn a_permanent_one_way_link_leaves_out_one_relay_for_good() {
     let mut late = Vec::new();
@@ -99,9 +99,9 @@ fn one_flapping_link_costs_a_tenth_of_the_time_at_most() {
     assert!(worst.is_empty(), "{worst:?}");
 }
 
-/// Checks that a relay outside the chain does not attract a relay of the chain. Relay 3 is left out, and has links to
-/// neither relay 1 nor relay 2. If its hello counted these two as linked to it, relay 6 would choose relay 3 as its
-/// neighbour in place of relay 5 every 16 s.
+/// Checks that a relay outside the chain does not attract a relay of the chain. Relay 3 is left out of the chain, and
+/// has links to neither relay 1 nor relay 2. Relay 3's hello must not count these two as connected to relay 3:
+/// otherwise relay 6 chooses relay 3 as its neighbour in place of relay 5 every 16 s.
 #[test]
 fn a_left_out_relay_attracts_no_other() {
     let (air, share) = flown_with_flaps(2, (10_191_000, 25_107_000), 325);
@@ -111,8 +111,8 @@ fn a_left_out_relay_attracts_no_other() {
 
 /// Random seeds of links that stay up a little longer than the longest hold-down of 90 s.
 ///
-/// A relay does not use a link that fails often for the time of the hold-down. In these runs one end of the link uses
-/// the link again before the other end. Soon afterwards the link is lost again.
+/// After repeated losses of a link, a relay does not use the link until the hold-down has passed. In these runs one end
+/// of the link uses it earlier than the other end. Soon afterwards the link is lost again.
 const UP_FOR_100_S: [u64; 6] = [206, 264, 321, 520, 663, 878];
 
 /// Checks that one flapping link costs at most a tenth of the time with agreed positions. The link fails and returns
@@ -172,7 +172,8 @@ fn a_mission_mismatch_is_reported_once_a_minute() {
     }
 }
 
-/// Checks that an epoch of relay 2 that goes back is reported, and costs few frames.
+/// Checks that the chain reports a relay whose epoch is lower after a reboot, and sends few frames. An epoch is the
+/// part of a nonce that rises at every start of a relay. At most 6 frames a second are permitted.
 #[test]
 fn a_returning_epoch_on_wires_is_reported_and_costs_little() {
     for wiring in [Wiring::Pair, Wiring::Shared] {

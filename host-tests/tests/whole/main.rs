@@ -33,7 +33,7 @@ struct Measured {
     whole_s: Option<f64>,
     groups: usize,
     groups_s: f64,
-    /// Longest time in which a relay and its copy had setpoints although they received each other, s.
+    /// Longest time, s, in which two drones with the same index both had setpoints and received each other.
     both_s: f64,
     text: String,
 }
@@ -142,11 +142,11 @@ fn ends_whole(schedule: fn(u64) -> Schedule) {
     assert!(late.is_empty() && two.is_empty());
 }
 
-/// Checks that of a relay and its copy, one loses its setpoint within 2 s.
+/// Checks that of two drones with the same index, one loses its setpoint within 2 s.
 ///
-/// The copy is a second drone with the same index. The chain must be whole once one of the two is removed. Two
-/// agreements may be in use at the same time only if a cut separates relay and copy: both of them vote then, so that
-/// two parts may have a quorum.
+/// The second drone is called the copy. The chain must be whole once one of the two is removed. Two agreements may be
+/// in use at the same time only if a cut separates relay and copy: then both vote, so that two parts of the chain can
+/// have a quorum.
 #[test]
 fn with_a_duplicate_one_chain_flies_and_recovers_later() {
     let (first, count) = (number("SEED", 1), number("COUNT", 150));
@@ -176,8 +176,8 @@ fn with_a_duplicate_one_chain_flies_and_recovers_later() {
 
 /// Checks that a chain becomes whole again after schedules of faults that are hard to recover from.
 ///
-/// The difficulties are numbers of membership views far ahead, an idle neighbour that is switched on elsewhere, two
-/// interleaved chains, and two candidates for one position that are received in turn.
+/// The difficulties are a relay that knows far higher view numbers, an idle neighbour that is switched on elsewhere,
+/// two interleaved chains, and two candidates for one position that are received in turn.
 #[test]
 fn schedules_that_once_got_stuck_end_in_one_chain() {
     for seed in [105, 218, 587, 593, 371, 1_463] {
@@ -242,7 +242,7 @@ fn a_drone_switched_on_hours_early_joins_within_120_s() {
     assert!(late.is_empty(), "{late:?}");
 }
 
-/// Checks that a chain recovers if one relay has a stored vote on a far later membership view. The vote is from an
+/// Checks that a chain recovers if one relay has a stored vote on a view with a far higher number. The vote is from an
 /// earlier flight.
 #[test]
 fn a_relay_with_far_later_views_joins_within_120_s() {
@@ -268,8 +268,8 @@ fn a_relay_with_far_later_views_joins_within_120_s() {
 
 /// Runs chains whose clocks step by up to ten hours. In half of them a relay is isolated for three minutes.
 ///
-/// Returns the number of chains, the results of those that recovered late, and the results of those in which two
-/// agreements were in use at the same time.
+/// If `forward`, about half of the steps are forward, otherwise all are back. Returns the number of chains, the results
+/// of those that recovered late, and the results of those in which two agreements were in use at the same time.
 fn with_steps(forward: bool) -> (u64, Vec<Measured>, Vec<Measured>) {
     let (mut late, mut two) = (Vec::new(), Vec::new());
     let count = number("COUNT", 200);
@@ -310,7 +310,7 @@ fn clocks_that_step_back_leave_one_whole_chain() {
 
 /// Checks that clocks that step forward seldom let two agreements be in use at the same time.
 ///
-/// A relay whose clock steps forward stops waiting for the leases of others too early. Two parts of the chain may
+/// A relay whose clock steps forward stops waiting for the other relays' leases too early. Two parts of the chain can
 /// then use different agreements until these leases expire.
 #[test]
 fn clocks_that_step_forward_seldom_split_the_chain() {

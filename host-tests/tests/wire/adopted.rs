@@ -13,9 +13,9 @@ use super::offer::{KEPT, kept, mission_id, upload};
 use super::signed::{NOW, SignedBench, settings};
 use super::votes::*;
 
-/// Returns relay 4, which has adopted an upload of mission version 2, and the upload.
+/// Returns relay 4 after it adopted an upload of mission version 2, and this upload.
 ///
-/// It adopted the upload in membership view 1 of all eight relays.
+/// Relay 4 adopted the upload in membership view 1 of all eight relays.
 fn adopted() -> (SignedBench, WireMessage) {
     let mut met = SignedBench::fourth();
     let newer = upload(2, met.base);

@@ -106,10 +106,10 @@ struct Step {
     message: WireMessage,
     right_side: bool,
     right_mission: bool,
-    /// Offset of the message's pass number from the expected one.
+    /// Difference between the number of the message's pass and the expected number.
     ///
-    /// A pass is a round of messages along the chain. A message along the chain is expected to have the number of the
-    /// next pass; its answer, the number of the pass sent last.
+    /// A pass is a message along the chain. An onward pass is expected to have the next number, its answer the number
+    /// of the onward pass sent last.
     off: i16,
     tame: bool,
     /// Time until the next step of the test, ms.
@@ -150,11 +150,11 @@ struct Flight {
     /// Messages of the test, one of each tag, in the order of the tags.
     kinds: Vec<WireMessage>,
     ports: (Port, Port),
-    /// True once the relay may have accepted a pass, a message that travels along the chain.
+    /// True once the test has sent a pass (message along the chain) that the relay can accept.
     begun: bool,
     /// Number of the last pass (message that travels along the chain) that was sent to the relay.
     pass: u16,
-    /// Number of the last pass (message that travels along the chain) that the relay may have accepted.
+    /// Number of the last pass (message along the chain) sent to the relay that the relay can accept.
     last: u16,
     view: ViewId,
 }
@@ -162,8 +162,8 @@ struct Flight {
 impl Flight {
     /// Returns the messages of a step with the ports at which they arrive.
     ///
-    /// These are the step's message, and perhaps the next neighbour's answer if the message starts a round along the
-    /// chain.
+    /// The first is the step's message. If it starts a round along the chain, and `answered` is true, the next
+    /// neighbour's answer follows.
     fn messages(&mut self, step: &Step) -> Vec<(Port, WireMessage)> {
         let (from, to) = self.ports;
         let tag = step.message.tag();

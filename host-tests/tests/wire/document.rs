@@ -31,7 +31,7 @@ fn code(cell: &str) -> &str {
     cell.strip_prefix('`').unwrap().strip_suffix('`').unwrap()
 }
 
-/// Returns the bytes of an example twice: from the annotated rows, and from the code block.
+/// Returns the bytes of an example in `FORMAT.md` twice: from its table, and from its code block.
 fn example(section: &str) -> (Vec<u8>, Vec<u8>) {
     let hex = |text: &str| bytes(&text.split_whitespace().collect::<String>()).unwrap();
     let mut plain = Vec::new();

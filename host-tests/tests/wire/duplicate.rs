@@ -57,8 +57,10 @@ fn a_neighbours_claim_is_echoed_to_its_number() {
     }
 }
 
-/// Checks that a relay becomes passive if a larger claim names the relay's own claim number. A claim that does not
-/// name this number may be from before the relay's start, and is only answered.
+/// Checks that a relay turns passive if a larger claim names the relay's own claim number.
+///
+/// A claim is larger if its number is. A claim that does not name the relay's number may date from before the relay's
+/// start: the relay answers it and stays active.
 #[test]
 fn the_smaller_claim_turns_passive_and_the_larger_answers() {
     for (wiring, port) in PORTS {

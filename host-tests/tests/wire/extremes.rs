@@ -60,7 +60,7 @@ fn note_one(path: &str, value: &Value<'_>, seen: &mut BoundsSeen) {
     seen.entry(path.to_owned()).or_default().insert(text);
 }
 
-/// Adds to `all` the values of the field `path` that some test vector must have.
+/// Adds to `all` the values of the field `path` that at least one test vector must have.
 fn wanted(path: &str, field: &Field, kind: &Kind, all: &mut BoundsSeen) {
     let mut want = |text: String| {
         all.entry(path.to_owned()).or_default().insert(text);

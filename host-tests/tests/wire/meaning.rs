@@ -20,7 +20,7 @@ use uav_relay_decode::value::{Fields, Value};
 use super::message::{WireMessage, list, number};
 use super::offer;
 
-/// Fields of a message, or of a group in it, which are read in the types of the crate.
+/// Fields of a message, or of a group in it. The functions return their values in the crate's types.
 struct MessageFields<'a>(&'a Fields<'static>);
 
 impl MessageFields<'_> {
@@ -83,7 +83,7 @@ impl MessageFields<'_> {
     }
 }
 
-/// Returns the crate's message with the values that `wire_message` has by the tables of the format.
+/// Returns `wire_message` as the crate's type of message, with the same values.
 pub(crate) fn message(wire_message: &WireMessage) -> Message {
     let fields = wire_message.fields();
     let of = MessageFields(&fields);

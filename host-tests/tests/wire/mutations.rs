@@ -89,7 +89,8 @@ fn quads(message: &str, body: &[u8]) -> Vec<[u8; 4]> {
     quads
 }
 
-/// Returns f64 to try in an offer: limits, multiples of its path-loss factors, and their neighbours.
+/// Returns f64 to try in an offer: limits, path-loss factors, and the f64 next to each of these. The factors are the
+/// body's own, and 1e20 times these.
 fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     let own = body
         .windows(8)
@@ -100,7 +101,7 @@ fn octets(body: &[u8]) -> Vec<[u8; 8]> {
     near.chain(strange).map(f64::to_le_bytes).collect()
 }
 
-/// Asserts that the crate decodes or refuses a body as the tables of the format do. Returns the verdict.
+/// Asserts that the crate decodes or refuses a body as the tables of the format do. Returns the result of both.
 fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     let read = Message::decode(body);
     let verdict = read.as_ref().map(|_| ()).map_err(|error| *error);
@@ -111,7 +112,7 @@ fn compared(body: &[u8], name: &str) -> Result<(), MessageError> {
     verdict
 }
 
-/// Numbers of message bodies by verdict: accepted, wrongly encoded, out of range.
+/// Numbers of message bodies by result of decoding: accepted, wrongly encoded, out of range.
 #[derive(Default, Debug)]
 struct VerdictCounts([usize; 3]);
 

@@ -19,9 +19,9 @@ pub(crate) const SITES: [&str; 6] = [
 const RELAYS: usize = 5;
 /// Offset of the noise power from the start of an offer's body, bytes. A body is a frame without header and CRC.
 const NOISE: usize = 83;
-/// Offset of the return direction's fields in an offer's body, bytes. They are `reverse` and the power of Rx.
+/// Offset in an offer's body, bytes, of the fields of the direction Rx to Tx. They are `reverse` and the power of Rx.
 const BACK: usize = 87;
-/// Offset in an offer's body of the SNR gap of fitted slots, bytes.
+/// Offset in an offer's body, bytes, of the SNR gap for time slots that are as long as each hop needs.
 const GAP: usize = 95;
 const SITES_AT: usize = 99;
 

@@ -69,7 +69,7 @@ proptest! {
     }
 }
 
-/// Checks that the crate decodes a body by the tables of `FORMAT.md`, or refuses it as they do.
+/// Checks that the crate and the tables of `FORMAT.md` decode a body to the same message or error.
 fn check_by_tables(body: &[u8]) {
     let read = Message::decode(body);
     match WireMessage::read(body) {
@@ -184,7 +184,7 @@ fn node_numbers_out_of_range_are_not_encoded() {
     }
 }
 
-/// Checks that a sweep with a joint solution is encoded as message `Aside`, without measured values.
+/// Checks that a sweep of the joint method is encoded as message `Aside`. This message has no measured value.
 #[test]
 fn joint_sweeps_are_asides_even_on_the_line() {
     let sweep = |chosen, measured_per_w| Sweep {

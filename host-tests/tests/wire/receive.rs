@@ -93,7 +93,7 @@ fn near_relay_4() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Sends random pieces of frames to relay `index` of 8. All statistics counters in `expected` must occur.
+/// Sends random pieces of frames to relay `index` of 8. Asserts that every counter named in `expected` counts.
 fn fed_with_anything(
     interference: Interference,
     index: u16,

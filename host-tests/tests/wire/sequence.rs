@@ -135,8 +135,9 @@ fn a_token_is_forwarded_and_its_result_returned() {
 
 /// Checks that messages that the relay does not await are stale.
 ///
-/// Such messages answer another message, or are of another kind, or belong to a round along the chain that is over.
-/// Tokens (messages of Algorithm 2) are stale without a position, in a field of interference, or beyond Rx.
+/// The relay does not await answers to other messages, messages of another kind, or messages of a round that is over. A
+/// token (message of Algorithm 2) is stale if the relay has no position, if the interference is a field, or if the
+/// token's position is beyond Rx.
 #[test]
 fn unexpected_or_unfit_messages_are_stale() {
     for config in missions() {
@@ -167,10 +168,10 @@ fn unexpected_or_unfit_messages_are_stale() {
     }
 }
 
-/// Checks that a sweep message drops the target SIRs that would need its sender beyond Rx.
+/// Checks that a sweep message drops the target SIRs that would put its sender beyond Rx.
 ///
-/// In a field of interference, the message lists the position that its sender needs for each target SIR. Here no
-/// target remains, so that the relay forwards an empty list.
+/// In a field of interference, the message lists the position that its sender needs for each target SIR. Here no target
+/// remains, so that the relay forwards an empty list.
 #[test]
 fn a_reach_beyond_rx_leaves_no_feasible_target() {
     let (mut bench, from, to) = relay_4(mission(Interference::Field(FIELD)));
@@ -181,8 +182,8 @@ fn a_reach_beyond_rx_leaves_no_feasible_target() {
     assert!(out[0].1.is("Sweep") && out[0].1.list("reach_m").is_empty());
 }
 
-/// Checks that the smallest target SIRs are met in a field of interference. This must hold although intermediate
-/// values exceed f32.
+/// Checks that the smallest target SIRs are met in a field of interference. This must hold although intermediate values
+/// exceed the range of f32.
 #[test]
 fn the_smallest_targets_are_met_in_a_field() {
     for (field, anchor) in [

@@ -57,9 +57,9 @@ fn on_a_channel_the_four_nearest_of_each_side_are_received() {
     }
 }
 
-/// Checks that a relay sends nothing to a neighbour that reports no neighbour of its own.
+/// Checks that a relay sends nothing to a node whose hello states that the node has no neighbour.
 ///
-/// Once the neighbour chooses this relay again, and knows a newer membership view, the relay requests a view.
+/// Once this node chooses the relay as its neighbour, and knows a newer view, the relay requests a view.
 #[test]
 fn a_returning_neighbours_newer_view_causes_a_request() {
     for (newest, calls) in [(0, false), (id(5, 1), true)] {
@@ -76,9 +76,9 @@ fn a_returning_neighbours_newer_view_causes_a_request() {
     }
 }
 
-/// Checks that a relay holds a sweep message back while its next neighbour has chosen another node.
+/// Checks that a relay forwards no sweep message while its next neighbour has chosen another node.
 ///
-/// It forwards the message once the neighbour has chosen this relay.
+/// The relay forwards the message once the neighbour has chosen this relay.
 #[test]
 fn a_pass_waits_for_a_neighbour_busy_with_another() {
     let (mut bench, sweep) = sixth();

@@ -63,7 +63,7 @@ impl DerefMut for SignedBench {
 }
 
 impl SignedBench {
-    /// Creates relay `own` of `mission`, which does nothing yet. The relay has authenticated the nodes of `peers`, each at its port.
+    /// Creates relay `own` of `mission`, which has nothing more to send. It has authenticated each node of `peers` at the given port.
     pub(crate) fn new(
         mission: Mission,
         own: u16,
@@ -95,8 +95,8 @@ impl SignedBench {
         Self::new(mission, 4, settings, &peers)
     }
 
-    /// Delivers a message of peer `peer`. Returns the frames that the relay then sends. A mission offer is changed to
-    /// answer the relay's current hello.
+    /// Delivers a message of peer `peer`. Returns the frames that the relay then sends. A mission offer first gets the number of the
+    /// relay's current hello, so that it counts as an answer.
     pub(crate) fn receive(
         &mut self,
         peer: usize,
@@ -130,7 +130,7 @@ impl SignedBench {
         self.relay.handle_bytes(now, peer.port, &frame);
     }
 
-    /// Returns the number in the hello with which the relay would answer a request of peer `peer`.
+    /// Returns the offer number in the relay's next hello to peer `peer`. A mission offer must repeat this number.
     pub(crate) fn offer_number(&self, peer: usize, now: Instant) -> u16 {
         let mut asked = self.clone();
         let node = asked.peers[peer].node;
@@ -180,7 +180,7 @@ impl SignedBench {
         counted(self.relay.stats())
     }
 
-    /// Returns the digest and version of the uploaded mission that the relay has stored, if any.
+    /// Returns the digest and version of the stored uploaded mission; `None` without one.
     pub(crate) fn held(&self) -> Option<(u16, u16)> {
         let mission_id = self.relay.upload().map(Upload::id)?;
         Some((mission_id.digest, mission_id.version))

@@ -16,8 +16,7 @@ use super::signed::{NOW, SignedBench, settings};
 use super::uploads::fourth;
 use super::votes::{FLIES, REFUSED, WHOLE, hello};
 
-/// Latitude, longitude and height of Tx, then of Rx: a kilometre apart to the millimetre. Units are 1e-7 degrees and
-/// mm.
+/// Latitude, longitude and height of Tx, then of Rx, in units of 1e-7 degrees and mm. Their distance is 1000.000 m.
 const A_KILOMETRE: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -47,9 +46,9 @@ fn farther(base: u16, east: i32) -> (WireMessage, [i32; 6]) {
     (with_sites(&upload(2, base), sites), sites)
 }
 
-/// Checks that an upload is refused if the positions of Tx and Rx do not fit its length.
+/// Checks that an upload is refused if its positions of Tx and Rx do not fit its Tx-Rx distance.
 ///
-/// Relays that do not use these positions refuse it, too, because all relays of a chain must decide alike.
+/// Relays that do not use these positions refuse the upload, too, because all relays of a chain must decide alike.
 #[test]
 fn an_upload_whose_sites_do_not_fit_its_distance_is_refused() {
     for sited in [false, true] {
@@ -182,8 +181,8 @@ fn a_fence_along_another_line_is_stale_and_has_no_effect() {
     assert_eq!(stale(&met, line), (1, 0));
 }
 
-/// Checks that a relay whose new mission is along another line waits until its drone can have stopped. Meanwhile the
-/// relay has no setpoint.
+/// Checks that a relay whose new mission is along another line waits long enough for its drone to stop. During this
+/// time the relay has no setpoint.
 #[test]
 fn along_a_new_line_a_relay_stops_before_it_has_a_setpoint() {
     let config = paper(1);

@@ -23,7 +23,7 @@ pub(crate) fn headers() -> impl Strategy<Value = Header> {
     )
 }
 
-/// Draws valid messages of the kinds `names`. A draw shrinks to a message of zeros.
+/// Draws valid messages of the kinds `names`. After a failure, proptest simplifies a message to one of zeros.
 pub(crate) fn kinds(names: &'static [&'static str]) -> BoxedStrategy<WireMessage> {
     (proptest::sample::select(names), vec(any::<u8>(), 0..400))
         .prop_map(|(name, bytes)| {

@@ -14,8 +14,8 @@ use super::strategies::{headers, pieces};
 
 type Outcome = Result<Vec<u8>, DeframeError>;
 
-/// Returns the frames and errors that the deframer finds in a stream, byte by byte. Checks that decoding in runs
-/// gives the same.
+/// Returns the frames and errors that the deframer finds in a stream, byte by byte. Checks that it finds the same in
+/// runs of several bytes.
 fn deframed(stream: &[u8]) -> Vec<Outcome> {
     let mut deframer = Deframer::new();
     let mut out = Vec::new();

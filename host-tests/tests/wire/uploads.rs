@@ -89,9 +89,10 @@ fn an_offer_that_is_not_newer_is_answered_by_a_hello() {
     assert_eq!(met.held(), Some(of));
 }
 
-/// Checks that a relay that knows the positions of Tx and Rx refuses a mission of another length.
+/// Checks that a relay that knows the positions of Tx and Rx refuses a mission with another distance.
 ///
-/// The distance of these positions is fixed, so that no such mission can be right. The refusal is reported once.
+/// The surveyed positions fix the distance from Tx to Rx, so that no such mission can be right. The refusal is reported
+/// once.
 #[test]
 fn a_relay_with_sites_refuses_another_distance_once() {
     let refused = Event::UploadRefused {

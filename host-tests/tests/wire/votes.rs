@@ -17,7 +17,7 @@ pub(crate) const fn id(number: u32, node: u16) -> u32 {
     number << 10 | node as u32
 }
 
-/// Returns the number that messages of a membership view add to the mission digest.
+/// Returns the number of a membership view that is added to the mission digest in this view's messages.
 pub(crate) fn mark(view: u32) -> u16 {
     let low = view & 0xFFFF;
     let (top, next) = (view >> 24, view >> 16 & 0xFF);
@@ -54,7 +54,7 @@ pub(crate) fn granted(view: u32, of: (u16, u16), place: u16, relays: u16) -> Wir
 
 /// Returns the decision message with which the relay at position `place` refuses a membership view.
 ///
-/// Its reason: `there` relays have voted for the view, of eight.
+/// The reason for the refusal is that only `there` of eight relays have voted for the view.
 pub(crate) fn refused(
     view: u32,
     (mission, version): (u16, u16),
@@ -90,8 +90,8 @@ pub(crate) fn loaded_hello(newest: u32, mission: u16, neighbour: u16, flags: u8)
 
 /// Returns a copy of a hello with other values for received nodes and connected relays.
 ///
-/// Bit 0 of `hears` is the nearest node. `behind` is the number of connected relays from the sender on, away from the
-/// destination.
+/// Bit 0 of `hears` is the nearest node. `behind` is the number of connected relays from the sender (included) away
+/// from the destination.
 pub(crate) fn with_neighbours(hears: u8, behind: u16, hello: &WireMessage) -> WireMessage {
     hello.with(json!({ "hears": hears, "behind": behind }))
 }

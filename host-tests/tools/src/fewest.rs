@@ -41,7 +41,7 @@ pub struct Most {
     pub relays: u16,
 }
 
-/// Lowest target SIR of [`Most::of`], as a fraction of the highest possible SIR of the first hop.
+/// Lowest target SIR that [`Most::of`] tries, as a fraction of the first hop's highest possible SIR.
 const DEPTH: f32 = 1e-20;
 
 /// Number of bisection steps in [`Most::of`]. The search covers a range of 46 in ln(target), so the target is found
@@ -49,15 +49,13 @@ const DEPTH: f32 = 1e-20;
 const HALVINGS: u8 = 32;
 
 impl Fewest {
-    /// Returns the minimum number of relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`]. `target` is
-    /// a linear SIR above 0.
+    /// Returns the minimum number of relays that meet the SIR `target`, at most [`Mission::MAX_RELAYS`]. `target` is a linear SIR above 0.
     ///
-    /// The mission's own number is ignored. `profile_of` returns the profile of relay 1..=N. Equal to an exhaustive
-    /// count if `proven`: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work: with one interferer a
-    /// reach for each relay, and all of them again with a minimum separation; in an interference field at most 32
-    /// chains of equal relays.
+    /// The mission's own number of relays is ignored. `profile_of` returns the profile of relay 1..=N. If the result is `proven`, it equals
+    /// an exhaustive count: `as_few_as_an_exhaustive_count` in `host-tests/tests/fleet/`. Work with one interferer: a reach for each relay,
+    /// and two reaches with a minimum separation. Work in an interference field: at most 32 chains of equal relays.
     ///
-    /// `None` if no number of relays meets it; [`Most::of`] returns the best that they can meet.
+    /// `None` if no number of relays meets the target; [`Most::of`] returns the best target that they can meet.
     pub fn of(mission: &Mission, target: f32, profile_of: impl Fn(u16) -> Profile) -> Option<Self> {
         let found = counted(mission, target, &profile_of)?;
         if !(mission.config().min_separation_m > 0.0) || !found.proven {
@@ -104,7 +102,8 @@ impl Most {
 
 /// Returns positions with which the mission's N relays meet the SIR `target`, relay 1 first.
 ///
-/// `None` if they do not meet it. Every hop but one has its maximum length, and meets the target to 1e-4 relative. Work as that of a chain in [`Fewest::of`].
+/// `None` if they do not meet it. All hops but one have their maximum length, and their SIR is `target` to 1e-4 relative. Work: at most two
+/// chains, each with a reach and a required position for every relay.
 pub fn places(
     mission: &Mission,
     target: f32,
@@ -207,7 +206,7 @@ fn ends<F: Fn(u16) -> Profile>(
     is_complete.then(|| chain.link(at).ending(chain.target, before_m, reach))?
 }
 
-/// Returns true if the reaches of a pass end within the last hop.
+/// Returns true if the last hop meets the target when every relay is at its reach.
 fn closes<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     ends(chain, |_, _| {}).is_some_and(|(slack, _)| slack >= 0.0)
 }
@@ -217,8 +216,8 @@ fn is_met<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> bool {
     closes(chain) && (closes(&chain.plainly()) || chain.place(0).is_some())
 }
 
-/// Returns positions that meet the target; `None` if there are none. It first computes each relay's reach, the farthest
-/// x at which its hop meets the target; then, from the last relay back, the x that the next hop requires.
+/// Returns positions that meet the target; `None` if there are none. The function first computes each relay's reach, the farthest x at
+/// which its hop meets the target; then, from the last relay back, the x that the next hop requires.
 fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>> {
     let slot = |index: u16| usize::from(index).wrapping_sub(1);
     let mut places = vec![Placement::default(); usize::from(chain.mission.relays())];
@@ -240,7 +239,7 @@ fn settled<F: Fn(u16) -> Profile>(chain: &Walk<'_, F>) -> Option<Vec<Placement>>
     Some(places)
 }
 
-/// Maximum number of relays added to the minimum number if their minimum separation makes it fail.
+/// Largest number of relays tried beyond the minimum, if the minimum separation makes the minimum fail.
 const MORE: u16 = 32;
 
 const TARGETS: u8 = 48;
@@ -282,12 +281,11 @@ fn fewest_of_equals(mission: &Mission, target: f32, profile: Profile) -> Option<
         })
 }
 
-/// Returns the highest target SIR that the mission's N relays meet, all with `profile`, in a field. It is linear, to
-/// an f32's step.
+/// Returns the highest target SIR that N relays with the same `profile` meet in a field. It is linear, and exact to one f32 step.
 ///
 /// `None` without a field, or if no target is met. It is the optimum if no minimum separation is binding:
-/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven
-/// field. Work: 48 chains, each three square roots for every point of the field and relay.
+/// `identical_relays_in_a_field_are_optimal` in `host-tests/tests/fleet/`. Algorithm 4 may be below it in an uneven field. Work: 48 chains,
+/// each three square roots for every point of the field and relay.
 pub fn best_of_equals(mission: &Mission, profile: Profile) -> Option<f32> {
     mission.field()?;
     let met = |target: f32| is_met_by_equals(mission, target, profile);

@@ -18,7 +18,7 @@ pub struct Board {
     pub target: &'static str,
     manifest: &'static str,
     package: &'static str,
-    /// True if the board's images are examples of `package`, false if they are binaries of it.
+    /// True if the board's images are examples of `package`, false if they are binaries of `package`.
     examples: bool,
     /// Names of the board's two images: with a UART to each neighbour, and with one UART to a shared radio.
     images: [&'static str; 2],

@@ -242,10 +242,10 @@ pub struct MovingShares {
     pub stayed: Vec<f64>,
 }
 
-/// Simulates `scenes` experiments in which an interferer moves past the line Tx-Rx, 300 m away from it.
+/// Simulates `scenes` experiments in which an interferer moves in parallel to the line Tx-Rx.
 ///
-/// Returns the mean ratios of the SIR to the best possible SIR, for chains that track the interferer and for chains
-/// that do not move.
+/// The interferer is 300 m beside the line. Returns the mean ratios of the SIR to the best possible SIR, for chains
+/// that track the interferer and for chains that do not move.
 pub fn moving_shares(
     scenes: u64,
     relays: u16,

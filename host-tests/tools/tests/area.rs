@@ -68,7 +68,7 @@ fn winds(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
     total.abs() > 3.0
 }
 
-/// Returns points on the outline and in it.
+/// Returns points on the outline and inside it.
 fn fine_grid(outline: &[[f64; 2]], number: usize) -> Vec<[f64; 2]> {
     let length = |i: usize| {
         let ([a, b], [c, d]) = (outline[i], outline[(i + 1) % outline.len()]);
@@ -316,7 +316,7 @@ impl Judge<'_> {
         worst
     }
 
-    /// Returns the best worst case that differential evolution finds.
+    /// Maximises the worst-case SIR by differential evolution. Returns the largest value that it finds.
     fn best(&self, seed: u64) -> f64 {
         const CROWD: usize = 24;
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
@@ -458,7 +458,7 @@ fn the_worst_case_is_that_of_brute_force() {
     }
 }
 
-/// Returns the quantile of the worst hop's SIR over positions and powers that the test draws itself.
+/// Returns the quantile `share` of the worst hop's SIR over positions and powers that this test draws.
 fn quantile(drawn: &Drawn, plan: &Plan, share: f64) -> f64 {
     let rng = &mut ChaCha8Rng::seed_from_u64(99);
     let mut scene = Scene::new(&drawn.scenario, drawn.relays).unwrap();
@@ -639,7 +639,9 @@ fn the_command_reports_the_area_and_draws_its_map() {
     );
 }
 
-/// Compares the error of the location with the scatter of least-squares fits to drawn measurements.
+/// Checks the planner's error of a located interferer against the scatter of least-squares fits.
+///
+/// The fits are to randomly drawn measurements. The difference must be below 15 %.
 #[test]
 fn the_error_of_the_location_is_that_of_fits() {
     let rng = &mut ChaCha8Rng::seed_from_u64(7);
@@ -745,7 +747,9 @@ fn the_error_of_the_location_is_that_of_fits() {
     }
 }
 
-/// Checks the report and the map of how well relays locate an interferer, against simulated searches.
+/// Checks the planner's report and map of the part of an area in which relays locate an interferer.
+///
+/// Simulated searches must locate it with less than three times the reported error.
 #[test]
 fn the_command_says_from_where_relays_locate_the_interferer() {
     let folder = tempfile::tempdir().unwrap();
@@ -933,7 +937,9 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     }
 }
 
-/// Checks no-fly areas on the ways that relays with their own altitudes fly, and after each loss.
+/// Checks that relays with altitudes of their own cross no no-fly area when they close a gap.
+///
+/// The planner avoids or refuses such paths, and warns of them for the loss of each relay.
 #[test]
 fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let folder = tempfile::tempdir().unwrap();

@@ -253,7 +253,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     assert!(number(&fewer["rate_bps"]) < half, "{fewer}");
 }
 
-/// Checks the SIR of each hop on the way from Rx to Tx against the formulas, written anew.
+/// Checks the SIR of each hop on the way from Rx to Tx against formulas in this test.
 #[test]
 fn the_way_back_is_reported_for_every_hop() {
     let file = tempfile::NamedTempFile::new().unwrap();

@@ -112,7 +112,7 @@ impl Case {
         }
     }
 
-    /// Returns the planner's data rates toward Rx and toward Tx, bit/s, if both share the time equally.
+    /// Returns the planner's data rates toward Rx and toward Tx, bit/s. Each direction has half of the time.
     fn both_bps(&self, plan: &Plan) -> [f64; 2] {
         let relays = u16::try_from(plan.places.len()).unwrap();
         let scene = Scene::new(&self.scenario, relays).unwrap();
@@ -212,8 +212,9 @@ impl Case {
 
 /// Checks the data rate that a flow has delivered. Returns it as a fraction of the planner's rate `promised_bps`.
 ///
-/// No packet may be unaccounted for, and the rate at the agreed positions is never exceeded. The planner's rate may
-/// be exceeded by the fraction `most`, because the agreed positions differ slightly from the planned ones.
+/// Every offered packet must be delivered, dropped, lost or queued. The delivered rate must not exceed the rate at the
+/// agreed positions. It may exceed the planner's rate by the fraction `most`, because the agreed positions differ
+/// slightly from the planned ones.
 fn share(flow: &Flow, promised_bps: f64, most: f64, what: &str) -> f64 {
     let packets = flow.packets;
     let gone = packets.delivered + packets.dropped + packets.lost + flow.queued;

@@ -43,7 +43,7 @@ impl std::fmt::Display for StackError {
 
 impl std::error::Error for StackError {}
 
-/// Call graph of an image: functions by address, and functions that may be called through a pointer.
+/// Call graph of an image: functions by address, and functions that can be called by pointer.
 #[derive(Clone, Debug, Default)]
 pub struct Calls {
     functions: BTreeMap<u64, Function>,
@@ -53,8 +53,8 @@ pub struct Calls {
 impl Calls {
     /// Parses a `disassembly` by `llvm-objdump -d --no-show-raw-insn` into a call graph.
     ///
-    /// `constants` are the words of the read-only data: an odd one that is a function's address plus 1 is a pointer
-    /// to that Thumb function.
+    /// `constants` are the words of the read-only data. An odd word that equals a function's address plus 1 is a pointer to that Thumb
+    /// function.
     ///
     /// # Errors
     /// [`StackError::Dynamic`] for a function that moves the stack pointer by a register.

@@ -34,14 +34,14 @@ const CARROT_PART: f32 = 0.96;
 /// Factor k of the moving target's acceleration near its maximum speed, 1/s. The acceleration is k times the
 /// difference of maximum speed and present speed.
 ///
-/// The target thus approaches its maximum speed smoothly, since a drone goes on accelerating for a moment.
+/// The target approaches its maximum speed smoothly, because a drone does not stop accelerating at once.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum speed of the moving target, as a fraction of the speed limit. The target slows down for a drone that lags
-/// behind, but never stops for good.
+/// Minimum speed of the moving target, as a fraction of the speed limit. If the drone lags behind, the target slows
+/// down, at most to this speed.
 const LEAST_PART: f32 = 0.1;
 
-/// Factor on the acceleration limit for the velocity in other directions than to a new setpoint.
+/// Factor on the acceleration limit for velocity that does not lead toward a new setpoint.
 ///
 /// When the setpoint changes, the moving target still has its old velocity. Its components across the new direction
 /// and away from the setpoint are reduced to 0 with twice the acceleration of [`Pace`], within
@@ -65,7 +65,7 @@ const HALVES_MS: u64 = 1_387;
 /// distance of 20 m to less than [`SETTLED_M`].
 const MOST_HALVES: u32 = 8;
 
-/// Maximum age of a drone's position from which the drone's lag behind the moving target is computed. The drone's
+/// Maximum age of a drone's position that is used to compute the drone's lag behind the moving target. The drone's
 /// position is compared with the target's position of the same time.
 const LONGEST_LAG: Duration = Duration::from_millis(1_000);
 
@@ -127,12 +127,12 @@ impl Pace {
 
     /// Returns the time from a changed setpoint until a drone that flew at maximum speed has stopped.
     ///
-    /// It is 9.8 s by default, and intended for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
+    /// The time is 9.8 s by default. It is the value for [`GuardConfig::lag`](crate::guard::config::GuardConfig::lag).
     ///
-    /// The drone reacts after 1.2 s. The moving target that it follows then slows down: first with the deceleration a
-    /// (maximum acceleration) to the speed a / k, where k is the gain near the setpoint, and from there in proportion
-    /// to the remaining distance, which is at most 0.25 m after this time. a is the acceleration of this pace, and k
-    /// is 0.5 /s. At most 8 steps.
+    /// The drone reacts after 1.2 s. Then the moving target slows down: first with the deceleration a to the speed a/k,
+    /// then in proportion to the remaining distance. Here a is the acceleration of this pace, and k is 0.5 /s, the
+    /// ratio of speed to distance near the setpoint. After the returned time the remaining distance is at most 0.25 m.
+    /// At most 8 steps.
     ///
     /// Asserted by `host-tests/tests/autopilot/motion.rs`: after this time a drone moves no farther than 0.5 m.
     #[expect(
@@ -219,8 +219,8 @@ impl Carrot {
         way(self.place, setpoint)
     }
 
-    /// Moves the target toward `setpoint` for the time until `now`. `drone` is the drone's position and its age, if
-    /// known.
+    /// Moves the target toward `setpoint` for the time from its last step until `now`. `drone` is the drone's position
+    /// and the age of this position; `None` if unknown.
     pub(super) fn advance(
         &mut self,
         now: Instant,
@@ -306,7 +306,7 @@ fn length(a: [f32; 3]) -> f32 {
 
 /// Interval at which the position of a moving target is sent to the autopilot.
 const MOVING: Duration = Duration::from_millis(100);
-/// Interval at which a standing target is sent again to a PX4. A PX4 leaves OFFBOARD after a second without a target.
+/// Interval at which a standing target is repeated to a PX4. A PX4 leaves OFFBOARD after a second without a target.
 const STANDING: Duration = Duration::from_millis(200);
 
 /// Interval between repetitions of a standing target to an ArduCopter that has not confirmed it. More frequent
@@ -367,10 +367,11 @@ impl Target {
         self.is_accepted = false;
     }
 
-    /// Compares the autopilot's reported target with the sent target. Returns true, once, if they differ. They count
-    /// as different only after the target was sent for some time, and several reports differ.
+    /// Compares the autopilot's reported target with the sent target. Returns true, once, when the two count as
+    /// different: the target has been sent for [`SENT_FOR`], and [`REFUSED_AFTER`] reports in a row named another
+    /// target.
     ///
-    /// While the target moves, the report may lag behind it by the time between two messages.
+    /// For a moving target a larger difference is allowed, because the report shows an earlier position of the target.
     pub(super) fn compare(&mut self, now: Instant, axis: &Axis, lat_e7: i32, lon_e7: i32) -> bool {
         self.is_reported = true;
         let Some(point) = axis.point(self.carrot.place) else {

@@ -38,8 +38,8 @@ struct LostSide {
 pub(super) struct Clearance {
     upstream: LostSide,
     downstream: LostSide,
-    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers. A repetition of
-    /// this command is answered again, without another effect.
+    /// Last accepted command that reports lost relays as landed: its sender, and the relays' numbers. `None` before the
+    /// first such command. If the command is repeated, it is answered a second time and has no other effect.
     accepted: Option<(Address, RelayNumbers)>,
     /// Unsent answer to a command: its addressee, and its `MAV_RESULT`; `None` without an answer.
     answer: Option<(Address, u8)>,
@@ -107,12 +107,12 @@ impl Clearance {
         self.answer.is_some() || self.cleared.is_some()
     }
 
-    /// Removes and returns the answer to send to the last command: its addressee, and its `MAV_RESULT`.
+    /// Removes and returns the pending answer to a command, or `None`: its addressee, and its `MAV_RESULT`.
     pub(super) const fn take_answer(&mut self) -> Option<(Address, u8)> {
         self.answer.take()
     }
 
-    /// Removes and returns the side whose lost relays have landed, for the relay.
+    /// Removes and returns the side whose lost relays have landed, for the relay; `None` if there is none.
     pub(super) const fn take_cleared(&mut self) -> Option<Side> {
         self.cleared.take()
     }

@@ -32,24 +32,25 @@ use crate::flight::mavlink::signing::Signing;
 /// MAVLink component number of this link: an onboard computer, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 const COMPONENT: u8 = 191;
 
-/// MAVLink system number of this component until the system number of the autopilot is known. It is the default of
-/// autopilots.
+/// MAVLink system number of this component until the system number of the autopilot is known. The number is the default
+/// of autopilots.
 const SYSTEM: u8 = 1;
 
 const HEARTBEAT: Duration = Duration::from_millis(1_000);
 
-/// Maximum time between two targets to a PX4 that counts as on time. After a longer time the PX4 may have entered its
-/// failsafe.
+/// Maximum time between two targets to a PX4 that counts as on time. After a longer time the PX4 has possibly entered
+/// its failsafe.
 const OVERDUE: Duration = Duration::from_millis(600);
 
 /// Time for which positions must be received regularly before [`State::Blind`] (position lost) ends.
 const RECOVERY: Duration = Duration::from_millis(1_000);
-/// Time used instead of [`RECOVERY`] if the drone's position is lost again within [`SHORT_TIME`].
+/// Time used instead of [`RECOVERY`] if the drone's position is lost twice within [`SHORT_TIME`].
 const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the drone's position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change to its report of the fence breach that caused it.
+/// Maximum time from an ArduCopter's mode change until its report of a fence breach. The fence breach has caused the
+/// mode change.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
 /// Time for which a reason not to control the drone must last before it is reported to the operator.
@@ -72,8 +73,8 @@ const HOLD_SETTLED: Duration = Duration::from_millis(3_000);
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     pub(super) axis: Axis,
-    /// Tx and Rx positions with which the link was created. The array is empty unless a mission uploaded in flight
-    /// can replace them.
+    /// Tx and Rx positions with which the link was created. The array is empty in a build without mission uploads
+    /// (feature `upload`).
     loaded: [Sites; UPLOAD as usize],
     pace: Pace,
     clock: MonotonicClock,
@@ -88,19 +89,19 @@ pub struct Autopilot {
     /// Side of the neighbour that a directional antenna points to; `None` if `point_antenna` has set none.
     antenna: Option<Side>,
     target: Option<Target>,
-    /// Position where the moving target stops after the setpoint was withdrawn.
+    /// Position where the moving target stops after the setpoint was withdrawn. `None` while there is a setpoint.
     stop: Option<Placement>,
-    /// Time at which the autopilot last stopped reporting the drone's position.
+    /// Time at which the autopilot last stopped reporting the drone's position; `None` if it never has.
     blind_at: Option<Instant>,
     /// Time since which positions are received again in the state [`State::Blind`]; `None` otherwise.
     located_at: Option<Instant>,
     /// Time for which positions must be received regularly before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Release that has not been reported yet, and the time to report it. A release is the end of the relay's control
-    /// of the drone.
+    /// Release that has not been reported yet, and the time to report it; `None` if there is none. A release is the end
+    /// of the relay's control of the drone.
     release: Option<(Release, Instant)>,
-    /// Reason why the pilot cannot give the relay control of the drone, and the begin of this reason. `None` if the
-    /// pilot can give control.
+    /// Reason why the pilot cannot give the relay control of the drone, and when the reason began. `None` if the pilot
+    /// can give control.
     wait: (Option<WaitReason>, Instant),
     /// Last reported reason why the pilot cannot give the relay control, and the time of the report. `None` if
     /// nothing has been reported. An inner `None` reports that the pilot can give the relay control.
@@ -110,8 +111,8 @@ pub struct Autopilot {
     /// Reasons reported to the operator why the guard (collision avoidance) holds the drone back. The first is
     /// because of the upstream neighbour, the second because of the downstream neighbour.
     hold: [Option<HoldReason>; 2],
-    /// Newest reasons why the guard (collision avoidance) holds the drone back, and since when. The first is because
-    /// of the upstream neighbour, the second because of the downstream neighbour.
+    /// Newest reasons why the guard (collision avoidance) holds the drone back, and when they last changed. The first
+    /// is because of the upstream neighbour, the second because of the downstream neighbour.
     newest_hold: ([Option<HoldReason>; 2], Instant),
     /// True from the acceptance of a new view (set of relays) until its relays have agreed on positions.
     is_new_view: bool,
@@ -172,8 +173,9 @@ impl Autopilot {
 
     /// Sets a number that differs at each start of the companion, such as the relay's seed.
     ///
-    /// It marks this link's clock requests (TIMESYNC). Without it, a reply to an earlier start, buffered in a cable,
-    /// may count as a reply to this link. A mode that the pilot chose before the restart then counts as a new choice.
+    /// The number marks this link's clock requests (TIMESYNC). Without the mark, a reply from before a restart of the
+    /// companion, buffered in a cable, could count as a reply to this link. A mode that the pilot chose before the
+    /// restart would then count as a new choice.
     pub const fn set_seed(&mut self, seed: u32) {
         self.vehicle.echo.seed(seed);
     }
@@ -266,10 +268,10 @@ impl Autopilot {
         self.review(now);
     }
 
-    /// Sets the line from Tx to Rx along which the drone flies, when a mission changes the two positions. Call it
-    /// when `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds
-    /// its position until the next setpoint, because the present one belongs to the previous line. Constant work; the
-    /// same line again has no effect.
+    /// Sets the line from Tx to Rx along which the drone flies, when a mission changes the two positions. Call it when
+    /// `Relay::sites` has changed, before the next [`handle_setpoint`](Self::handle_setpoint). The drone holds its
+    /// position until the next setpoint, because the present one belongs to the previous line. Constant work; a call
+    /// with the present line has no effect.
     pub fn fly_along(&mut self, now: Instant, axis: Axis) {
         let now = self.clock.advance(now);
         if axis == self.axis {
@@ -314,32 +316,34 @@ impl Autopilot {
         self.bearing = bearing.filter(|look| look.azimuth_rad.abs() <= core::f32::consts::PI);
     }
 
-    /// Sets the side of the neighbour that a directional antenna, forward on the drone, points to.
+    /// Sets the side of the neighbour to which a directional antenna points, mounted facing forward.
     ///
     /// With `None` the targets have no heading.
     ///
-    /// [`exchange`](Self::exchange) then calls [`handle_bearing`](Self::handle_bearing) with [`Relay::bearing`].
+    /// If a side is set, [`exchange`](Self::exchange) calls [`handle_bearing`](Self::handle_bearing) with
+    /// [`Relay::bearing`].
     pub const fn point_antenna(&mut self, side: Option<Side>) {
         self.antenna = side;
     }
 
     /// Sets the time of flight with a full battery, s, and the speeds of return and descent, m/s.
     ///
-    /// At first they are NaN (unknown: a percentage without a remaining time says nothing), 5 and 1.5. The speeds are clamped to 0.1 to 20.
-    /// From the first call on an ArduCopter is requested to send the messages of its battery.
+    /// Before the first call the three values are NaN, 5 and 1.5. With NaN the battery's percentage gives no remaining time. The speeds are
+    /// clamped to 0.1 to 20. From the first call on, the link requests the battery messages of an ArduCopter.
     pub const fn set_endurance(&mut self, full_s: f32, return_m_s: f32, descent_m_s: f32) {
         let [level, down] = [return_m_s.clamp(0.1, 20.0), descent_m_s.clamp(0.1, 20.0)];
         self.vehicle.battery.setup = Some([full_s, level, down]);
     }
 
-    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`.
+    /// Sets the numbers sent to the operator once a second: the chain's SIR, dB, and the setpoint `place`. `None` for
+    /// an unknown number.
     pub fn handle_values(&mut self, now: Instant, sir_db: Option<f32>, place: Option<Placement>) {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
     /// Sets whether the relay is ready to control the drone; true at the start. While it is false, a PX4 in
     /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD. Nothing else changes: a drone that the
-    /// relay controls stays under control, and an ArduCopter accepts GUIDED all the same.
+    /// relay controls stays under control, and an ArduCopter accepts GUIDED in any case.
     pub fn handle_ready(&mut self, now: Instant, ready: bool) {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
@@ -537,7 +541,7 @@ impl Autopilot {
         }
     }
 
-    /// Reports the reason for which the relay cannot control the drone, once it has lasted for a second.
+    /// Reports the reason for which the relay cannot control the drone, once the reason has lasted for 1 s.
     fn review_wait(&mut self, now: Instant) {
         if self.state != State::Standby {
             self.reported_wait = None;
@@ -566,8 +570,8 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the present reason not to control the drone must be reported. `None` once it has
-    /// been reported.
+    /// Returns the time at which the present reason not to control the drone must be reported. `None` once the reason
+    /// has been reported.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
         if self.state != State::Standby {
@@ -680,7 +684,8 @@ impl Autopilot {
         self.target_frame(now, &target.carrot)
     }
 
-    /// Returns the frame that sets the autopilot's target to the position of `carrot`, the moving target.
+    /// Returns the frame that sends the position of `carrot`, the moving target, to the autopilot. `None` if this
+    /// position is too far from the line Tx to Rx.
     fn target_frame(&mut self, now: Instant, carrot: &Carrot) -> Option<FrameBytes> {
         let at: Geodetic = self.axis.point(carrot.place)?;
         let x_m = carrot.place.x_m;
@@ -703,8 +708,8 @@ impl Autopilot {
         message.encode(self.own(), self.peer(), sequence)
     }
 
-    /// Returns the MAVLink address of this component. It has the system number of its autopilot, since it is a part
-    /// of the vehicle.
+    /// Returns the MAVLink address of this component. The address has the autopilot's system number, because this
+    /// component is a part of the vehicle.
     fn own(&self) -> Address {
         Address {
             component: COMPONENT,
@@ -732,8 +737,8 @@ impl Autopilot {
     }
 
     /// Returns the position of a drone too far from the line Tx to Rx, and its distance from that line. Such a drone
-    /// has no position in the mission's coordinates. `None` for a drone near the line, and without a position for 3
-    /// s. Constant work.
+    /// has no position in the mission's coordinates. `None` if the drone is near the line, or if its last position is
+    /// older than 3 s. Constant work.
     pub fn off_line(&self, now: Instant) -> Option<OffLine> {
         let at = self.off_line_detector.newest(self.clock.internal(now))?;
         OffLine::new(at, &self.axis)

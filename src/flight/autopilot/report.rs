@@ -163,10 +163,11 @@ fn left(now: Instant, until: u32) -> Option<Duration> {
 pub(super) struct Report {
     lines: Vec<Line, LINES>,
     texts: Deque<String<50>, TEXTS>,
-    /// Hashes of the lines sent in the last 10 s. Each has the earliest time at which an equal line may be sent
-    /// again, in ms that wrap.
+    /// Hashes of the lines sent in the last 10 s. Each hash has the earliest time at which an equal line is allowed, in
+    /// wrapping ms.
     recent: Vec<(u32, u32), RECENT>,
-    /// Hash of the last line sent on each topic, 0 before. An equal line that would have to wait is dropped.
+    /// Hash of the last line sent on each topic, 0 before the first line. An equal line that would have to wait is
+    /// dropped.
     newest_sent: [u32; Topic::COUNT],
     values: [Option<f32>; NAMES.len()],
     /// Number of values (SIR and position) sent to the operator in the present second.
@@ -199,15 +200,15 @@ impl Report {
         self.texts.iter().any(|text| *text == line) || self.texts.push_back(line).is_ok()
     }
 
-    /// Returns true if a line with this hash may be sent at `now`, and marks it as sent. It may not be sent within
-    /// `spacing` after an equal line.
+    /// Returns true if a line with this hash can be sent at `now`, and marks it as sent. A line must not be sent within
+    /// `spacing` ms after an equal line.
     fn passes(&mut self, now: Instant, hash: u32, spacing: u32) -> bool {
         self.recent.retain(|(_, until)| left(now, *until).is_some());
         let until = millis(now.as_micros()).wrapping_add(spacing);
         self.recent.iter().all(|(of, _)| *of != hash) && self.recent.push((hash, until)).is_ok()
     }
 
-    /// Removes the line at index `at`; unlike `Vec::remove`, without a panic if there is none.
+    /// Removes the line at index `at`; unlike `Vec::remove`, it does not panic if there is no such line.
     fn remove_line(&mut self, at: usize) {
         let mut index = 0;
         self.lines.retain(|_| {
@@ -216,7 +217,7 @@ impl Report {
         });
     }
 
-    /// Removes and returns the next line that may be sent at `now`, with its severity, or `None`.
+    /// Removes and returns the next line to send at `now`, with its severity; `None` if there is none.
     fn next_line(&mut self, now: Instant) -> Option<(u8, String<50>)> {
         let mut at = 0;
         while let Some(line) = self.lines.get(at).copied() {
@@ -324,13 +325,13 @@ pub enum AutopilotEvent {
     Restarted,
     /// New control state of the drone: see [`State`].
     State(State),
-    /// Release: the relay no longer controls the drone. It comes together with [`State::Standby`], or up to 1.3 s later if the
-    /// cause may be a fence.
+    /// Release: the relay no longer controls the drone. The event comes together with [`State::Standby`], or up to 1.3 s later if the cause
+    /// is possibly a fence.
     Released(Release),
-    /// Reason for which the pilot cannot give the relay control of the drone, by OFFBOARD or GUIDED. Or the reason
-    /// for which the relay does not use the mode that the pilot has chosen.
+    /// The relay cannot control the drone now, for this reason. The pilot cannot give the relay control by OFFBOARD or
+    /// GUIDED, or the relay does not use the mode that the pilot has chosen.
     Waits(WaitReason),
-    /// The pilot may now give the relay control of the drone by choosing OFFBOARD or GUIDED.
+    /// The pilot can now give the relay control of the drone, by the mode OFFBOARD or GUIDED.
     Ready,
     /// The autopilot refuses the target: for 3 s it has reported another target than the sent one.
     ///
@@ -371,17 +372,19 @@ pub(super) struct Events {
     pub(super) restarted: bool,
     pub(super) released: Option<Release>,
     pub(super) state: Option<State>,
-    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer one of the two.
+    /// Pending [`AutopilotEvent::Waits`] or [`AutopilotEvent::Ready`], the newer one of the two. `None` if none is
+    /// pending.
     pub(super) waits: Option<AutopilotEvent>,
     pub(super) breached: bool,
     pub(super) refused: bool,
     pub(super) off_line: Option<OffLine>,
-    /// Pending result of a command: [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`].
+    /// Pending result of a command: [`AutopilotEvent::LostCleared`] or [`AutopilotEvent::ClearRefused`]. `None` if none
+    /// is pending.
     pub(super) clearance: Option<AutopilotEvent>,
 }
 
 impl Events {
-    /// Removes and returns the next pending event.
+    /// Removes and returns the next pending event; `None` if there is none.
     pub(super) fn take(&mut self) -> Option<AutopilotEvent> {
         if let Some(kind) = self.found.take() {
             return Some(AutopilotEvent::Found(kind));

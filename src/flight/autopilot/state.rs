@@ -31,7 +31,7 @@ pub enum State {
     Standby,
     /// The relay controls the drone, which flies to the relay's setpoint.
     Engaged,
-    /// The relay controls the drone, but its position is unknown: the autopilot keeps the last target.
+    /// The relay controls the drone, whose position is unknown: the autopilot keeps the last target.
     Blind,
 }
 
@@ -159,8 +159,8 @@ pub enum ReleaseCause {
     Failsafe,
     /// The autopilot's fence was breached.
     Fence,
-    /// The link to the autopilot was interrupted or late. A PX4 may be in its failsafe, which a stream of targets
-    /// would end.
+    /// The link to the autopilot was interrupted or late. A PX4 is then possibly in its failsafe. A stream of targets
+    /// would end this failsafe.
     Link,
 }
 
@@ -195,8 +195,8 @@ impl Release {
     }
 }
 
-/// Reason for which the pilot cannot give the relay control of the drone. Or the reason for which the relay does not
-/// use the mode OFFBOARD or GUIDED that the pilot has chosen.
+/// Reason for which the relay cannot control the drone now. The pilot cannot give the relay control, or the relay does
+/// not use the mode OFFBOARD or GUIDED that the pilot has chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum WaitReason {

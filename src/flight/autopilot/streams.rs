@@ -8,13 +8,14 @@ use super::state::Kind;
 use crate::flight::mavlink::frame::id;
 use crate::time::{Duration, Instant};
 
-/// Time window in which the autopilot's messages are counted. Messages that come too rarely are then requested again.
+/// Time window in which the autopilot's messages are counted. Messages that come too rarely are then requested once
+/// more.
 const WINDOW: Duration = Duration::from_millis(4_000);
 
 /// Maximum time from a request for a message to its answer.
 const ANSWER: Duration = Duration::from_millis(400);
 
-/// Number of [`WINDOW`]s in which a message is missing before it is no longer requested. A message without which the
+/// Number of [`WINDOW`]s without a message after which this message is no longer requested. A message without which the
 /// drone cannot fly is requested every [`SELDOM`] windows instead.
 const MAX_SILENT_WINDOWS: u8 = 4;
 /// Number of [`WINDOW`]s between two requests for a vital message that the autopilot does not send.
@@ -46,7 +47,7 @@ impl RequestedMessage {
     }
 }
 
-/// Index of the first message of the battery in [`REQUESTED`].
+/// Index of the first battery message in [`REQUESTED`].
 const BATTERY: usize = 4;
 
 const REQUESTED: [RequestedMessage; 6] = [
@@ -73,7 +74,7 @@ struct Stream {
 pub(super) struct Streams {
     all: [Stream; REQUESTED.len()],
     since: Instant,
-    /// Outstanding request: the index of the requested message, and the time of the request.
+    /// Outstanding request: index of the requested message, and time of the request. `None` if there is none.
     outstanding: Option<(usize, Instant)>,
     unanswered: u8,
     is_answered: bool,
@@ -153,7 +154,7 @@ impl Streams {
 
     /// Restarts the requests for the autopilot's report of its target, once the relay controls the drone.
     ///
-    /// An ArduCopter sends that report only in GUIDED, so that earlier requests may have been given up.
+    /// An ArduCopter sends that report only in GUIDED. Earlier requests were therefore possibly given up.
     pub(super) fn renew(&mut self) {
         for (stream, asked) in self.all.iter_mut().zip(REQUESTED) {
             let is_target = asked.id == id::POSITION_TARGET_GLOBAL_INT;
@@ -173,7 +174,7 @@ impl Streams {
 
     /// Returns the next message to request, and its interval in µs; `None` if no request is due.
     ///
-    /// Messages of the battery are requested only if it `counts`.
+    /// Battery messages are requested only if `counts` is true.
     pub(super) fn take(&mut self, now: Instant, kind: Kind, counts: bool) -> Option<(u32, u32)> {
         if let Some((_, at)) = self.outstanding {
             if now.since(at) < ANSWER {

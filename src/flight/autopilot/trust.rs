@@ -18,10 +18,10 @@ const IN_A_ROW: u8 = 3;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Mistrust {
-    /// The autopilot signs, the link has no key, and the autopilot answers no request. It seems to ignore unsigned
-    /// frames.
+    /// The autopilot signs, the link has no key, and the autopilot answers no request. The autopilot seems to ignore
+    /// unsigned frames.
     NoKey,
-    /// The autopilot signs and the link has no key, but the autopilot answers requests all the same.
+    /// The autopilot signs and the link has no key, but the autopilot answers unsigned requests.
     SignsOnly,
     /// The link has a key, and the autopilot does not sign. Its frames are therefore ignored.
     Unsigned,
@@ -77,7 +77,7 @@ impl Trust {
         }
     }
 
-    /// Returns true if the frame is accepted: its signature is valid, or it needs none.
+    /// Returns true if the frame is accepted: its signature is valid, or no signature is required.
     fn takes(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         let (takes, wrong) = self.judge(now, received, frame);
         if !takes {
@@ -133,8 +133,8 @@ impl Trust {
         }
     }
 
-    /// Returns the next signature mismatch to report, once. `hears` is true if the autopilot answers requests, false
-    /// if it does not, and `None` while that is unknown.
+    /// Returns the next signature mismatch to report; each kind is returned once. `hears` is true if the autopilot
+    /// answers requests, false if it does not, and `None` while that is unknown.
     pub(super) fn take_event(&mut self, hears: Option<bool>) -> Option<Mistrust> {
         let is_known = |it: &Mistrust| *it != Mistrust::NoKey || hears.is_some();
         let mistrust = Mistrust::ALL

@@ -18,7 +18,7 @@ pub(super) const SILENT: Duration = Duration::from_millis(3_000);
 /// Age from which on a received position of the drone is too old to be used.
 pub(super) const STALE: Duration = Duration::from_millis(1_000);
 
-/// Silence of the autopilot after which a PX4 may have entered its failsafe. It does so after a second without a
+/// Silence of the autopilot after which a PX4 has possibly entered its failsafe. A PX4 does so after a second without a
 /// target, and a target is sent every 0.2 s.
 const GAP: Duration = Duration::from_millis(800);
 
@@ -66,7 +66,7 @@ pub(super) enum VehicleUpdate {
     Found,
     /// The message shows that the autopilot has restarted.
     Restarted,
-    /// The message has new information that may change the control state.
+    /// The message has new information, which can change the control state.
     StateChanged,
     /// The message has a new position of the drone, in the mission's coordinates.
     Position(Position),
@@ -87,14 +87,15 @@ pub(super) enum VehicleUpdate {
 pub(super) struct Vehicle {
     known: Option<(Address, Kind)>,
     heard_at: Option<Instant>,
-    /// Time at which the last message of any kind was received from the autopilot.
+    /// Time at which the last message of any kind was received from the autopilot; `None` before the first.
     frame_at: Option<Instant>,
     mode: u32,
     /// True while the autopilot's mode is OFFBOARD or GUIDED, in which the relay sets the target.
     granted: bool,
     /// Value of `MAV_STATE` in the autopilot's last heartbeat.
     status: u8,
-    /// True if OFFBOARD or GUIDED, now or once entered, counts as the pilot's choice. See [`Self::review_choice`].
+    /// True if OFFBOARD or GUIDED counts as the pilot's choice. This is about the present mode, or about the next
+    /// change to OFFBOARD or GUIDED. See [`Self::review_choice`].
     chosen: bool,
     armed: bool,
     in_air: bool,
@@ -104,7 +105,8 @@ pub(super) struct Vehicle {
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
-    /// Measurement time of the last position, also of one that is too far from the line Tx to Rx.
+    /// Measurement time of the last position; `None` before the first. Positions too far from the line Tx to Rx count,
+    /// too.
     measured_at: Option<Instant>,
     position: Option<Position>,
     /// Place to return to (HOME_POSITION); `None` if unknown.
@@ -113,8 +115,8 @@ pub(super) struct Vehicle {
 }
 
 impl Vehicle {
-    /// Processes a received message. The first sender that identifies itself as an autopilot is kept for good,
-    /// because the same port may also receive other vehicles.
+    /// Processes a received message. After the first heartbeat of an autopilot, messages of all other senders are
+    /// ignored: the same port can also receive other vehicles.
     pub(super) fn read(&mut self, now: Instant, received: &Received, axis: &Axis) -> VehicleUpdate {
         let from = received.from;
         let Some(message) = received.message else {
@@ -250,13 +252,13 @@ impl Vehicle {
         }
     }
 
-    /// Withdraws the right to control the drone if the autopilot may have changed its mode by itself.
+    /// Withdraws the right to control the drone if the autopilot has possibly changed its mode by itself.
     ///
     /// A PX4 in its failsafe resumes OFFBOARD by itself once it receives targets, and in OFFBOARD it enters its
     /// failsafe after a second without one. A PX4 is therefore sent targets only after it has reported a mode other
     /// than OFFBOARD outside of a failsafe: since the link started, since the last failsafe, and since the link was
-    /// last interrupted or late. An ArduCopter does not change to GUIDED by itself. There another mode since the
-    /// start of the link and since the last silence is enough.
+    /// last interrupted or late. An ArduCopter does not change to GUIDED by itself. An ArduCopter only needs to have
+    /// reported another mode once: since the start of the link, and since its last silence.
     pub(super) fn review_choice(&mut self, now: Instant) {
         let before = |at: Option<Instant>, limit| at.is_some_and(|at| now.since(at) < limit);
         self.chosen &= match self.kind() {
@@ -277,7 +279,7 @@ impl Vehicle {
         self.chosen = false;
     }
 
-    /// Returns true if messages of the autopilot may have been delayed, so that they show an old state.
+    /// Returns true if messages of the autopilot are possibly delayed, so that they show an old state.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         self.echo.is_late(now) || self.measured_at.is_none_or(|at| now.since(at) >= STALE)
     }
@@ -319,8 +321,8 @@ impl Vehicle {
         self.home = None;
     }
 
-    /// Converts the stored position to another line from Tx to Rx by `moved`. Drops the position if that returns
-    /// `None`.
+    /// Converts the stored position to another line from Tx to Rx by the function `moved`. The position is dropped if
+    /// `moved` returns `None`.
     pub(super) fn move_places(&mut self, moved: impl Fn(Placement) -> Option<Placement>) {
         self.position = self.position.and_then(|position| {
             let place = moved(position.place)?;
@@ -328,7 +330,7 @@ impl Vehicle {
         });
     }
 
-    /// Records a message of the battery, or of the place to return to. Returns false for any other.
+    /// Records a message about the battery, or about the place to return to. Returns false for any other message.
     fn read_battery(&mut self, now: Instant, message: Incoming) -> bool {
         match message {
             // On the ground a PX4 computes the time from an assumed current.
@@ -355,9 +357,10 @@ impl Vehicle {
         self.heard_at.is_some() && (!self.armed || is_grounded)
     }
 
-    /// Returns the newest remaining time of flight, once, and the time of the way home, s.
+    /// Returns the newest remaining time of flight and the time of the flight home, s.
     ///
-    /// `None` before the home is known. NaN is unknown, as the way home is without a recent position, and to a home far from the line.
+    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an unknown time. The
+    /// time of the flight home is unknown without a recent position, and if the home is too far from the line Tx to Rx.
     pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let home = axis.place(self.home?);
@@ -396,7 +399,7 @@ impl Vehicle {
         }
     }
 
-    /// Returns the drone's position if it is known and recent, and the drone is in the air.
+    /// Returns the drone's position if it is known and recent, and the drone is in the air; else `None`.
     pub(super) fn place_in_air(&self, now: Instant) -> Option<Placement> {
         let position = self.position(now)?;
         (self.armed && self.in_air).then_some(position.place)
@@ -416,27 +419,31 @@ impl Vehicle {
     }
 }
 
-/// Time on the ground after which an armed drone counts as landed: a single report in flight does not.
+/// Time for which an armed drone must report that it is on the ground before it counts as landed. A single wrong report
+/// in flight thus has no effect.
 const LANDED: Duration = Duration::from_millis(2_000);
-/// Age from which on SYS_STATUS counts instead of BATTERY_STATUS, and a position gives no way home.
+/// Age from which on a BATTERY_STATUS or a position is too old for the endurance. SYS_STATUS is then used instead of
+/// BATTERY_STATUS, and the time of the flight home is unknown.
 const OLD: Duration = Duration::from_millis(10_000);
-/// Part of a reported remaining time that counts.
+/// Factor on the remaining time that the autopilot reports: 10 % are a reserve.
 const CERTAIN: f32 = 0.9;
 
-/// Endurance by the battery's messages.
+/// Remaining time of flight, from the battery's messages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Battery {
-    /// Arguments of `Autopilot::set_endurance`; `None` for [`UNSET`](Self::UNSET) without requests.
+    /// Arguments of `Autopilot::set_endurance`. `None` before its first call: [`UNSET`](Self::UNSET) is used, and no
+    /// messages are requested.
     pub(super) setup: Option<[f32; 3]>,
     detailed_at: Option<Instant>,
-    /// Remaining time, s, NaN if unknown; `None` once the link has taken it.
+    /// Remaining time of flight, s; NaN if unknown. `None` once the link has taken it, and on the ground.
     newest: Option<f32>,
 }
 
 impl Battery {
     const UNSET: [f32; 3] = [f32::NAN, 5.0, 1.5];
 
-    /// Returns true for BATTERY_STATUS of the first `battery`, and without one for SYS_STATUS (`None`).
+    /// Returns true if a message about `battery` is used: BATTERY_STATUS of battery 0. SYS_STATUS (`None`) is used only
+    /// if no such BATTERY_STATUS came in the last 10 s.
     fn is_first(&mut self, now: Instant, battery: Option<u8>) -> bool {
         if battery == Some(0) {
             self.detailed_at = Some(now);
@@ -445,9 +452,9 @@ impl Battery {
         battery.map_or(is_only, |id| id == 0)
     }
 
-    /// Returns the remaining time of flight, s, as reported, or else by the percentage.
+    /// Returns the remaining time of flight, s: the reported time, or else computed from the percentage.
     ///
-    /// NaN is unknown. Without a valid percentage a PX4 has no estimate of the time either.
+    /// NaN if the percentage is not valid: then a PX4 has no estimate of the time either.
     #[expect(clippy::cast_precision_loss, reason = "some hours at most")]
     fn left_s(&self, percent: i8, remaining_s: i32) -> f32 {
         if !(0..=100).contains(&percent) {
@@ -499,12 +506,12 @@ const SHIFT: u32 = 20;
 /// Tag in the TIMESYNC requests of a link whose seed was not set.
 const TAG: u32 = 0xA_52A5;
 
-/// Measurement of the delay of the link to the autopilot by echoes (TIMESYNC). It gives an upper bound of the age of
-/// received messages.
+/// Measurement of the delay of the link to the autopilot by echoes (TIMESYNC). The measurement gives an upper bound of
+/// the age of received messages.
 ///
-/// A cable, a radio or a router may buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's
-/// clock may lose time. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes
-/// stay in order: a message received after a reply was sent after the request, so it is not older than the request.
+/// A cable, a radio or a router can buffer bytes for seconds. A heartbeat has no time stamp, and the autopilot's clock
+/// can run slow. The link therefore sends its own time twice a second, and the autopilot returns it. Bytes stay in
+/// order: a message received after a reply was sent after the request, so it is not older than the request.
 ///
 /// A request has a tag, drawn at each start of the companion. A reply buffered since before a restart therefore does
 /// not count.
@@ -519,7 +526,7 @@ pub(super) struct Echo {
     due: Option<Instant>,
     /// Time of the first TIMESYNC request to the autopilot; `None` before it.
     begun_at: Option<Instant>,
-    /// Time at which the newest TIMESYNC request with a reply was sent.
+    /// Time at which the newest TIMESYNC request with a reply was sent; `None` without a reply.
     answered_at: Option<Instant>,
 }
 
@@ -575,7 +582,7 @@ impl Echo {
         self.answered_at
     }
 
-    /// Returns true while the autopilot's messages may be older than `LATE`.
+    /// Returns true while the autopilot's messages are possibly older than `LATE`.
     pub(super) fn is_late(&self, now: Instant) -> bool {
         match (self.answered_at, self.begun_at) {
             (Some(at), _) => now.since(at) >= LATE,
@@ -602,7 +609,7 @@ const HALF: Duration = Duration::from_millis(4_000);
 
 /// Minimum number of messages in each half of the time window over which the minimum delay is taken.
 ///
-/// If the link pauses, a half may contain only the late messages that arrive after the pause. Their delay would then
+/// If the link pauses, a half can contain only the late messages that arrive after the pause. Their delay would then
 /// count as normal.
 const LEAST: u8 = 8;
 
@@ -676,9 +683,9 @@ impl RemoteClock {
     }
 }
 
-/// Converts `micros`, µs, to milliseconds, which wrap after 49 days as the autopilot's do.
+/// Converts `micros`, µs, to milliseconds, which wrap after 49 days like the autopilot's milliseconds.
 ///
-/// It uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
+/// The function uses 32-bit divisions only, because a 64-bit division takes a kilobyte of flash.
 #[expect(clippy::cast_possible_truncation, reason = "eight years are 48 bits")]
 pub(super) const fn millis(micros: u64) -> u32 {
     let high = (micros >> 16) as u32;
@@ -718,8 +725,8 @@ impl OffLine {
 
 /// Detection of a drone that is too far from the line Tx to Rx for the mission's coordinates.
 ///
-/// It finds Tx and Rx positions with latitude and longitude swapped, because these are valid and nothing else shows
-/// the mistake.
+/// It detects Tx and Rx positions with latitude and longitude swapped. Such positions are valid, and no other check
+/// finds the mistake.
 ///
 /// | position | effect |
 /// | --- | --- |
@@ -730,13 +737,13 @@ impl OffLine {
 pub(super) struct OffLineDetector {
     newest: Option<(Instant, Geodetic)>,
     reported_at: Option<Instant>,
-    /// True from a report on the ground of a position far from the line, until a position near the line.
+    /// True once a drone on the ground was reported as off the line; false once it is near the line.
     reported_on_ground: bool,
 }
 
 impl OffLineDetector {
-    /// Records a position of the drone that is too far from the line Tx to Rx. Returns true if a report is due: in
-    /// the air once in 10 s, on the ground only once until the drone is near the line again.
+    /// Records a position of the drone that is too far from the line Tx to Rx. Returns true if a report is due: in the
+    /// air once in 10 s, on the ground once, until the drone has been near the line.
     pub(super) fn record(&mut self, now: Instant, at: Geodetic, is_in_air: bool) -> bool {
         self.newest = Some((now, at));
         let is_wanted = is_in_air || !self.reported_on_ground;
@@ -749,13 +756,13 @@ impl OffLineDetector {
         true
     }
 
-    /// Records that the drone is near the line Tx-Rx again. After that a new departure from the line on the ground is reported again.
+    /// Records that the drone is near the line Tx-Rx. A drone on the ground that is far from the line after that is reported again.
     pub(super) const fn returned(&mut self) {
         self.newest = None;
         self.reported_on_ground = false;
     }
 
-    /// Returns the newest position, if it was far from the line and less than 3 s ago.
+    /// Returns the newest position if it is far from the line and less than 3 s old; else `None`.
     pub(super) fn newest(&self, now: Instant) -> Option<Geodetic> {
         let fresh = self
             .newest
@@ -788,7 +795,7 @@ mod tests {
         );
     }
 
-    /// Checks that messages may be old as long as no TIMESYNC request has been sent.
+    /// Checks that the link counts as late as long as no TIMESYNC request has been sent.
     #[test]
     fn the_delay_is_unknown_before_the_first_request() {
         assert!(Echo::default().is_late(Instant::ZERO));
@@ -872,8 +879,8 @@ mod clock_tests {
         assert!(ages.iter().skip(145).all(|age| *age < 20));
     }
 
-    /// Checks messages that a cable holds back and delivers at once after 7 s. The age of the first one is 7 s, and
-    /// later ones are the younger the later they were sent.
+    /// Checks messages that a cable holds back and delivers at once after 7 s. The age of the first message is 7 s.
+    /// Each later message has a smaller age, because it was sent later.
     #[test]
     fn a_burst_after_a_gap_is_old() {
         let held = 20_000..27_000;

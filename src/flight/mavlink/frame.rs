@@ -65,7 +65,7 @@ pub struct Known {
     pub id: u32,
     /// CRC seed: a digest of the message's fields, so that both ends use the same definition.
     pub crc_extra: u8,
-    /// Length of the message's original fields, bytes, without extensions that later dialects may add.
+    /// Length of the message's original fields, bytes, without extensions of later dialects.
     pub length: u8,
 }
 
@@ -109,12 +109,12 @@ pub mod id {
     pub const STATUSTEXT: u32 = 253;
 }
 
-/// Maximum number of bytes that later dialects may have added to a message as extensions. A longer message is treated
-/// as noise.
+/// Maximum number of bytes of extensions that a later dialect is assumed to add to a message. A longer message is
+/// treated as noise.
 const ADDED: u8 = 24;
 
 impl Known {
-    /// Maximum payload length of this message, bytes, with extensions that later dialects may add.
+    /// Maximum payload length of this message, bytes, with the assumed extensions of later dialects.
     pub const fn longest(self) -> u8 {
         self.length.saturating_add(ADDED)
     }
@@ -128,9 +128,10 @@ const fn known(id: u32, crc_extra: u8, length: u8) -> Known {
     }
 }
 
-/// Messages that the parser knows. These are messages of this crate, and messages whose payload may contain frames.
+/// Messages that the parser knows. These are messages of this crate, and messages whose payload can contain frames.
 ///
-/// The parser skips a message with such a payload as a whole, so that it does not find a frame inside.
+/// The parser skips a message with such a payload as a whole, so that it does not take a frame inside the payload for a
+/// received one.
 const TABLE: [Known; 31] = [
     known(id::HEARTBEAT, 50, 9),
     known(id::SYS_STATUS, 124, 31),

@@ -245,8 +245,8 @@ const SIK_ZERO: f32 = -52.154_27;
 
 /// Returns the noise power, W, for the value `noise` of a SiK radio's RADIO_STATUS.
 ///
-/// The radio's documentation states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise. `None`
-/// for 255 (unknown), and for 0, which a radio reports before its first measurement and which is below any real noise.
+/// The radio's documentation states `signal_dBm = (RSSI / 1.9) - 127` as an approximation, and the same units for noise. `None` for 255
+/// (unknown), and for 0, which a radio reports before its first measurement.
 ///
 /// Source: "SiK Radio, advanced configuration" of ArduPilot, on `LBT_RSSI`; mavros (`3dr_radio`) and INAV convert alike.
 pub fn noise_w(noise: u8) -> Option<f32> {
@@ -328,7 +328,7 @@ impl Parser {
         self.next_frame(|received, _| received)
     }
 
-    /// Returns the result of `read` for the next received message and the bytes of its frame.
+    /// Returns the result of `read` for the next received message and the bytes of its frame; else `None`.
     ///
     /// Work: for each received byte, at most one checksum over at most 266 bytes is computed. In real frames this
     /// happens at no more than one byte in ten, in maliciously chosen bytes at one in three.

@@ -55,7 +55,7 @@ pub enum Outgoing<'a> {
         boot_ms: u32,
         /// Target position of the drone.
         at: Geodetic,
-        /// Target velocity toward north, east and down, m/s; without it the autopilot stops at the target.
+        /// Target velocity toward north, east and down, m/s; `None` to stop at the target.
         velocity_m_s: Option<[f32; 3]>,
         /// Heading of the drone, radians clockwise from north; `None` leaves it to the autopilot.
         yaw_rad: Option<f32>,

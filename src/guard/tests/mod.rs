@@ -574,7 +574,7 @@ fn a_relay_out_of_order_grants_nothing() {
 
 /// Checks that a relay counts as held up after five reminders without a change of its setpoint.
 ///
-/// The same setpoint, computed anew, does not start the count again; another setpoint does.
+/// A setpoint with the same value does not restart the count; another setpoint does.
 #[test]
 fn a_setpoint_that_stays_for_five_reminders_is_held_up() {
     let mut own = Own::new(config(), 1, Instant::ZERO);

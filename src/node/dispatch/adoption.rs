@@ -91,7 +91,7 @@ impl Node {
     /// Replaces the active mission by the stored `mission` with the identifier `id`. `now` is `None` after a start.
     ///
     /// If the new mission has other positions of Tx and Rx, all relay positions become invalid: the relay has no
-    /// setpoint until the next agreement, and the guard (collision avoidance) starts again.
+    /// setpoint until the next agreement, and the guard (collision avoidance) restarts.
     pub(super) fn adopt(&mut self, mission: Mission, id: MissionId, now: Option<Instant>) {
         self.member.mission = mission;
         self.member.interference = *mission.interference();

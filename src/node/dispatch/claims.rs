@@ -146,7 +146,7 @@ impl Node {
     }
 
     /// Makes this passive relay active again, as after a restart. It leaves its view, because the other node with its
-    /// number may have changed this view in the meantime.
+    /// number has possibly changed this view in the meantime.
     pub(super) fn become_active(&mut self, now: Instant) {
         self.layers.neighbours.leave();
         self.layers.lease.end();

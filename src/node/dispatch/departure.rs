@@ -29,7 +29,7 @@ use crate::wire::message::{Hello, Requests};
 const IN_PLACE_M: f32 = 3.0;
 
 /// Time after which an ordered departure counts as blocked, in units of `dead_after`. The reason is that the two
-/// neighbours do not receive each other. The departure is requested again after the same time.
+/// neighbours do not receive each other. The departure is requested once more after the same time.
 const BLOCKED_AFTER: u32 = 4;
 
 /// State of a relay that leaves the chain or waits outside of it.
@@ -73,7 +73,7 @@ pub(crate) struct Leaving {
     ended: [bool; 2],
     /// True for each side whose neighbour has selected the relay beyond this relay.
     passed: [bool; 2],
-    /// True for a spare, also for one that has requested to leave since.
+    /// True if this relay is a spare. Remains true if the spare requests to leave.
     spare: bool,
     free: bool,
     /// True while the drone has no endurance for a return to the chain.
@@ -85,12 +85,14 @@ pub(crate) struct Leaving {
     /// Position at which the drone counts as in place. `None` until the chain has agreed, and while the setpoint
     /// moves.
     goal: Option<Placement>,
-    /// Spare (relay that waits outside) from which a frame was received last, and the time of this frame.
+    /// Spare (relay that waits outside) from which a frame was received last, and the time of this frame. `None` if no
+    /// such frame was received.
     heard_spare: Option<(u16, Instant)>,
-    /// Relay outside of the chain, on this side, that must be informed when it may leave.
+    /// Relay outside of the chain, at this side, that must be informed when it is allowed to leave. `None` if there is
+    /// none.
     waiting: Option<(Side, u16)>,
-    /// Relays that may leave and that were reported to the firmware. One bit mask for each side, with a bit for each
-    /// distance.
+    /// Relays that are allowed to leave, and that were reported to the firmware. One bit mask for each side, with a bit
+    /// for each distance.
     told: [u8; 2],
 }
 
@@ -214,14 +216,16 @@ impl Node {
         }
     }
 
-    /// Returns true until this relay has taken part in anything. The first leader has once it starts a pass.
+    /// Returns true until this relay has taken part in the protocol. For the first leader this ends when it starts a
+    /// pass.
     fn is_untouched(&self) -> bool {
         let Layers { round, view, .. } = &self.layers;
         let is_loaded = self.member.view == ViewId::LOADED && view.outstanding().is_none();
         round.is_fresh() || is_loaded && round.is_untouched()
     }
 
-    /// Cancels the request to leave if nothing of it has been granted. Returns true if it has cancelled it.
+    /// Cancels this relay's request to leave. Returns false, and does nothing, if the leader has already ordered the
+    /// departure, or if the relay has already left the chain.
     pub(crate) fn withdraw(&mut self, now: Instant) -> bool {
         let is_untouched = self.is_untouched();
         let leaving = &mut self.layers.leaving;
@@ -236,19 +240,20 @@ impl Node {
         true
     }
 
-    /// Returns true if every departure is refused for good.
+    /// Returns true if this relay cannot leave the chain with its settings: it has no guard, or two wires.
     pub(crate) fn is_refused(&self, now: Instant) -> bool {
         let refusal = self.layers.departure_refusal(now, &self.member);
         let lasting = [Departure::NeedsGuard, Departure::NeedsChannel];
         refusal.is_some_and(|why| lasting.contains(&why))
     }
 
-    /// Records if the drone has no endurance for a return to the chain.
+    /// Records if the drone has no endurance for a return to the chain: yes if `spent` is true.
     pub(crate) const fn set_spent(&mut self, spent: bool) {
         self.layers.leaving.spent = spent;
     }
 
-    /// Returns true if the drone may fly away; `None` unless this relay has requested to leave.
+    /// Returns true if the drone may fly away, false if it has to wait. `None` unless this relay has requested to
+    /// leave.
     pub(crate) fn leaves(&self) -> Option<bool> {
         let leaving = &self.layers.leaving;
         leaving.requested.then_some(leaving.free)
@@ -353,16 +358,16 @@ impl Node {
         neighbour == 0 || node.abs_diff(own) < neighbour.abs_diff(own)
     }
 
-    /// Returns true if node `to` at `side`, outside of the chain, may leave. It may leave once the view without it is
-    /// agreed on, and the relays of this view are in place.
+    /// Returns true if node `to` at `side`, outside of the chain, is allowed to leave. This is so once the view without
+    /// it is agreed on, and the relays of this view are in place.
     pub(super) fn frees(&self, side: Side, to: u16) -> bool {
         let lease = &self.layers.lease;
         let complete = lease.is_whole() && lease.until().is_some() && lease.orders().in_place;
         complete && self.layers.neighbours.at(side).is_agreed() && self.is_beside(side, to)
     }
 
-    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. The event is raised once;
-    /// again only after the node has been a neighbour again.
+    /// Raises an event for the firmware: the drone of node `to` at `side` may fly away. The event is raised once. It is
+    /// raised a second time only if the node was a neighbour in the meantime.
     pub(super) fn on_freed(&mut self, side: Side, to: u16) {
         let bit = mask(to.abs_diff(self.member.node));
         if let Some(told) = self.layers.leaving.told.get_mut(side as usize)
@@ -378,7 +383,8 @@ impl Node {
         self.layers.lease.orders().joiner == to && self.is_beside(side, to)
     }
 
-    /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to.
+    /// Updates the position at which this relay counts as in place; `wanted` is the position to fly to. `None` if there
+    /// is no such position.
     pub(super) fn update_goal(&mut self, wanted: Option<Placement>) {
         // Near a lost drone, or that of a relay that leaves, the guard's limit is as close as a relay gets.
         let is_held = [Side::Upstream, Side::Downstream]

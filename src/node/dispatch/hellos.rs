@@ -87,8 +87,7 @@ impl Node {
         }
     }
 
-    /// Returns the mission fields of a hello. They are for the stored mission, or for a newer mission that was
-    /// refused.
+    /// Returns the mission fields of a hello. They describe the stored mission, or a newer mission that was refused.
     fn mission_state(&self) -> MissionState {
         let (active, latest) = (self.member.active, self.layers.update.latest());
         if let Some(refused) = self.layers.update.refused_mission(active) {
@@ -225,8 +224,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records if node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly does
-    /// not receive this relay.
+    /// Records if node `from` receives this relay: yes if `heard` is true. Reports the node to the firmware if it
+    /// repeatedly does not receive this relay.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -294,8 +293,8 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay as its neighbour (`mutual`). If this has just
-    /// become true, retransmits unanswered messages, because the neighbour can answer now.
+    /// Records if the neighbour at `side` has selected this relay: yes if `mutual` is true. If this has just become
+    /// true, retransmits unanswered messages, because the neighbour can answer now.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {
             return;

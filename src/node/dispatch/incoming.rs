@@ -14,8 +14,8 @@ use crate::time::Instant;
 use crate::wire::message::Message;
 
 impl Node {
-    /// Handles an intact message from node `from` at `side`. Returns false if node `from` may not send such a
-    /// message. Work: at most the computation of this relay's positions for 16 target SIRs.
+    /// Handles an intact message from node `from` at `side`. Returns false if such a message is not allowed from node
+    /// `from`. Work: at most the computation of this relay's positions for 16 target SIRs.
     #[inline(never)]
     pub(crate) fn handle_message(
         &mut self,
@@ -224,8 +224,8 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first` is
-    /// true), messages that the node could not verify are sent again.
+    /// Handles a valid signed frame of node `from` at `side`. If it is the first frame of a session (`first` is true),
+    /// messages that the node could not verify are repeated.
     pub(crate) fn on_authentic(&mut self, now: Instant, side: Side, from: u16, first: bool) {
         if self.ground_side(from).is_some() {
             return;
@@ -291,7 +291,7 @@ impl Node {
     }
 
     /// Returns the side of node `sender`. `None` unless the node is a neighbour, a possible neighbour, or a ground
-    /// station that may upload missions.
+    /// station that is permitted to upload missions.
     pub(crate) fn side_of(&self, sender: u16) -> Option<Side> {
         if let Some(side) = self.ground_side(sender) {
             return Some(side);

@@ -322,8 +322,7 @@ impl Node {
         }
     }
 
-    /// Starts the search for the best target SIR again. Has an effect only at the leader, and not during a view
-    /// change.
+    /// Restarts the search for the best target SIR. Has an effect only at the leader, and not during a view change.
     pub(crate) fn restart(&mut self, now: Instant) {
         let leads = self.member.index == self.member.mission.leader();
         let is_in = !self.is_passive() && !self.layers.leaving.is_outside();
@@ -360,15 +359,16 @@ impl Layers {
         }
     }
 
-    /// Returns true if a view proposal from `side` is early. It would leave out relays that are about to be linked.
-    /// This is assumed for a short time after the sender became the neighbour, if the proposal has visited fewer
-    /// relays than the previous proposal.
+    /// Returns true if a view proposal from `side` comes too early. Such a proposal would leave out relays that are
+    /// about to be linked. A proposal counts as early if it has visited fewer relays than the previous proposal, and
+    /// its sender has only just become the neighbour.
     pub(super) fn is_premature(&self, now: Instant, side: Side, proposal: &Proposal) -> bool {
         let place = self.view.rank_and_count().map_or(0, |(place, _)| place);
         self.neighbours.at(side).has_grace(now) && proposal.place.saturating_add(1) < place
     }
 
-    /// Schedules retransmissions of all messages that await a reply. Called when the next relay can be reached again.
+    /// Schedules retransmissions of all messages that await a reply. Called when the next relay is reachable after a
+    /// loss.
     pub(super) fn resend(&mut self) {
         self.view.resend();
         self.round.resend();
@@ -392,7 +392,7 @@ pub(super) struct Telemetry {
 /// their neighbours.
 const FIRST_RETENTION: u32 = 3;
 
-/// Time without a quorum after which relays drop their links again, in units of `dead_after`.
+/// Time until relays without a quorum drop their links once more, in units of `dead_after`.
 const LATER_RETENTION: u32 = 4;
 
 /// Timer after which relays without a quorum drop the links to their neighbours and search for others.

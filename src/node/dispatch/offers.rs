@@ -12,8 +12,8 @@ use crate::wire::message::{Hello, Message};
 use crate::wire::upload::{Upload, UploadError};
 
 impl Node {
-    /// Handles a message from the ground station at `side`, Tx or Rx. Returns false if a ground station may not send
-    /// this kind of message.
+    /// Handles a message from the ground station at `side`, Tx or Rx. Returns false if this kind of message is not
+    /// allowed from a ground station.
     pub(super) fn on_ground(
         &mut self,
         now: Instant,
@@ -101,7 +101,7 @@ impl Node {
     ///
     /// An offer that repeats no recent number is answered by a hello; the next offer can repeat the number of this
     /// hello. After any other offer a hello is sent only if this relay has stored or refused the mission, or has a
-    /// newer mission. Otherwise the hello would trigger the same offer again.
+    /// newer mission. Otherwise the hello would trigger a repetition of the offer.
     pub(super) fn on_offer(
         &mut self,
         now: Instant,

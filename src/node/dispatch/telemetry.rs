@@ -28,8 +28,8 @@ impl Node {
         self.reporting.handle_frame(now, from);
     }
 
-    /// Returns the next node to which a handshake must be sent. No report from this node has arrived. `None` if there
-    /// is no such node.
+    /// Returns the next node to which a handshake must be sent, because no report of this node has arrived. `None` if
+    /// there is no such node.
     pub(crate) fn poll_greeting(&mut self) -> Option<u16> {
         self.reporting.poll_greeting()
     }
@@ -50,8 +50,8 @@ impl Node {
         self.reporting.poll(now, member, neighbours, wait, own)
     }
 
-    /// Returns the time by which telemetry reports are delayed. An agreement on positions uses the shared channel
-    /// first.
+    /// Returns the delay of telemetry reports. Above 0 only on a shared channel during an agreement on positions, which
+    /// needs the channel.
     pub(super) fn telemetry_waits(&self) -> Duration {
         let is_idle = matches!(
             self.phase(),

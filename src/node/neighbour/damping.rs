@@ -75,7 +75,7 @@ struct Link {
     losses: u8,
     /// True if the last loss does not count as flapping, because the channel was bad.
     excused: bool,
-    /// True if the last loss was an outage: no frame was received for longer than `dead_after` after it.
+    /// True if the last loss was an outage: no frame came for longer than `dead_after` after the loss.
     was_down: bool,
     /// Time between the last two losses of the link; 0 if no earlier loss counted.
     interval: Duration,
@@ -115,7 +115,7 @@ impl Link {
     }
 
     /// Records a loss of the link. `losses` is the number of recent losses before this loss. If `counted` is false,
-    /// this number stays the same at first; a long silence after the loss counts it later.
+    /// this loss does not count yet; it counts later if the node is then silent for long.
     fn record_loss(&mut self, losses: u8, counted: bool, now: Instant) {
         *self = Self {
             lost_at: now,
@@ -135,7 +135,8 @@ impl Link {
 /// Records of lost links to the four nearest nodes on one side, nearest node first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
-    /// Node that will be selected as the neighbour once it has been received without gaps for long enough.
+    /// Node that will be selected as the neighbour once it has been received without gaps for long enough. `None` if
+    /// there is no such node.
     candidate: Option<Heard>,
     links: [Link; CANDIDATES as usize],
 }
@@ -164,9 +165,9 @@ impl Damping {
         self.links.get_mut(usize::from(distance).wrapping_sub(1))
     }
 
-    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames (`counts`
-    /// is false) only the loss of a flapping link counts. If another link on this side flaps, this link takes over
-    /// its loss count, because all links of a side cross the same gap in the chain.
+    /// Records the loss of the link to the node `distance` relays away. On a channel that loses many frames `counts` is
+    /// false: then only the loss of a flapping link counts. If another link on this side flaps, the lost link takes
+    /// over the loss count of the flapping link. Reason: all links of a side cross the same gap in the chain.
     pub(super) fn record_loss(
         &mut self,
         distance: u16,
@@ -214,8 +215,8 @@ impl Damping {
         link.back = Some(Heard::updated(link.back, distance, now, gap));
     }
 
-    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false earlier
-    /// than `probe_after` after `since`.
+    /// Returns true if no node has answered the search for a neighbour that began at `since`. Always false until the
+    /// search has lasted for `probe_after`.
     fn is_unanswered(&self, since: Instant, now: Instant, settings: &Settings) -> bool {
         let answers = |link: &Link| link.back.is_some_and(|back| back.last >= since);
         now.since(since) >= settings.probe_after && !self.links.iter().any(answers)
@@ -270,8 +271,8 @@ impl Damping {
         self.candidate = None;
     }
 
-    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node
-    /// has been received without gaps for long enough: for `probe_after` or `more`, whichever is longer.
+    /// Records a frame of the node `distance` relays away, a candidate for the neighbour. Returns true if the node has
+    /// been received without gaps for at least `probe_after` and at least `more`.
     pub(super) fn has_waited(
         &mut self,
         distance: u16,

@@ -54,8 +54,8 @@ impl ReportLimiter {
         nodes: 0,
     };
 
-    /// Returns true if the node `distance` relays away may be reported now, and marks it as reported. A node may be
-    /// reported once a minute.
+    /// Returns true if a report of the node `distance` relays away is allowed now. Marks the node as reported. One
+    /// report a minute is allowed for each node.
     pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
         if now.since(self.since) >= MINUTE {
             *self = Self {
@@ -124,7 +124,7 @@ pub(super) struct Hellos {
 impl Hellos {
     pub(super) const NONE: Self = Self { due: 0, reply: 0 };
 
-    /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
+    /// Schedules a hello to the node `distance` relays away; if `ask` is true it requests an answer.
     pub(super) const fn schedule(&mut self, distance: u16, ask: bool) {
         let bit = mask(distance);
         self.due |= bit;

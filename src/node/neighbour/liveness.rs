@@ -107,7 +107,7 @@ pub(crate) struct Liveness {
 pub(crate) struct Silence {
     /// True if this check has found that the neighbour is lost.
     pub(crate) lost: bool,
-    /// Time at which the neighbour's silence is checked again.
+    /// Time of the next check of the neighbour's silence.
     pub(crate) next_check: Instant,
 }
 
@@ -130,10 +130,10 @@ impl Liveness {
         }
     }
 
-    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is
-    /// kept, because it describes the channel. The unanswered requests to the previous node count as a run. But they
-    /// do not count if the link `was_down`, because they then measure an outage. If the link `flaps` slowly, all runs
-    /// are dropped.
+    /// Restarts the liveness record for another node as the neighbour. The longest run of unanswered requests is kept,
+    /// because it describes the channel. The unanswered requests to the previous node count as a run, unless `was_down`
+    /// is true: they then measure an outage of the link. If `flaps` is true (the link flaps slowly), all runs are
+    /// dropped.
     pub(crate) fn renew(&mut self, now: Instant, was_down: bool, flaps: bool) {
         let longest = if flaps {
             MIN_REQUESTS
@@ -163,7 +163,9 @@ impl Liveness {
         self.lost && !self.was_received
     }
 
-    /// Returns the longest silence that lost frames alone can explain, if a request is sent every `tick`.
+    /// Returns the longest silence of a live neighbour, caused only by lost frames.
+    ///
+    /// The silence is counted as lost requests, one every `tick`.
     pub(crate) fn longest_gap(&self, tick: Duration) -> Duration {
         tick.times(u32::from(self.longest.saturating_mul(MARGIN)))
     }
@@ -218,8 +220,8 @@ impl Liveness {
         !self.lost
     }
 
-    /// Checks at `now` if the silent neighbour is lost. It is never lost before a silence of `dead`. `tick` is the
-    /// time to the next check.
+    /// Checks at `now` if the silent neighbour is lost. The neighbour is never lost before a silence of `dead`. `tick`
+    /// is the time to the next check.
     pub(crate) fn review_silence(
         &mut self,
         now: Instant,

@@ -41,7 +41,7 @@ enum NeighbourState {
     NoPeer,
     /// Linked: this relay and the node have selected each other, by the node's last report.
     Linked,
-    /// Pairing: this relay has selected a node, but this node has not selected this relay, or no longer.
+    /// Pairing: this relay has selected a node, but this node does not select this relay (any more).
     Pairing {
         since: Instant,
     },
@@ -57,7 +57,7 @@ pub(crate) struct Neighbour {
     pub(super) node: u16,
     pub(super) agreed: AgreedNodes,
     /// End of the time after the selection of a neighbour in which no new view is requested. The relay beyond the
-    /// neighbour may select the neighbour at the same time. One view change is enough for both selections.
+    /// neighbour possibly selects the neighbour at the same time. One view change is enough for both selections.
     grace: Instant,
     state: NeighbourState,
     pub(super) liveness: Liveness,
@@ -261,9 +261,9 @@ impl Neighbour {
 
     /// Handles the timer of this side. Returns true if the neighbour has become lost by this call.
     ///
-    /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, another node may be selected in
-    /// place of a lost neighbour, as on a shared channel. `interval` is the time between heartbeat requests; `None`
-    /// for the usual time.
+    /// A neighbour is not lost before a silence of `dead`. If `can_search` is true, another node can be selected in
+    /// place of a lost neighbour, as on a shared channel. `interval` is the time between heartbeat requests; `None` for
+    /// the usual time.
     pub(crate) fn handle_timeout(
         &mut self,
         now: Instant,
@@ -398,7 +398,7 @@ impl Neighbour {
         node != 0 && self.dropped == node
     }
 
-    /// Drops the selected neighbour and searches again. Reason: the reachable relays are too few for a quorum.
+    /// Drops the selected neighbour and starts a new search. Reason: the reachable relays are too few for a quorum.
     pub(crate) fn drop_link(&mut self, now: Instant) {
         if matches!(
             self.state,
@@ -499,8 +499,8 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns the number of nodes between this relay and the candidate, without the lost next node. For each of
-    /// these nodes the selection is delayed, because a nearer node may still answer.
+    /// Returns the number of nodes between this relay and the candidate, without the nearest node. The nearest node is
+    /// lost. Each of the other nodes delays the selection of the candidate, because a nearer node could still answer.
     pub(super) const fn beyond(self) -> u16 {
         self.distance.saturating_sub(2)
     }
@@ -526,8 +526,8 @@ impl Neighbour {
         self.node == self.agreed.node()
     }
 
-    /// Records where a view proposal came from: the neighbour on this side, or this relay itself. A relay itself
-    /// proposes only without a neighbour toward the leader.
+    /// Records where a view proposal came from: the neighbour on this side, or this relay itself. This relay makes a
+    /// proposal only if it has no neighbour toward the leader.
     pub(crate) const fn proposed_by(&mut self, proposer: Proposer) {
         self.agreed.proposed_by(proposer, self.node);
     }
@@ -625,7 +625,7 @@ impl PendingHeartbeat {
 
 /// Number of consecutive hellos without this relay in their list, after which their sender is reported. A hello lists
 /// the nodes that its sender receives. This relay receives the sender, but the sender does not seem to receive this
-/// relay. A smaller number may be due to a lost frame or two.
+/// relay. A smaller number is possibly due to one or two lost frames.
 const NOT_RECEIVED: u8 = 8;
 
 /// Number of consecutive handshakes of a node with another key after which the node is reported.
@@ -765,7 +765,7 @@ impl Neighbour {
         Some((self.node, number, reply))
     }
 
-    /// Schedules a hello to the node `distance` relays away; with `ask` it requests an answer.
+    /// Schedules a hello to the node `distance` relays away; if `ask` is true it requests an answer.
     pub(crate) const fn schedule_hello(&mut self, distance: u16, ask: bool) {
         self.hellos.schedule(distance, ask);
     }

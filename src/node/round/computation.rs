@@ -38,11 +38,11 @@ pub(super) enum PassKind {
 pub(super) struct JointPlace {
     /// Lateral offset and altitude of the position that this relay computed.
     pub(super) cross_section: CrossSection,
-    /// Largest x that this relay may take, m. Beyond it, the later relays could not keep the minimum separation. Not
+    /// Largest allowed x of this relay, m. Beyond this x the later relays could not keep the minimum separation. Not
     /// used in an interference field.
     pub(super) end_m: f32,
-    /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays may stop
-    /// before that x to help the next hop.
+    /// True for a plain pass: every relay takes the farthest x that meets the target SIR. False if relays are allowed
+    /// to stop before that x, to help the next hop.
     pub(super) plain: bool,
 }
 
@@ -52,7 +52,8 @@ pub(super) struct FittedSlots {
     /// x of this relay in its joint solution, m, and its slots at this x, as shares of the frame. `None` without a
     /// solution.
     pub(super) solved: Option<(f32, SlotShares)>,
-    /// Begin and end of this relay's slots at the agreed positions, as shares of the frame.
+    /// Begin and end of this relay's slots at the agreed positions, as shares of the frame. `None` without an
+    /// agreement.
     pub(super) agreed: Option<SlotShares>,
 }
 
@@ -150,7 +151,7 @@ impl Computation {
         self.after = None;
     }
 
-    /// Starts the leader's search for the best target SIR again, from its first step.
+    /// Restarts the leader's search for the best target SIR from its first step.
     pub(crate) fn restart(&mut self) {
         self.task.clear();
         // A new solution makes the leader try the same targets as the first time.
@@ -202,8 +203,8 @@ impl Computation {
         self.began = true;
     }
 
-    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`, if
-    /// `ladder` is `Some`. `last` is true if no other algorithm follows.
+    /// Starts the search for the highest feasible target SIR. The first sweep tries the targets in `ladder`; with
+    /// `None`, the search's own first targets. `last` is true if no other algorithm follows.
     pub(super) fn search_with(
         &mut self,
         context: &Context<'_>,
@@ -456,7 +457,7 @@ impl LeaderTask {
     }
 
     /// Starts a search for the highest feasible target SIR. `last` is true if no other algorithm follows. `given` is
-    /// true if the configured altitudes are used because the altitudes of the joint method failed.
+    /// true if the relays keep the configured altitudes, because the joint method found no altitudes.
     pub(crate) fn search(&mut self, search: Search, last: bool, given: bool) {
         *self = Self::Searching {
             search,
@@ -478,7 +479,7 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes that the joint method has computed.
     pub(crate) chosen: bool,
-    /// True if a later relay on this pass has its own power or fixed altitude, other than the mission's.
+    /// True if a later relay on this pass has a power or fixed altitude that differs from the mission's.
     pub(crate) own: bool,
     behind: Option<Behind>,
     /// Farthest x in the direction of the pass at which the previous node meets each target SIR, m.
@@ -577,8 +578,8 @@ impl SweepPass {
         true
     }
 
-    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from it the x that the previous relay
-    /// must take. If the previous relay has no such x, the commitment is revoked.
+    /// Stores this relay's x for the committed target SIR, `place`, m. Computes from `place` the x that the previous
+    /// relay must take. If there is no such x, or `place` is `None`, the commitment is revoked.
     fn store_position(&mut self, link: &Link<'_>, place: Option<f32>) {
         if self.verdict.commit.is_none() {
             return;

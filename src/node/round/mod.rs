@@ -217,7 +217,7 @@ impl Round {
         self.work_at = Some(now + PAUSE);
     }
 
-    /// Cancels the next step of a computation: the first leader starts no pass.
+    /// Cancels the next step of a computation. The first leader thus starts no pass if it leaves the chain before.
     pub(crate) const fn cancel_work(&mut self) {
         self.work_at = None;
     }
@@ -253,13 +253,13 @@ impl Round {
         self.computation.discard_agreed_place();
     }
 
-    /// Schedules a retransmission of an outstanding pass message. Called when the next relay can be reached again.
+    /// Schedules a retransmission of an outstanding pass message. Called when the next relay is reachable after a loss.
     pub(crate) fn resend(&mut self) {
         self.circulation.resend();
     }
 
-    /// Returns the pending message of a pass along the chain, and starts its retransmission timer. `None` if the next
-    /// relay is not `reachable`.
+    /// Returns the pending message of a pass along the chain, and starts its retransmission timer. `None` if there is
+    /// none, or if `reachable` is false: the next relay cannot be reached.
     pub(crate) fn poll_onward(
         &mut self,
         context: &Context<'_>,
@@ -272,8 +272,8 @@ impl Round {
         reachable.then_some(message)
     }
 
-    /// Returns the pending reply to the previous relay and marks it as sent. `None` if no reply is pending, or if the
-    /// previous relay is not `reachable`.
+    /// Returns the pending reply to the previous relay and marks it as sent. `None` if no reply is pending, or if
+    /// `reachable` is false: the previous relay cannot be reached.
     pub(crate) fn poll_back(&mut self, context: &Context<'_>, reachable: bool) -> Option<Message> {
         match self.circulation.poll_reply().filter(|_| reachable)? {
             Reply::Result => self.computation.back(context),

@@ -35,7 +35,7 @@ const PATIENCE: u8 = 4;
 /// message along the chain that collects measurements.
 const TRIALS_A_PERIOD: u64 = 8;
 
-/// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
+/// Number of consecutive measurements at or below the noise after which a sensor is possibly faulty.
 const SILENT: u8 = 8;
 
 impl Computation {
@@ -54,8 +54,8 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that may start a sensing pass, which collects measurements. The chain must have
-    /// agreed, or have no feasible target.
+    /// Returns true at a leader that is allowed to start a sensing pass, which collects measurements. The chain must
+    /// have agreed, or have no feasible target.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
@@ -270,10 +270,10 @@ impl Computation {
 
     /// Checks this relay's sensor by comparison with the measurements of all other relays.
     ///
-    /// A relay whose measurement is absurd excludes itself. A relay that measures nothing, although the measurements
-    /// of the other relays predict interference at its position, is marked as deaf. A relay that excluded itself
-    /// earlier checks if its measurements fit again. Unless it excludes itself now, it adds its own sums to the
-    /// result.
+    /// A relay whose measurement is absurd excludes itself. A relay that measures nothing, although the measurements of
+    /// the other relays predict interference at its position, is marked as deaf. A relay that excluded itself earlier
+    /// checks if its measurements now fit. Finally the relay adds its own sums to the result, unless it has just
+    /// excluded itself.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,

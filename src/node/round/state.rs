@@ -36,7 +36,7 @@ pub enum Phase {
     Infeasible,
     /// A new view (set of members) is proposed; passes wait for its decision.
     ViewChange,
-    /// Missing quorum: too few relays are reachable. They keep their positions.
+    /// Missing quorum: too few relays are reachable. The relays keep their positions.
     NoQuorum,
 }
 
@@ -89,8 +89,8 @@ impl Arrival {
     }
 }
 
-/// Maximum number of passes by which a late message may be behind the current pass. A pass is a message along the
-/// chain. A message that is farther behind is foreign: its leader has restarted.
+/// Maximum number of passes by which a late message is allowed to be behind the current pass. A pass is a message along
+/// the chain. A message that is farther behind is foreign: its leader has restarted.
 const STRAGGLERS: u16 = 32;
 
 /// Divisor of the numbers of first passes. The number of a first pass is a multiple of 64: the first pass of a view,

@@ -15,7 +15,8 @@ use core::task::Poll;
 /// Number of positions that one call of [`Computation::continue_turn`] evaluates in Algorithm 2. The first value is for
 /// traffic from Tx to Rx only, the second for both directions.
 ///
-/// A call also completes the current altitude of the search grid, which is at most 24 or 194 positions more.
+/// A call also completes the current altitude of the search grid: at most 24 more positions, or 194 for both
+/// directions.
 const PLACES_AT_ONCE: [u16; 2] = [600, 300];
 
 fn neighbour(context: &Context<'_>, place: Placement, power_w: f32) -> HopEnd {

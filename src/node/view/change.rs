@@ -28,7 +28,7 @@ use crate::view::{View, ViewId};
 use crate::wire::digest::MissionId;
 use crate::wire::message::{Decision, Message, Poll, Proposal};
 
-/// Maximum amount by which one message may raise the latest known view number. One message thus cannot use up all
+/// Maximum amount by which one message can raise the latest known view number. So one message cannot use up all
 /// numbers.
 const MAX_ADVANCE: u32 = 4096;
 
@@ -103,8 +103,8 @@ impl ViewChange {
     }
 
     /// Records that another relay knows `view`. The latest known view advances by at most [`MAX_ADVANCE`] numbers,
-    /// because one message could otherwise use up all of them. A relay that was away for long catches up, because it
-    /// receives `view` repeatedly.
+    /// because one message could otherwise use up all of them. A relay that was away for long receives `view`
+    /// repeatedly, and so catches up.
     #[inline(never)] // called from many places
     pub(crate) fn observe_view(&mut self, view: ViewId) {
         if view > self.newest {
@@ -112,8 +112,8 @@ impl ViewChange {
         }
     }
 
-    /// Records that all members of `view` have accepted it, as a pass in that view proves. Ignored if `view` is not the view that this
-    /// relay has accepted last.
+    /// Records that all members of `view` have accepted it. A pass in that view is the proof. The call has no effect if
+    /// `view` is not the view that this relay has accepted last.
     pub(crate) fn commit(&mut self, view: ViewId) {
         if self.electorate.awaits(view) {
             self.electorate.commit();
@@ -130,8 +130,8 @@ impl ViewChange {
         self.proposed
     }
 
-    /// Returns this relay's rank and the number of relays, as of the last view proposal. `None` without a proposal.
-    /// Ranks count from 1 at the leader.
+    /// Returns this relay's rank in the last view proposal, and the number of relays of the proposal. Ranks count from
+    /// 1 at the leader. `None` without a proposal.
     pub(crate) fn rank_and_count(&self) -> Option<(u16, u16)> {
         let proposed = self.proposed?;
         Some((proposed.rank, proposed.reached.max(proposed.rank)))
@@ -159,8 +159,8 @@ impl ViewChange {
         self.request.request_now(now);
     }
 
-    /// Handles a view proposal or a decision from a neighbour. This relay has stored the mission of the proposed
-    /// view.
+    /// Handles a view proposal or a decision from a neighbour. Call it only if this relay has stored the mission of the
+    /// proposed view.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let all = context.member.all;
         match message {
@@ -214,9 +214,9 @@ impl ViewChange {
         Effects::STALE.by(Proposer::Neighbour)
     }
 
-    /// Votes on the proposed `view`, after the `place` relays that the proposal has already visited. `received` has
-    /// the votes of these relays; `None` at the proposer. Returns the effects on the other layers. `None` if this
-    /// relay has already promised (Paxos) this view or a later one.
+    /// Votes on the proposed `view`, and returns the effects on the other layers. The proposal has already visited
+    /// `place` relays. `received` has the votes of these relays; `None` at the proposer. The result is `None` if this
+    /// relay has already promised (Paxos) `view` or a later view.
     pub(super) fn propose(
         &mut self,
         context: &Context<'_>,
@@ -291,7 +291,7 @@ impl ViewChange {
         self.apply_view_verdict(context, verdict)
     }
 
-    /// Schedules another view proposal after a refusal, because more relays may be reachable then.
+    /// Schedules another view proposal after a refusal, because more relays can be reachable by then.
     pub(super) fn retry_after_refusal(&mut self, context: &Context<'_>) {
         let wait = context.settings().probe_after;
         self.request.request_after_refusal(context.now, wait);
@@ -510,8 +510,8 @@ pub(crate) struct Proposed {
     /// Node to which the proposal was forwarded; `None` until it is forwarded. The proposal is never sent to a second
     /// node, because two views with the same identifier could result.
     pub(super) forwarded_to: Option<u16>,
-    /// View that the decided view replaces. Before the decision this field has the newest view known to be agreed on;
-    /// the decided view may replace another view.
+    /// View that the decided view replaces. Before the decision: the newest view known to be agreed on. The decision
+    /// can name another view.
     pub(crate) base: View,
     /// Number of relays that the view proposal has reached; 0 until its decision is known.
     pub(super) reached: u16,
@@ -549,7 +549,7 @@ pub(crate) struct ViewRequest {
     /// Number of consecutive refusals of view proposals, for lack of a quorum.
     refusals: u8,
     /// Earliest time of the next view request after a refusal, if a new reason for a view arises. `None` if a new
-    /// reason does not advance the request.
+    /// reason does not make the request earlier.
     not_before: Option<Instant>,
     jitter: Jitter,
 }
@@ -573,8 +573,8 @@ impl ViewRequest {
         self.pending
     }
 
-    /// Requests a view, and repeats the request until a view is decided. If a request waits after a refusal, this
-    /// call shortens the wait, because something has changed.
+    /// Requests a view, and repeats the request until a view is decided. If a request waits after a refusal, this call
+    /// shortens the wait, because there is a new reason for a view.
     pub(crate) fn start(&mut self, now: Instant) {
         if !self.pending {
             self.request_now(now);
@@ -630,8 +630,8 @@ impl ViewRequest {
         self.at.is_some_and(|at| at <= now)
     }
 
-    /// Handles the expired timer of view requests. Returns true if a request must be sent: one is pending, or this
-    /// relay is `fresh` (no pass or view since its start).
+    /// Handles the expired timer of view requests. Returns true if the relay must send a request. This is so if a
+    /// request is pending, or if this relay is `fresh` (no pass or view since its start).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {

@@ -53,9 +53,9 @@ pub(crate) struct Electorate {
     /// True if this relay is a member of the view `agreed`, so that its vote counts.
     pub(super) member: bool,
     pub(super) promised: ViewId,
-    /// View that this relay has accepted but does not know to be agreed on; `None` if there is none.
+    /// View that this relay has accepted, without knowing if a quorum has; `None` if there is none.
     pub(super) accepted: Option<Successor>,
-    /// View proposals that this relay has voted on and that may still become views, latest first.
+    /// View proposals that this relay has voted on and that can still become views, latest first.
     pub(super) voted: [ViewId; VOTES],
     /// Node number of the leader before any view change. Of two halves of the initial view, the half with this node
     /// has the quorum.
@@ -89,9 +89,9 @@ impl Electorate {
         self.agreed
     }
 
-    /// Votes on the view `proposal`, and returns the votes so far, including this one. `None` if this relay has
-    /// already promised `proposal` or a later view. `received` has the votes of earlier relays; `None` at the
-    /// proposer. `other_leases` has the remaining times of other relays' leases.
+    /// Votes on the view `proposal`, and returns the votes so far, including this vote. `None` if this relay has already promised
+    /// `proposal` or a later view. `received` has the votes of earlier relays; `None` at the proposer. `other_leases` has the remaining
+    /// times of other relays' leases.
     pub(crate) fn vote(
         &mut self,
         node: u16,
@@ -139,8 +139,7 @@ impl Electorate {
         Some(poll)
     }
 
-    /// Returns true if the vote of `node`, this relay, is not enough for a quorum on `proposal`. The function only
-    /// checks; it does not vote.
+    /// Returns true if the vote of this relay, `node`, is not enough for a quorum on `proposal`. The relay does not vote in this call.
     pub(super) fn lacks_quorum_alone(
         &self,
         node: u16,
@@ -215,8 +214,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. The result is at most
-/// `most`; `most` also stands for an unknown time.
+/// Returns the time until relays are allowed to use positions of the next view, in tenths of a second. The result is at most `most`; `most`
+/// also stands for an unknown time.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };

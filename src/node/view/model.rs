@@ -86,7 +86,8 @@ fn departures_and_joins_keep_one_sequence_of_views() {
     }
 }
 
-/// Checks that the model check finds a departure that reduces the quorum before it is agreed on.
+/// Checks that the model check finds a wrong rule for departures. By this rule a departure reduces the quorum before
+/// the chain has agreed on the departure.
 #[test]
 fn the_check_finds_the_fault_of_counting_only_the_relays_inside() {
     let check = Check {
@@ -212,7 +213,7 @@ pub(super) struct Chain {
     pub(super) relays: Vec<RelayState>,
     /// Part number of each relay while links are cut. Relays with equal numbers reach each other.
     pub(super) parts: Vec<u8>,
-    /// Frames that were sent and may still arrive, sorted and without duplicates.
+    /// Frames that were sent and can still arrive, sorted and without duplicates.
     pub(super) air: Vec<Frame>,
     /// Views that the relays of the model have ever decided on.
     pub(super) decided: Vec<DecidedView>,
@@ -224,7 +225,7 @@ pub(super) struct Chain {
     pub(super) losses: u8,
     /// Bit mask of the relays outside of the chain; bit 0 is the first relay.
     pub(super) outside: u8,
-    /// Number of departures and joins that may still happen in this run of the model.
+    /// Number of departures and joins that can still happen in this run of the model.
     pub(super) moves: u8,
 }
 
@@ -613,8 +614,9 @@ impl Check {
         !twice(&decrees) && !twice(&agreed)
     }
 
-    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. No such view may
-    /// have more member relays than its number of relays.
+    /// Returns true if each view that a relay knows as agreed on is in the list of agreed views. Each of these views
+    /// must also have at most as many members as its number of relays. A member is a relay that knows this view as the
+    /// newest agreed view, and has a vote in it.
     pub(super) fn is_known_and_counted(&self, chain: &Chain) -> bool {
         self.rule != Rule::Members
             || chain.relays.iter().all(|unit| {
@@ -630,7 +632,7 @@ impl Check {
     }
 }
 
-/// Maximum number of proposals that a chain may need to agree on a view once its links are restored.
+/// Maximum number of proposals that a chain is allowed to need for a view once its links are restored.
 pub(super) const MAX_PROPOSALS: u8 = 3;
 
 impl Check {

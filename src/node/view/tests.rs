@@ -377,7 +377,7 @@ fn a_decision_counts_only_for_its_mission() {
     assert_eq!(relay.handle(&decision), granted);
 }
 
-/// Checks that a relay ignores a decision on a view with an older mission than it has stored.
+/// Checks that a relay ignores the decision on a view whose mission is older than its stored mission.
 #[test]
 fn a_relay_without_the_mission_is_not_in_its_view() {
     let mut relay = Relay::second();

@@ -25,12 +25,12 @@ const LEAST_TRUST: f32 = 1e-4;
 /// from Tx to Rx. The minimum is needed because the rate is a divisor; the rate is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First amount by which the limit of the target is raised, in ln(SIR). The limit is raised if the chain meets it,
-/// but does not meet the upper bound of all chains.
+/// First increase of the limit of the target, in ln(SIR). The limit is raised if the chain meets it, but does not meet
+/// the upper bound of all chains.
 const EXCESS: f32 = 0.03;
 
-/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. The limit keeps the slack from
-/// outweighing a penalty.
+/// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
+/// outweigh the penalty for relays too near the interferer.
 const SPARE: f32 = 3e-3;
 /// Smallest upper limit on the chain's slack, divided by the distance from Tx to Rx.
 const LEAST_SPARE: f32 = 4e-5;
@@ -63,10 +63,10 @@ pub(crate) enum AscentStep {
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute the relays' moves anew for the current chain. This takes a backward pass from the last relay to the
+    /// Compute new moves of the relays for the current chain. This takes a backward pass from the last relay to the
     /// first.
     Again,
-    /// End the improvement of this chain, or repeat it with a lower limit on the slack if this may help.
+    /// End the improvement of this chain, or repeat the improvement with a lower limit on the slack.
     Over,
 }
 
@@ -81,7 +81,7 @@ pub(crate) struct Ascent {
     /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If the chain misses
     /// the bound, this limit is raised.
     pub(crate) limit: f32,
-    /// Amount by which `limit`, the target at which the chain is checked, is raised next, in ln(SIR).
+    /// Next increase of `limit`, the target at which the chain is checked, in ln(SIR).
     excess: f32,
     /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. The limit is lowered if relays
     /// are too near the interferer, because a large slack would outweigh the penalty for their positions.
@@ -226,7 +226,7 @@ impl Ascent {
         self.slack.abs() < least && (self.linear + self.square).abs() < least
     }
 
-    /// Returns true if the improvement diverges. The chain then still falls far short of Rx after some iterations.
+    /// Returns true if the improvement diverges: after 12 iterations the chain still falls far short of Rx.
     pub(crate) fn is_astray(&self) -> bool {
         self.iterations >= ASTRAY_AFTER && self.slack < -ASTRAY * self.distance_m
     }
@@ -285,8 +285,9 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next action after a trial that did not improve the chain. The next trial makes a smaller fraction of the computed moves.
-    /// After the smallest fraction the moves are computed anew, with a lower maximum length of each move.
+    /// Returns the next action after a trial that did not improve the chain. The next trial makes a smaller fraction of
+    /// the computed moves. After the smallest fraction the action is to compute new moves, with a lower maximum length
+    /// of each move.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();

@@ -54,8 +54,9 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, that leaves the relays after it room for their separation. `end_m` is the
-    /// largest x of the relay before it, m. `step` is the minimum step in x between these two relays, m.
+    /// Returns the largest x of a relay, m, at which the minimum separation of later relays is possible.
+    ///
+    /// `end_m` is the largest x of the previous relay, m. `step` is the minimum step in x from the previous relay, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
@@ -88,8 +89,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude at which relay `index` is held, m. `None` if the relay may choose its altitude. Also
-    /// `None` if the mission allows one altitude only.
+    /// Returns the altitude at which relay `index` is held, m. `None` if the relay is free to choose its altitude, or
+    /// if the mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -163,10 +164,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
 /// the receiver, divided by the squared length of the hop. For the receivers Rx and Tx, the gain already includes the
 /// interference.
 ///
-/// Lengths are in units of the distance D from Tx to Rx. The gains may be stored as logarithms.
+/// Lengths are in units of the distance D from Tx to Rx. The gains can also be stored as logarithms.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gains {
-    /// Position (x, y, h) of the interferer.
+    /// Position (x, y, h) of the interferer, in units of the distance from Tx to Rx.
     pub(super) source: Triple,
     /// Receiver noise divided by the interferer's power received at the distance D (nu).
     pub(super) noise: f32,
@@ -243,7 +244,8 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays in a segment. Only one segment of the chain has its computed moves in memory at a time.
+/// Number of relays whose computed moves are in memory at one time. This is one segment of the chain, or 0 without the
+/// feature `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
@@ -317,7 +319,7 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
-    /// Lateral offsets and altitudes that the relay may choose from.
+    /// Permitted lateral offsets and altitudes of the relay.
     pub room: Room,
     /// Transmit power of the relay, W.
     pub power_w: f32,
@@ -333,7 +335,7 @@ impl Seat {
     }
 
     /// Returns the profile of a relay with the altitude and power `own`. If `holds` is true, the relay keeps this
-    /// altitude; otherwise it may choose another altitude.
+    /// altitude. If it is false, the relay is free to choose another altitude.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

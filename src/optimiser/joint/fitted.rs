@@ -62,8 +62,8 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Number of the initial chain that starts from the best chain along the line. This chain is used only if relays may
-/// leave the common altitude.
+/// Index, from 0, of the initial chain that starts from the best chain found along the line Tx to Rx. This initial
+/// chain is used only if relays are allowed to leave the common altitude or the line.
 const BEST: u8 = 8;
 /// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
@@ -76,21 +76,21 @@ const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 ///
 /// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
-/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio
-/// the length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about
-/// 6e-8, so a shorter slot may be empty.
+/// their slots are `from_tx` and `to_tx` of the first relay, and `to_rx` and `from_rx` of the last one. For a radio the
+/// length of the frame and a clock that all nodes share are still necessary. The numbers are multiples of about 6e-8,
+/// so a shorter slot can become empty.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SlotShares {
     /// Begin and end of the slot in which this relay sends to the next node toward Rx.
     pub to_rx: [f32; 2],
-    /// Begin and end of the slot in which this relay sends to the next node toward Tx. Empty, 1 and 1, in a mission
-    /// of one direction.
+    /// Begin and end of the slot in which this relay sends to the next node toward Tx. In a mission of one direction
+    /// both are 1: the slot is empty.
     pub to_tx: [f32; 2],
     /// Begin and end of the slot in which this relay receives from the next node toward Tx.
     pub from_tx: [f32; 2],
-    /// Begin and end of the slot in which this relay receives from the next node toward Rx. Empty, 1 and 1, in a
-    /// mission of one direction.
+    /// Begin and end of the slot in which this relay receives from the next node toward Rx. In a mission of one
+    /// direction both are 1: the slot is empty.
     pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
     /// times this value.
@@ -122,8 +122,8 @@ impl State {
     };
 }
 
-/// Hop between two nodes: its gains, r (share of data back), and minimum separation. `gains` has the forward and the
-/// backward gain, each divided by the SNR gap.
+/// Hop between two nodes: its gains, r, and the minimum separation. r is the data rate back divided by the data rate to
+/// Rx. `gains` has the forward and the backward gain, each divided by the SNR gap.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     gains: [f32; 2],
@@ -142,7 +142,7 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times for one bit to Rx and for r bits back. Both are infinite if two relays are too close or in
+    /// Returns the times to send one bit toward Rx and r bits back. Both are infinite if two relays are too close or in
     /// the wrong order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
@@ -230,7 +230,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         worst: 0.0,
     };
 
-    /// Continues the solution by one bounded portion. Ready at the end, with the linear SIR of the worst hop.
+    /// Continues the solution by one bounded portion. `Ready` once the chain is solved, with the linear SIR of the
+    /// worst hop.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<Result<f32, Infeasible>> {
         let relays = chain.relays();
         match self.work {
@@ -453,7 +454,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the hop's worse SIR.
+    /// Returns the forward and backward time of the hop to node `index`. If the worse SIR of the hop is below `worst`,
+    /// it replaces `worst`.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -470,7 +472,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 
     /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are shares of the
-    /// frame, 0 to 1. For hop 0 these are 0 and 1; `hop` is at most N + 1.
+    /// frame, 0 to 1. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {
@@ -514,7 +516,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
     }
 }
 
-/// Returns the number of initial chains. More chains are tried if relays may choose lateral offsets or altitudes.
+/// Returns the number of initial chains. More chains are tried if several lateral offsets or altitudes are allowed.
 fn starts(chain: &Chain<'_, impl SeatOf>) -> usize {
     let config = chain.mission.config();
     if config.band.is_single() && config.lateral.is_single() {

@@ -43,8 +43,8 @@ use crate::place::Placement;
 use crate::sir::square;
 
 /// Derivatives of the end of a hop that just meets its target SIR. The joint method computes the moves of relays with
-/// these derivatives. The condition makes one coordinate of the end dependent. It is a function of the other two
-/// coordinates w of the end, of the hop's start p, and of the target SIR.
+/// these derivatives. Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w,
+/// of the hop's start p, and of the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -215,8 +215,8 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
 }
 
 /// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s is the squared distance from the hop's receiver
-/// to the interferer, m^2. l is the squared length of the hop, m^2. `c` is the target divided by the gain; with noise
-/// it is larger.
+/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain. Noise makes
+/// `c` larger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,

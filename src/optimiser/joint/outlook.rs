@@ -56,9 +56,9 @@ impl Outlook {
         (reach_m - r, outlook)
     }
 
-    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the missing
-    /// squared distance, m^2; `slope` and `by_target` are the derivatives of `near` with respect to the position and
-    /// to ln(target SIR).
+    /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
+    /// distance that the relay lacks, m^2; `slope` and `by_target` are the derivatives of `near` with respect to the
+    /// position and to ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -237,10 +237,10 @@ impl Policy {
         policy
     }
 
-    /// Returns the relay's move in its two free coordinates, m; the third one follows from the hop.
+    /// Returns the relay's move in its two free coordinates, m. The third coordinate follows from the hop.
     ///
-    /// It is the fraction `share` of the relay's own step, plus the reaction to `change`, the move of the previous
-    /// relay in x, y and h, m.
+    /// The move is the fraction `share` of the relay's own step, plus the reaction to `change`, the move of the
+    /// previous relay in x, y and h, m.
     pub(super) fn apply(&self, share: f32, change: [f32; 3]) -> [f32; 2] {
         let dot = |row: [f32; 3]| row.iter().zip(change).map(|(a, b)| a * b).sum::<f32>();
         let [y, h] = self.step;

@@ -41,7 +41,7 @@ pub(crate) struct Site<'a> {
 
 impl<'a> Site<'a> {
     /// Creates the relay to be placed, which receives from `sender`; `first` is true if the sender is Tx. `room` has
-    /// the lateral offsets and altitudes that the relay may choose from.
+    /// the permitted lateral offsets and altitudes of the relay.
     pub(crate) fn new(
         mission: &'a Mission,
         interferer: &'a Interferer,
@@ -115,9 +115,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the
-    /// centre and the squared radius, m^2. `None` if c = target / gain is at most 1, where the reach has no such
-    /// limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the centre
+    /// and the squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -267,8 +266,8 @@ impl<'a> Site<'a> {
 }
 
 /// Returns the coordinate of a hop's end at which the hop just meets its target, m. The triples have this coordinate
-/// first; `a` and `b` are the other two coordinates of the end. There may be two solutions: `rising` selects the
-/// larger one. `None` without a solution.
+/// first; `a` and `b` are the other two coordinates of the end. If there are two solutions, `rising` selects the larger
+/// solution. `None` without a solution.
 fn follows(
     tangent: &Tangent,
     rising: bool,
@@ -294,8 +293,9 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point at which the line from `best` to `wanted` leaves a circle. `middle` is the circle's centre, and
-/// `rim` its squared radius, m^2. `None` if `best` is outside.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. The points are lateral offsets and
+/// altitudes. `middle` is the circle's centre, and `rim` its squared radius, m^2. `None` if `best` is outside of the
+/// circle.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -385,13 +385,13 @@ fn value(bytes: [u8; 4], band: Band) -> f32 {
     band.nearest(band.least_m + code * (band.span_m() / LAST))
 }
 
-/// Lateral offsets and altitudes that a relay may choose from.
+/// Permitted lateral offsets and altitudes of a relay.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Room {
-    /// Range of the lateral offsets that the relay may choose from, m.
+    /// Range of the permitted lateral offsets, m.
     pub lateral: Band,
-    /// Range of the altitudes that the relay may choose from, m.
+    /// Range of the permitted altitudes, m.
     pub band: Band,
 }
 
@@ -471,8 +471,8 @@ pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room)
     LITTLE * Sender::transmitter(mission).sir_at(mission, 0.0, at)
 }
 
-/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the lateral
-/// offsets and altitudes that the relay may choose from.
+/// Returns the maximum SIR of the hop to Rx from a relay of `power_w` watts, less a margin. `room` has the permitted
+/// lateral offsets and altitudes of the relay.
 pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     let across = room
         .nearest(CrossSection::default())
@@ -484,23 +484,23 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
 /// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from a limit of its allowed range at which a relay counts as at that limit. It is a fraction of the
-/// distance from Tx to Rx.
+/// Tolerance within which a relay counts as at a limit of its allowed range. It is a fraction of the distance from Tx
+/// to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference of a hop's squared length from the maximum, up to which it counts as stretched. It applies to
-/// hops that end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
+/// Relative tolerance up to which the squared length of a hop counts as its maximum. The tolerance applies to hops that
+/// end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns three numbers about a relay at `to` that may be too near the interferer. The first number is the
-    /// missing squared distance, m^2; 0 if the relay is far enough away. The second number is the weight of the
-    /// penalty for it. The third number is the derivative of the first with respect to ln(target SIR). `c` is the
-    /// target SIR divided by the sender's gain.
+    /// Returns three numbers about a relay at `to` that can be too near the interferer. The first number is the squared
+    /// distance that the relay lacks, m^2; 0 if the relay is far enough away. The second number is the weight of the
+    /// penalty for this. The third number is the derivative of the first number with respect to ln(target SIR).
     ///
-    /// A hop of maximum length from p to p' that ends near the interferer at m is short. It violates the minimum
-    /// separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2, with the inverse q of interference plus noise.
-    /// With the noise nu that is so if |p' - m|^2 < L / (1 - nu L) for L = c d_min^2.
+    /// `c` is the target SIR divided by the sender's gain. A hop of maximum length from p to p' that ends near the
+    /// interferer at m is short. It violates the minimum separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2,
+    /// with the inverse q of interference plus noise. With the noise nu that is so if |p' - m|^2 < L / (1 - nu L) for L
+    /// = c d_min^2.
     fn near(&self, c: f32, to: Placement) -> (f32, f32, f32) {
         if !(self.apart_m > 0.0) {
             return (0.0, 0.0, 0.0);

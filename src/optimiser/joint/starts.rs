@@ -25,7 +25,7 @@ pub(super) enum Start {
     Around { aside: f32, up: f32, far: f32 },
     /// Initial chain on a parabola as for `Arch`, but computed without a minimum separation. The solver then searches
     /// the highest target of this chain. For the search it computes the hops exactly as the relays do in flight; a
-    /// relay may stay short of its farthest position.
+    /// relay is allowed to stay short of its farthest position.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The

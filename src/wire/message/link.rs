@@ -27,10 +27,10 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and a neighbour of the destination. This is the
-    /// neighbour that the destination has selected on the sender's side. If the sender is outside of the chain, the
-    /// flag means that the sender would join the chain if it is called. If the destination is outside of the chain,
-    /// the flag means that the destination is called.
+    /// True if the sender could be inserted between the destination and the destination's neighbour. This is the
+    /// neighbour that the destination has selected on the sender's side. If the sender is outside of the chain: true if
+    /// it would join the chain when it is called. If the destination is outside of the chain: true if the destination
+    /// is called.
     pub ready: bool,
     /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. These are
     /// the connected relays from the sender to the end of the chain away from the destination.
@@ -141,8 +141,8 @@ pub struct Claim {
     pub other_number: u32,
     /// True if the claiming node is passive because another node uses its node number.
     pub passive: bool,
-    /// True for an echo: the sender returns a claim of a node that has the destination's node number. If two nodes
-    /// have this node number, both receive the echo, and so the claim of the other node.
+    /// True for an echo: the sender returns a claim of a node that has the destination's node number. If two nodes have
+    /// this node number, both receive the echo. So each of them receives the claim of the other node.
     pub echo: bool,
 }
 

@@ -84,7 +84,7 @@ pub enum Message {
     Sense(Heard),
     /// Reply to `Sense`: measurements of the sender and of all later relays.
     Sensed(Heard),
-    /// Message to the next relay: token of Algorithm 2, whose receiver may move.
+    /// Message to the next relay: token of Algorithm 2. The relay with the token moves to a better position.
     Token(Token),
     /// Reply to a token of Algorithm 2: position of the sender, and SIR of the worst hop after the sender.
     Moved(Moved),

@@ -118,7 +118,7 @@ impl Entry {
 pub struct Detail {
     /// Setpoint of the drone, and the agreed position of the relay.
     pub places: [Coarse; 2],
-    /// Distances to the neighbours toward Tx and toward Rx, in relays: 1 to 4, 0 for none.
+    /// Differences of node numbers to the neighbours toward Tx and toward Rx: 1 to 4, 0 for no neighbour.
     pub neighbours: [u8; 2],
     power: Word,
     version: Word,
@@ -210,7 +210,7 @@ impl Reports {
     }
 }
 
-/// Report whose content a relay without the feature `telemetry` hands on without decoding it.
+/// Report whose content a relay without the feature `telemetry` forwards without decoding it.
 #[cfg(not(feature = "telemetry"))]
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reports(Vec<u8, 86>);

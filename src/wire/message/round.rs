@@ -326,7 +326,7 @@ pub enum AdjustStep {
         /// Method by which the relay searches for a better position.
         local: Local,
     },
-    /// The relay stays for good, because Algorithm 2 has ended.
+    /// The relay no longer moves, because Algorithm 2 has ended.
     Stop,
 }
 

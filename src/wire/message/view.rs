@@ -31,16 +31,16 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled; for the initial view, its leader. The votes of exactly
-    /// half of the view's members are then enough for a quorum.
+    /// True if the proposer of the view `agreed` was polled. For the initial view the leader takes the place of the
+    /// proposer. The votes of exactly half of the view's members are then enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown.
-    /// Positions of the new view may be used only after that time.
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Relays
+    /// must not use positions of the new view before.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted; it may have been agreed on. `None` without such
-    /// a view.
+    /// Latest view after `agreed` that a polled member has accepted. Possibly this view is already agreed on. `None`
+    /// without such a view.
     pub successor: Option<Successor>,
 }
 
@@ -58,7 +58,7 @@ impl Poll {
     }
 }
 
-/// View that a polled relay has accepted in an earlier decision, and that may have been agreed on.
+/// View that a polled relay has accepted in an earlier decision, and that is possibly agreed on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
@@ -85,8 +85,8 @@ pub struct Decision {
     /// View to accept: the proposed view, or an earlier view that was found to be decided already. `None` without a
     /// quorum.
     pub accepted: Option<View>,
-    /// Time until positions of the accepted view may be used, in tenths of a second. Until then, members of the
-    /// previous view that were not polled may still have a lease.
+    /// Time until relays are allowed to use positions of the accepted view, in tenths of a second. Until then, members
+    /// of the previous view that were not polled can still have a lease.
     pub usable_in: u16,
 }
 
@@ -276,11 +276,11 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader to a relay that may leave and to a relay that joins. Part of each lease renewal.
+/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Part of each lease renewal.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
-    /// Node that may leave the chain, 0 for none: its neighbours select each other.
+    /// Node that is allowed to leave the chain, 0 for none. Its neighbours then select each other.
     pub leaver: u16,
     /// Node outside of the chain that is called to join it, 0 for none.
     pub joiner: u16,
@@ -319,8 +319,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts; of two spares the
-    /// spare with the lower number.
+    /// Merges the requests of two parts of the chain. If both parts have a departure, the more urgent one counts. If
+    /// both have a spare, the spare with the lower number counts.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {
@@ -378,7 +378,7 @@ impl RenewalBody {
     /// Returns the nodes that leave and join, 0 for none.
     ///
     /// # Errors
-    /// [`MessageError::Value`] if a number is above 1000, or if both numbers are present and 0.
+    /// [`MessageError::Value`] if a number is above 1000, or if two numbers are encoded that are both 0.
     fn nodes(&self) -> Result<[u16; 2], MessageError> {
         let Some([a, b, c, d]) = self.nodes else {
             return Ok([0; 2]);

@@ -119,8 +119,8 @@ fn a_link_is_proven_by_three_handshakes_or_four_if_crossed() {
     }
 }
 
-/// Checks that a lost handshake does no lasting harm. The node that lacks a proof of the other's presence requests it
-/// again.
+/// Checks that both nodes prove their presence to each other although one handshake is lost. A node without this proof
+/// requests a handshake again.
 #[test]
 fn one_lost_handshake_leaves_both_ends_proven() {
     for lost in 0..4 {
@@ -427,9 +427,9 @@ fn the_smaller_claim_receives_the_larger_one() {
     }
 }
 
-/// Checks when the node with the smaller claim may replace another node of the same number. It is accepted once the
-/// node with the larger claim is silent. Recorded frames of that node are then rejected, until this node sends new
-/// frames.
+/// Checks when the node with the smaller claim can replace another node of the same number. It is accepted once the
+/// node with the larger claim is silent. Recorded frames of the node with the larger claim are then rejected, until
+/// that node sends new frames.
 #[test]
 fn the_smaller_claim_is_accepted_once_the_larger_is_silent() {
     const FAR: u32 = 1 << 20;

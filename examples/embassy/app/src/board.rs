@@ -15,12 +15,13 @@ pub struct Board<F> {
     pub seed: u32,
     /// Cause of the last reset of the board.
     pub reset: Reset,
-    /// Flash for state that survives a reboot, if any. Without it a block with a signing key is refused, and the
-    /// relay's votes are lost at a reboot.
+    /// Flash for state that survives a reboot; `None` if the board has no such flash. With `None` a block with a
+    /// signing key is refused, and the relay's votes are lost at a reboot.
     pub storage: Option<Storage<F>>,
 }
 
-/// Flash of a board and its layout: offsets of whole erase units that no firmware image occupies.
+/// Flash of a board, and the offsets of its storage areas. Each area consists of whole erase units outside of the
+/// firmware image.
 #[derive(Debug)]
 pub struct Storage<F> {
     /// Driver of the flash memory.
@@ -35,8 +36,8 @@ pub struct Storage<F> {
 }
 
 impl<F: NorFlash> Board<F> {
-    /// Creates the description of a board, with the configuration block that its flash has. A read error gives a
-    /// blank block.
+    /// Creates the description of a board, and reads the configuration block from its flash. After a read error the
+    /// block is blank.
     pub fn new(seed: u32, mut storage: Storage<F>) -> Self {
         let mut block = [0xFF; LEN];
         if storage.flash.read(storage.block, &mut block).is_err() {

@@ -22,7 +22,8 @@ use crate::votes::Votes;
 /// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Static storage of the relay and of its mission's interference points, which saves stack.
+/// Storage for the relay and for the interference points of its mission. It is a `static`, because both would take too
+/// much stack.
 #[derive(Debug)]
 pub struct DroneStorage {
     field: config::FieldStorage,

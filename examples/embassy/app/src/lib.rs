@@ -39,8 +39,8 @@ use drone::{Drone, DroneStorage, Refused};
 /// Bit rate of every port, bit/s, 8N1.
 pub use uav_relay_block::BAUD;
 
-/// Size of a UART driver's buffers, bytes: 22 ms of traffic. No byte is lost during a call of the relay's functions,
-/// which takes 3 ms.
+/// Size of a UART driver's buffers, bytes. A buffer holds 22 ms of traffic, and a call of the relay's functions takes
+/// at most 3 ms, so no byte is lost during a call.
 pub const BUFFER: usize = 256;
 
 /// Clock of the relay, based on Embassy's time driver.
@@ -86,7 +86,7 @@ impl<const IN: usize> Buffers<IN> {
 /// Interval at which the watchdog is fed, unless the relay's timers are late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. For a drone that does not join the chain.
+/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. Used for a drone that does not join the chain.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -114,8 +114,8 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
 
 /// Runs the relay of `board` on a UART to each neighbour, and on a UART to the autopilot, if any.
 ///
-/// It never completes if the drone joins the chain, and calls the watchdog's `feed` every [`TURN`] while the relay
-/// makes progress.
+/// If the drone joins the chain, the function never completes. It calls the watchdog's `feed` every [`TURN`] while the
+/// relay makes progress.
 ///
 /// # Errors
 /// The reason why the drone does not join the chain, which is logged, too.
@@ -200,7 +200,7 @@ async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
-/// Serves the tasks beside the relay's ports, forever. They are the log of events, and the autopilot's port, if any.
+/// Runs the log of events and the autopilot's port, if any, forever. They are the tasks beside the relay's ports.
 async fn beside<R: Read, W: Write>(
     relay: &AsyncRelay<'_>,
     link: Option<&AsyncAutopilot>,

@@ -36,7 +36,7 @@ bind_interrupts!(
 );
 
 /// Creates the description of the board. An erase of a flash sector stops the CPU for 0.25 s (16 KiB) or 0.55 s (64
-/// KiB), twice that at most.
+/// KiB); these are typical times, and the longest are twice as long.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     Board::new(
         seed(),

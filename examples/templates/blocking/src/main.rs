@@ -29,7 +29,7 @@ use uav_relay::{Duration, Event, Instant, Relay, Settings};
 /// Queues of a UART: 10 ms of received bytes, and 256 bytes to send, more than the longest frame.
 type Queues = ByteQueues<{ queue_depth(BAUD, Duration::from_millis(10)) }, 256>;
 
-/// UART served by its interrupt, and the interrupt's end of the UART's queues.
+/// UART that its interrupt serves, and the interrupt handler's side of the UART's queues.
 struct Served<U: Instance> {
     uart: Serial<U>,
     end: InterruptEnd<'static>,
@@ -38,7 +38,7 @@ struct Served<U: Instance> {
 static UPSTREAM: Mutex<RefCell<Option<Served<USART2>>>> = Mutex::new(RefCell::new(None));
 static DOWNSTREAM: Mutex<RefCell<Option<Served<USART3>>>> = Mutex::new(RefCell::new(None));
 
-/// Milliseconds since the start. It overflows after 49 days.
+/// Milliseconds since the start. The counter overflows after 49 days.
 static MILLIS: AtomicU32 = AtomicU32::new(0);
 
 #[entry]

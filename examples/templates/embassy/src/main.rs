@@ -45,7 +45,7 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Static storage of the relay, some 10 KB, which the stack of `main` need not hold.
+/// Static storage of the relay, some 10 KB, to keep it off the stack of `main`.
 static RELAY: StaticCell<Option<Relay>> = StaticCell::new();
 static SENT: StaticCell<[u8; 256]> = StaticCell::new();
 static RECEIVED: StaticCell<[u8; 256]> = StaticCell::new();

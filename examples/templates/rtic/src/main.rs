@@ -33,13 +33,13 @@ mod app {
     /// Queues of a UART: 10 ms of received bytes, and 256 bytes to send, more than the longest frame.
     type Queues = ByteQueues<{ queue_depth(BAUD, Duration::from_millis(10)) }, 256>;
 
-    /// UART served by its interrupt, and the interrupt's end of the UART's queues.
+    /// UART that its interrupt serves, and the interrupt handler's side of the UART's queues.
     pub struct Served<U: Instance> {
         uart: Serial<U>,
         end: InterruptEnd<'static>,
     }
 
-    /// Starter of the task that serves a UART: it sets the UART's interrupt pending.
+    /// Starter of the interrupt that serves a UART: it sets this interrupt pending.
     pub struct Request(Interrupt);
 
     impl Pend for Request {

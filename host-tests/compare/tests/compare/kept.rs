@@ -34,7 +34,7 @@ fn results_contain_the_stored_run() {
 
 /// Checks in the recorded run that SLSQP takes at least 20 times as long as this crate.
 ///
-/// SLSQP runs from a single start: of all equally spaced chains, the one from which it reaches this crate's SIR
+/// SLSQP runs from a single start. This start is the equally spaced chain from which SLSQP reaches this crate's SIR
 /// soonest. The problems have eight and fifty relays with free altitudes. Problems with lateral offsets are not
 /// checked, because this crate itself takes more time there: it tries more than twice as many starts.
 #[test]

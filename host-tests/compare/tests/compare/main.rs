@@ -60,7 +60,8 @@ fn table(results: &Value) -> String {
 
 /// Returns SIR (linear) and positions [x, y, altitude], m, of the best chain of eight relays.
 ///
-/// The altitude is 20 m. An independent program has computed the chain, which the tests use as a correct result.
+/// The altitude is 20 m. An independent program has computed the chain. The tests use it as the chain of a correct
+/// solver.
 fn best_of_eight() -> (f64, Vec<[f64; 3]>) {
     let cases = cases::of("gamma_star").unwrap();
     let found = cases.iter().find(|case| {
@@ -78,7 +79,7 @@ fn run(solver: &str, time_s: f64, sir: f64, chain: &[[f64; 3]]) -> Value {
     json!({ "solver": solver, "answer": { "found": found } })
 }
 
-/// Returns the table cells of solver "rival", whose result for eight relays is `rival`.
+/// Returns the table cells of the solver "rival", if it has the result `rival` for eight relays.
 fn line_of_rival(rival: Value) -> String {
     let (sir, chain) = best_of_eight();
     let own = run("own", 1e-5, sir, &chain);

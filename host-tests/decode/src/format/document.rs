@@ -52,7 +52,7 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
 
 /// Replaces each row such as `as bytes 1 to 18 of a Sweep` by the rows of that message's table.
 ///
-/// `known` has the table rows of the earlier messages, by name.
+/// `known` has the names and table rows of the messages before this one.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {

@@ -107,8 +107,8 @@ impl Format {
 }
 
 impl Field {
-    /// Returns how many units make a base unit, and the base unit, for a scaled unit: (10, "s") for 0.1 s. `None` for
-    /// other units.
+    /// Returns the number of units in a base unit, and the base unit: (10, "s") for a unit of 0.1 s. `None` if the unit
+    /// has no factor.
     pub fn scale(&self) -> Option<(f64, &str)> {
         let (number, base) = self.unit.split_once(' ')?;
         let multiple: f64 = number.parse().ok()?;

@@ -125,7 +125,7 @@ fn value_text(field: &Field, value: &Value<'_>) -> String {
     }
 }
 
-/// Returns the number's text, with its value in base units if the field's unit is scaled: `50 (5 s)`.
+/// Returns the number's text. If the unit has a factor such as 0.1 s, the value in base units follows: `50 (5 s)`.
 fn scaled(field: &Field, text: String, number: f64) -> String {
     match field.scale() {
         Some((per, base)) => format!("{text} ({} {base})", number / per),

@@ -17,7 +17,8 @@ use super::{Item, Packet, SourceError};
 struct Interface {
     name: String,
     is_ours: bool,
-    /// Time resolution of the interface as in the capture file: 10^-n s, or 2^-n s with the top bit set.
+    /// Time resolution of the interface as the capture file states it. The value n stands for 10^-n s, the value 128 +
+    /// n for 2^-n s.
     resolution: u8,
 }
 
@@ -131,9 +132,11 @@ fn pieces<E>(
     }
 }
 
-/// Converts the time stamp of a captured packet, according to the time resolution of its interface.
+/// Converts the time stamp of a captured packet to the time since 1970. `resolution` is the time resolution of its
+/// interface.
 ///
-/// `read` is the time stamp as the capture library returns it: the library takes every unit for a nanosecond.
+/// `read` is the time stamp as the capture library returns it. The library ignores the resolution and takes every unit
+/// for a nanosecond.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

@@ -45,14 +45,14 @@ pub enum SourceError<E> {
     Read(io::Error),
     /// Malformed capture, with the fault.
     Capture(String),
-    /// Error of the consumer, which stopped the reading.
+    /// Error that the caller's function `take` has returned. It ended the reading.
     Taken(E),
 }
 
 /// Calls `take` with each item of `input`, a capture or a byte stream.
 ///
 /// # Errors
-/// [`SourceError`]; `take` has got the items before the error.
+/// [`SourceError`]. The items before the error have been passed to `take`.
 pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,

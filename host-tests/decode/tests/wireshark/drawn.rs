@@ -8,7 +8,8 @@ use uav_relay_decode::envelope::{before, sealed, stuffed};
 use uav_relay_decode::format::Format;
 use uav_relay_decode::write::write_fields;
 
-/// Returns a random frame with the message whose tag is `kind`. A `kind` one above the last tag gives a handshake.
+/// Returns a random frame with the message whose tag is `kind`. If `kind` is the last tag plus one, the frame is a
+/// handshake.
 pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let (layout, flags, mut body) = match format.messages.get(kind) {
         Some(message) => (

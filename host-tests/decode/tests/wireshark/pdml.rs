@@ -77,9 +77,9 @@ pub(crate) struct Wanted<'f> {
     value: Value<'f>,
 }
 
-/// Returns the fields that Wireshark should show for a message, in order. Their names begin with `prefix`.
+/// Returns the fields that Wireshark should show for a message, in this order. Their names begin with `prefix`.
 ///
-/// The fields include the length of each list, and each single flag.
+/// The count of each list, and each flag of a flags byte, is a field of its own.
 pub(crate) fn flat<'f>(prefix: &str, fields: &Fields<'f>) -> Vec<Wanted<'f>> {
     let mut all = Vec::new();
     for (field, value) in &fields.0 {

@@ -4,17 +4,18 @@ use uav_relay::{Phase, Schedule, ViewId};
 
 use super::{Chain, Member};
 
-/// Limit of the number of rounds until all relays agree; in a round each relay receives one frame.
+/// Maximum number of rounds until all relays agree. In a round each relay receives one frame.
 ///
-/// It is enough for the slowest agreement: a few minutes of virtual time in which links that were lost repeatedly are
-/// not used, and then 24 passes of messages along 4 relays.
+/// The limit is enough for the slowest agreement. This agreement takes a few minutes of virtual time, in which the
+/// relays do not use links that were lost repeatedly, and then 24 passes of messages along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
     /// Runs the chain without faults until all relays agree in one view (membership of the chain).
     ///
-    /// Panics if they never do, unless the leader finds that no target SIR can be met. Does nothing if a relay lowers
-    /// the target in fixed steps, because such an agreement takes too long.
+    /// Panics if the relays do not agree within [`PATIENCE`] rounds. Returns at once if the leader finds that no target
+    /// SIR can be met. Does nothing if a relay lowers the target in fixed steps, because such an agreement takes too
+    /// long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {

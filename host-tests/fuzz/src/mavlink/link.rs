@@ -19,7 +19,8 @@ use crate::input::Input;
 
 const MAX_OPERATIONS: usize = 256;
 
-/// Limit on the frames that the link sends in one turn. A link that exceeds it counts as never finished.
+/// Maximum number of frames that the link may send in one turn of the main loop. If it sends more, the test assumes
+/// that it never stops.
 ///
 /// The limit is twice 13 frames: a heartbeat, three message requests, a command answer, a flight target, three status
 /// texts and four named values. A clock request (TIMESYNC) can come in addition.
@@ -189,7 +190,8 @@ impl Link {
         }
     }
 
-    /// Delivers a frame of the autopilot to the link. If the link signs, the frame is signed as `input` chooses.
+    /// Delivers a frame of the autopilot to the link. If the link requires signatures, the frame is first signed;
+    /// `input` chooses whether the signature is right.
     fn deliver_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) {
         match &mut self.peer {
             Some(peer) => {
@@ -200,8 +202,8 @@ impl Link {
         }
     }
 
-    /// Delivers bytes to the link in one piece, and to a clone in pieces of two alternating lengths. The results must
-    /// be equal.
+    /// Delivers bytes to the link in one piece, and to a copy of the link in several pieces. The pieces have two
+    /// alternating lengths. The results must be equal.
     fn deliver_bytes(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
         without_allocation(|| self.autopilot.handle_bytes(self.now, bytes));
@@ -254,7 +256,8 @@ impl Link {
         self.deliver_frame(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// Reports a lost relay to the link, and delivers an operator's command that lost drones are gone.
+    /// Reports a lost relay to the link, then delivers an operator's command. The command states that the drones of
+    /// lost relays are gone.
     fn clear_lost_relay(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
@@ -281,7 +284,7 @@ impl Link {
         self.deliver_frame(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
-    /// Delivers the drone's position to the link, perhaps with a delayed or wrong time stamp.
+    /// Delivers the drone's position to the link. `input` chooses the time stamp: right, old or wrong.
     fn position(&mut self, input: &mut Input<'_>, place: Placement) {
         let clock = input.byte();
         let Some(point) = self.axis.point(place) else {
@@ -303,7 +306,7 @@ impl Link {
         );
     }
 
-    /// Calls the link as a turn of a firmware's loop does, and checks its frames, positions and events.
+    /// Calls the link as a firmware's main loop does, and checks the link's frames, positions and events.
     fn settle(&mut self) {
         without_allocation(|| self.autopilot.handle_timeout(self.now));
         let mut frames = 0;
@@ -353,9 +356,9 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame sent by the link, after the removal of the frame's signature.
+    /// Checks a frame that the link has sent. The frame's signature is already removed.
     ///
-    /// `covered_flags` are the flags that the frame's checksum covers.
+    /// `covered_flags` is the value of the flags byte from which the frame's checksum was computed.
     fn check_frame(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()
@@ -431,7 +434,7 @@ fn nearby_place(input: &mut Input<'_>) -> Placement {
     }
 }
 
-/// Reads a position near the line; a coordinate is now and then an arbitrary number.
+/// Reads a position near the line Tx-Rx. In some draws a coordinate is an arbitrary number.
 fn any_place(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, 1_400.0)),

@@ -28,7 +28,8 @@ const TODAY: u64 = 37_527_840_000_000;
 
 const HISTORY: usize = 32;
 
-/// Sender of signed frames (system, component, link), and the time stamp of its last accepted frame.
+/// Sender of signed frames, and the signature time stamp of its last accepted frame. The sender is a system number, a
+/// component number and a link number.
 type Sender = ((u8, u8, u8), u64);
 
 #[derive(Debug)]
@@ -37,10 +38,10 @@ pub(super) struct Peer {
     stamp: u64,
     /// Newest signed frames of the simulated autopilot, for replays.
     history: Vec<Vec<u8>>,
-    /// Clock of the tested link, as a MAVLink signature time stamp. The clock was read at the instant in the field `at`.
+    /// Expected clock of the tested link at the instant `at`, as a MAVLink signature time stamp.
     time: u64,
     at: Instant,
-    /// Senders that the tested link should remember, with the time stamps of their last frames.
+    /// Senders that the tested link should remember, with the time stamp of each sender's last frame.
     senders: Vec<Sender>,
     /// Signature time stamp of the last frame that the tested link sent.
     sent: u64,
@@ -51,7 +52,7 @@ pub(super) struct Peer {
 impl Peer {
     /// Creates the autopilot's end of a signed link, and the signing settings of the tested link.
     ///
-    /// `input` chooses whether the tested link knows the time at its start.
+    /// `input` chooses whether the tested link knows the present time at its start.
     pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
         let time = match input.below(4) {
             0 => 0,
@@ -119,7 +120,7 @@ impl Peer {
         self.history.get(at).cloned()
     }
 
-    /// Changes the autopilot's clock as `input` chooses.
+    /// Sets the autopilot's clock to another time, which `input` chooses.
     ///
     /// The new time is a day earlier or later, near the time of the tested link, or the largest time stamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
@@ -134,7 +135,8 @@ impl Peer {
         };
     }
 
-    /// Processes bytes that the tested link has received, and counts the frames that the link must reject.
+    /// Processes the bytes that were delivered to the tested link. Counts in `refused` the frames that the link must
+    /// reject.
     pub(super) fn expect_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let mut parser = self.parser.clone();
         for &byte in bytes {
@@ -192,7 +194,7 @@ impl Peer {
 
     /// Advances the expected clock of the tested link to `now`.
     ///
-    /// The clock advances by at most 71 minutes (2^32 µs) at each call, as the link's own clock does.
+    /// The clock advances by at most 71 minutes (2^32 µs) in each call. The link's own clock has the same limit.
     fn advance(&mut self, now: Instant) {
         let passed = now.since(self.at).as_micros().min(u64::from(u32::MAX)) / 10;
         self.time = self.time.saturating_add(passed).min(LAST);
@@ -239,7 +241,7 @@ fn read(bytes: &[u8]) -> u64 {
 
 /// Signs the unsigned frame `frame`. `link` and `stamp` are link number and time stamp of the signature.
 ///
-/// The frame's checksum is computed again, because it covers the flag that marks a signed frame.
+/// The frame's checksum is computed anew, because it covers the flag that marks a signed frame.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);

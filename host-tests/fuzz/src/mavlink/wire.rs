@@ -55,8 +55,8 @@ pub(super) fn extra(id: u32) -> u8 {
 
 pub(super) const SENT: [Kind; 7] = [HEARTBEAT, COMMAND, ACK, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
-/// Builds a MAVLink frame from the system and component `from`. Trailing zeros of its payload are omitted, except for
-/// its first byte.
+/// Builds a MAVLink frame from the system and component `from`. Trailing zeros of the payload are omitted, but at least
+/// one byte of the payload is kept.
 ///
 /// If `flags` has the bit for a signed frame (1), 13 arbitrary bytes follow as the signature.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {
@@ -82,12 +82,13 @@ pub(super) struct Placed {
     pub(super) at: usize,
 }
 
-/// Maximum number of frames and noise pieces in a stream. The limit bounds the work, because a stream is read twice.
+/// Maximum number of frames and noise pieces in a stream. The limit bounds the work, because the test parses a stream
+/// twice.
 const MAX_PARTS: usize = 64;
 
 /// Builds a stream of noise and of intact, damaged and truncated frames.
 ///
-/// Also returns where the intact frames begin. Zeros follow at the end, so that a parser does not wait for the rest
+/// Also returns the offsets of the intact frames. Zeros follow at the end, so that a parser does not wait for the rest
 /// of a truncated frame.
 pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
     let (mut bytes, mut placed) = (Vec::new(), Vec::new());

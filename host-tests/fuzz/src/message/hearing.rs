@@ -39,7 +39,7 @@ impl Body<'_, '_> {
         self.float(|input| input.scaled(1e-30, 1e6));
     }
 
-    /// Appends to the message the interference power that an end of the chain has reported, W; 0 for none.
+    /// Appends to the message the interference power measured at Tx or Rx, W; 0 for no measurement.
     fn level_or_none(&mut self) {
         if self.input.flag() {
             self.float(|input| input.scaled(1e-30, 1e6));
@@ -49,9 +49,9 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the sums of a sensing message, made from drawn measurements at up to eight positions.
+/// Returns the sums of a sensing message, computed from random measurements at up to eight positions.
 ///
-/// `input` chooses between the measurements of one interferer and arbitrary powers.
+/// `input` chooses whether the powers are those of one interferer or arbitrary.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {
     let of_one = input.flag();
     let unit = input.scaled(1e-6, 1e12);

@@ -44,9 +44,9 @@ impl Body<'_, '_> {
         self.answer(choice);
     }
 
-    /// Appends to the offer the number of the hello that it answers.
+    /// Appends a hello number to the offer: the number of the hello message that the offer answers.
     ///
-    /// It is the number in the relay's last hello for a `choice` below 240, otherwise a number from the fuzzer's
+    /// If `choice` is below 240, the number is that of the relay's last hello, otherwise a number from the fuzzer's
     /// input.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
@@ -58,8 +58,8 @@ impl Body<'_, '_> {
 
     /// Appends the surveyed positions of Tx and Rx to an offer; `choice` selects them.
     ///
-    /// They are mostly zeros, which means no positions. Otherwise they are a kilometre apart, as in the paper, or
-    /// arbitrary numbers.
+    /// In most offers all numbers are 0, which means that there are no positions. In the others the positions are 1000
+    /// m apart, like Tx and Rx of the paper, or arbitrary.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -73,7 +73,7 @@ impl Body<'_, '_> {
 
     /// Appends a mission version to the offer.
     ///
-    /// It is the newest version stored by the tested relay, one of the next three, or any.
+    /// The version is the newest version stored by the tested relay, one of the next three versions, or any version.
     fn version(&mut self) {
         let held = self.state.held.version;
         let version = match self.input.byte() {
@@ -83,8 +83,8 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends a number of relays to the offer. Mostly it is the number of the mission before flight, sometimes any
-    /// number.
+    /// Appends the mission's number of relays to the offer. Mostly it is the number in the mission loaded before
+    /// flight, sometimes any number.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,

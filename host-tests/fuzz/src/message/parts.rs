@@ -5,7 +5,7 @@ use uav_relay::wire::digest::MissionId;
 
 use crate::input::Input;
 
-/// State of the tested relay that its neighbour may know.
+/// State of the tested relay that a neighbour can know.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
     /// Digest of the mission that was loaded into the tested relay before flight.
@@ -18,11 +18,11 @@ pub struct RelayState {
     pub held: MissionId,
     /// View (agreed membership of the chain) that the tested relay has accepted last.
     pub view: ViewId,
-    /// Number of the current pass, a round of messages along the chain.
+    /// Number of the current pass, a message that travels along the chain and back.
     pub number: u16,
     /// Session number in the tested relay's last message of its collision guard (a fence); 0 for none.
     ///
-    /// Each relay draws a random number for the session with its neighbour.
+    /// Each relay draws this number at random for the session with its neighbour.
     pub association: u16,
     /// Number in the last hello of the tested relay; 0 for none. A mission offer to this relay must repeat the number.
     pub offer_number: u16,
@@ -37,8 +37,8 @@ pub(super) struct Body<'a, 'b> {
 }
 
 impl Body<'_, '_> {
-    /// Appends the number of a pass, a round of messages along the chain, to the message. It is the next, the current
-    /// or an earlier number, or any.
+    /// Appends the number of a pass (message along the chain and back) to the message. It is the next, the current, an
+    /// earlier or an arbitrary number.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
             0..96 => self.state.number.wrapping_add(1),
@@ -58,7 +58,8 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends the number of a pass (message round) to the message, and the digest of mission and view.
+    /// Appends the number of a pass to the message, and the digest of mission and view. A pass is a message along the
+    /// chain and back.
     ///
     /// Rarely the digest belongs to another view.
     pub(super) fn pass(&mut self) {
@@ -74,8 +75,8 @@ impl Body<'_, '_> {
 
     /// Appends the name of a view (membership of the chain) to the message.
     ///
-    /// The view is the view of the tested relay, one of the next views of a possible proposer, an earlier view, or
-    /// any view.
+    /// The view is the accepted view of the tested relay, an earlier view, or any view; or it is a view with one of the
+    /// next numbers and one of the first four relays as proposer.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {
@@ -101,7 +102,7 @@ impl Body<'_, '_> {
 
     /// Appends a sequence number to the message: mostly 0 (none) to 11.
     ///
-    /// It is the number of a heartbeat's request or reply, or a similar number.
+    /// Heartbeats and other messages contain such numbers.
     pub(super) fn request_number(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -119,8 +120,8 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends the last part of a lease renewal to the message. That part is the flag `in_place` and, in half of the messages, the nodes
-    /// that leave and join, not both 0.
+    /// Appends the last part of a lease renewal to the message. This part is the flag `in_place` and, in half of the
+    /// messages, the node that leaves and the node that joins. At least one of these two nodes is not 0.
     pub(super) fn renewal_nodes(&mut self) {
         self.small(0, 1);
         if self.small(0, 1) == 1 {
@@ -181,15 +182,15 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// Appends a lateral position y, m, to the message. Its limit on both sides of the line is 100 m in some draws
-    /// and 1e5 m in others.
+    /// Appends a lateral position y, m, to the message. Its maximum distance from the line is 100 m in some draws and
+    /// 1e5 m in others.
     pub(super) fn lateral(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of up to `most` floats with its count to the message. They are equal, or each is drawn from
-    /// `low` to `high`.
+    /// Appends a list of up to `most` floats, with its count, to the message. All floats are equal, or each is drawn
+    /// between `low` and `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -252,8 +253,8 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the 16-bit mark of a view, which is added to the mission's digest. It is the lower half of the view's name
-/// plus the byte-swapped upper half.
+/// Returns a 16-bit digest of a view, for the sum of mission digest and view digest in a message. It is the lower half
+/// of the view's name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -27,9 +27,9 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// Returns the number of a node beyond the neighbours of relay `index`, at least 0.
+/// Returns the number of a node that is farther away than the neighbours of relay `index`, at least 0.
 ///
-/// The node is `more` places farther along the chain than the neighbour at `side` (0 upstream, 1 downstream).
+/// The node is `more` places beyond the neighbour at `side` (0 upstream, 1 downstream).
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
     let distance = 1 + more as u16;
     if side == 1 {

@@ -7,16 +7,16 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Largest difference of node numbers between sender and receiver of a frame on a shared channel.
+/// Maximum difference between the node numbers of sender and receiver of a frame on a shared channel.
 const NEAR: u16 = 4;
 
 /// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
-/// Checker of the frames that a relay sends. The checker stores the numbers in the last frames, such as the number of
+/// Checker of the frames that a relay sends. It stores the numbers in the relay's last frames, such as the number of
 /// the pass.
 ///
-/// A pass is a round of messages along the chain.
+/// A pass is a message along the chain and back.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
     /// Node number of the relay under test.
@@ -42,8 +42,8 @@ impl Frames {
         }
     }
 
-    /// Checks a frame sent by the relay. It must be valid, from this relay, and to a neighbour reached through
-    /// `port`.
+    /// Checks a frame sent by the relay. The frame must be valid, must name this relay as its sender, and must go to a
+    /// neighbour that is connected to `port`.
     pub(super) fn look(&mut self, relay: &Relay, settings: &Settings, port: Port, bytes: &[u8]) {
         let mut deframer = Deframer::new();
         let mut frames = 0;

@@ -2,7 +2,7 @@
 
 use uav_relay::wire::message::Message;
 
-/// Returns the number of a message's pass, which is a round of messages along the chain.
+/// Returns the number of the pass to which a message belongs. A pass is a message along the chain and back.
 ///
 /// `None` for a message without such a number, such as a lease message.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {

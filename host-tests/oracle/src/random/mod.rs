@@ -54,7 +54,7 @@ impl Style {
         relays: 1..=50,
         chain: Chain::Alike,
     };
-    /// Links with 1 to 50 relays, whose altitudes and powers may differ.
+    /// Chains of 1 to 50 relays; altitudes and powers of the relays can differ.
     pub const ANY: Self = Self {
         relays: 1..=50,
         chain: Chain::Any,
@@ -91,7 +91,7 @@ pub fn link(rng: &mut impl Rng, style: &Style) -> Link {
     }
 }
 
-/// Returns the link with receiver noise of 1e-6 to 1e4 times the interference at a random position. The noise stays
+/// Returns the link with added receiver noise. The noise is 1e-6 to 1e4 times the interference at a random position,
 /// within the limit of a mission.
 pub fn in_noise(rng: &mut impl Rng, link: &Link) -> Link {
     let place = rng.random_range(0.0..=link.distance_m);

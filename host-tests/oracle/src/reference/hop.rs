@@ -2,10 +2,11 @@
 
 use super::link::{Link, meets, received_w};
 
-/// Number of bisection steps: enough to halve any f64 interval in metres down to adjacent numbers.
+/// Number of bisection steps. It is enough to halve any f64 interval until its ends are adjacent f64 numbers.
 const HALVINGS: usize = 200;
 
-/// Hop to a relay from Tx or from the previous relay. `x` in its methods is the receiving relay's position, m.
+/// Hop to a relay from Tx or from the previous relay. The argument `x` of its methods is the position of the receiving
+/// relay, m.
 pub(super) struct Hop<'a> {
     link: &'a Link,
     sender_w: f64,
@@ -16,7 +17,7 @@ pub(super) struct Hop<'a> {
 }
 
 impl<'a> Hop<'a> {
-    /// Creates the hop to relay `k`, within 1 to N, from relay k-1 at `from_x`. Hop 1 is sent from Tx at 0.
+    /// Creates the hop to relay `k`, 1 to N, from the previous relay at `from_x`. For `k` = 1 the sender is Tx, at 0.
     pub(super) fn new(link: &'a Link, k: usize, from_x: f64) -> Option<Self> {
         let before = k.checked_sub(1)?;
         let own_h = link.relays.get(before)?.altitude_m;
@@ -70,7 +71,8 @@ impl<'a> Hop<'a> {
         meets(self.sir(x), target)
     }
 
-    /// Returns a value with the sign of the SIR's slope at `x`, by which the extrema of the SIR are found.
+    /// Returns a value that is positive where the SIR rises with `x`, and negative where it falls. The extrema of the
+    /// SIR are its zeros.
     ///
     /// Beyond the sender the value is a concave function of `x` (see [`super`]), so that it has at most two zeros.
     fn rise(&self, x: f64) -> f64 {
@@ -92,11 +94,11 @@ impl<'a> Hop<'a> {
         }
     }
 
-    /// Returns the positions, m, at which the SIR changes from rising to falling or back. They ascend and lie within
-    /// `low` to `high`, both at or beyond the sender; there are at most two.
+    /// Returns the positions, m, at which the SIR has a maximum or minimum, in ascending order. There are at most two.
+    /// They are within `low` to `high`, which must not be before the sender.
     ///
-    /// The SIR is monotone between them. The cost is about 60 evaluations of the slope, with receiver noise about
-    /// 300.
+    /// The SIR is monotone between these positions. The cost is about 60 evaluations of the slope, with receiver noise
+    /// about 300.
     pub(super) fn turns(&self, low: f64, high: f64) -> Vec<f64> {
         let (first, last) = (self.rises(low), self.rises(high));
         let sign = |from: f64, to: f64| bisect(from, to, |x| self.rises(x) == self.rises(from));
@@ -132,10 +134,11 @@ impl<'a> Hop<'a> {
     }
 }
 
-/// Returns the last x, m, on the way from `inside` to `outside` at which `holds` is true. `outside` may be smaller
-/// than `inside`.
+/// Returns the x, m, between `inside` and `outside` at which `holds` changes from true to false. `outside` may be
+/// smaller than `inside`.
 ///
-/// `holds` must be true at `inside`, false at `outside`, and change once. Exact to adjacent f64 values.
+/// `holds` must be true at `inside`, false at `outside`, and change once. At the returned x it is still true. The
+/// result is exact to adjacent f64 values.
 pub(super) fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = inside.midpoint(outside);

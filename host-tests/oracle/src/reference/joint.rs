@@ -41,7 +41,7 @@ impl Corridor {
     }
 }
 
-/// Relay with a fixed lateral position and altitude, inside the corridor or not.
+/// Relay whose lateral position and altitude are fixed, inside the corridor or outside of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedCrossSection {
     /// Index of the relay in the link, from 0.
@@ -53,7 +53,9 @@ pub struct FixedCrossSection {
 }
 
 impl FixedCrossSection {
-    /// Returns the corridor of one relay: a single point if `held` fixes its lateral position and altitude.
+    /// Returns the range of lateral positions and altitudes of one relay, called its corridor.
+    ///
+    /// The range is a single point if `held` fixes the lateral position and altitude of the relay.
     pub(crate) fn corridor_of(held: &[Self], relay: usize, corridor: Corridor) -> Corridor {
         let own = held.iter().find(|hold| hold.relay == relay);
         own.map_or(corridor, |hold| Corridor {
@@ -94,7 +96,8 @@ impl Place {
     }
 }
 
-/// Returns the SIR (linear) of a chain's worst hop. `None` without relays, or unless there is one position per relay.
+/// Returns the SIR (linear) of a chain's worst hop. `None` if the link has no relays, or if the number of positions
+/// differs from the number of relays.
 pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     let (tail, last) = (places.last()?, link.relays.last()?);
     if places.len() != link.len() {
@@ -127,8 +130,8 @@ pub fn sir(link: &Link, places: &[Place]) -> Option<f64> {
     Some(hops.fold(rx, f64::min))
 }
 
-/// Returns true if a chain keeps the relays' order, corridor, fixed positions and minimum separation. The separation
-/// may be short by 1e-9 of itself, for rounding.
+/// Returns true if a chain keeps the relays' order, corridor, fixed positions and minimum separation. A separation is
+/// accepted if it is short by less than 1e-9 of the minimum, because of rounding.
 pub fn keeps_rules(
     link: &Link,
     corridor: Corridor,

@@ -76,7 +76,7 @@ impl Link {
         self.relays.len()
     }
 
-    /// Returns true if there are no relays; every search then finds nothing.
+    /// Returns true if the link has no relays. Every search then returns `None`.
     pub fn is_empty(&self) -> bool {
         self.relays.is_empty()
     }
@@ -88,9 +88,10 @@ pub(super) fn received_w(power_w: f64, factor: f64, dx: f64, dy: f64, dz: f64) -
     power_w / (factor * (dx * dx + dy * dy + dz * dz))
 }
 
-/// Returns true if `sir` meets `target`: `sir` may be a few units in the last place below `target`.
+/// Returns true if `sir` meets `target`. An `sir` that is a few units in the last place below `target` meets it, too.
 ///
-/// Otherwise rounding would decide for a constant SIR (interferer at Tx) that equals the target.
+/// This tolerance is needed if the interferer is at Tx: the SIR is then constant and can equal the target, so that
+/// rounding would decide.
 pub(super) fn meets(sir: f64, target: f64) -> bool {
     sir >= target * (1.0 - 4.0 * f64::EPSILON)
 }

@@ -11,9 +11,9 @@ const LEAST_TARGET: f64 = 1e-250;
 impl Link {
     /// Returns the best SIR (linear) of all chains: the largest target SIR that a chain meets.
     ///
-    /// The result is accurate to 1e-13 relative. `None` without relays, or if every chain has an SIR of zero. About
-    /// 50 to 60 targets are tried. If all relays share one altitude, a target is tried with one chain only, in which
-    /// every relay is as far along as possible. Otherwise all positions of each relay are considered.
+    /// The result is accurate to 1e-13 relative. `None` without relays, or if every chain has an SIR of zero. About 50
+    /// to 60 targets are tried. If all relays share one altitude, a target is tried with one chain only, in which every
+    /// relay is as near to Rx as possible. Otherwise all positions of each relay are considered.
     pub fn optimum(&self) -> Option<f64> {
         let mut heights = self.relays.iter().map(|relay| relay.altitude_m);
         let first = heights.next()?;
@@ -24,11 +24,12 @@ impl Link {
         }
     }
 
-    /// Returns the largest target SIR (linear) that [`Link::feasible`] is found to meet, to 1e-13 relative.
+    /// Returns the largest target SIR (linear) that a bisection with [`Link::feasible`] finds. It is accurate to 1e-13
+    /// relative.
     ///
-    /// It is the optimum if all relays share one altitude. Otherwise it may be below the optimum, and a larger target
-    /// may be met too, because the greedy chain can fail at one target and succeed at a larger one. `None` as for
-    /// [`Link::optimum`].
+    /// If all relays share one altitude, the result is the optimum. Otherwise it may be below the optimum, because the
+    /// greedy chain can fail at one target and succeed at a larger one. `None` without relays, or if every chain has an
+    /// SIR of zero.
     pub fn farthest_optimum(&self) -> Option<f64> {
         self.largest_target(|target| self.feasible(target).is_some())
     }
@@ -57,9 +58,9 @@ impl Link {
 
     /// Returns the first target SIR (linear) that the paper's fixed-step search tries.
     ///
-    /// It is the smaller of two SIRs: the SIR of the first hop with relay 1 straight above Tx, and the SIR of the
-    /// last hop with relay N straight above Rx. If the interferer is behind Tx (its x is below 0), the largest SIR of
-    /// the first hop over x from 0 to D replaces the one above Tx.
+    /// It is the smaller of two SIRs. One is the SIR of the first hop with relay 1 straight above Tx. The other is the
+    /// SIR of the last hop with relay N straight above Rx. If the interferer is behind Tx (its x is below 0), the first
+    /// SIR is instead the largest SIR of the first hop over all x from 0 to D.
     fn first_target(&self) -> Option<f64> {
         let hop = Hop::new(self, 1, 0.0)?;
         let near = if self.x_i < 0.0 {
@@ -73,9 +74,9 @@ impl Link {
     /// Runs the paper's fixed-step search: lowers the target SIR by `epsilon` until a chain meets it.
     ///
     /// Returns the number of targets tried and the last target (linear). `None` if no target can be met. The first
-    /// target is the smaller of two SIRs: the SIR of the first hop with relay 1 straight above Tx, and the SIR of the
-    /// last hop with relay N straight above Rx. For an interferer behind Tx (X < 0), the first hop's best SIR
-    /// replaces the one above Tx. Each target costs one chain. `epsilon` is linear, > 0.
+    /// target is the smaller of two SIRs. One is the SIR of the first hop with relay 1 straight above Tx, or the best
+    /// SIR of this hop if the interferer is behind Tx (x below 0). The other is the SIR of the last hop with relay N
+    /// straight above Rx. Each target costs one chain. `epsilon` is linear, > 0.
     pub fn fixed_step(&self, epsilon: f64) -> Option<(u32, f64)> {
         let first = self.first_target()?;
         (0..u32::MAX)

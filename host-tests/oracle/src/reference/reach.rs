@@ -4,7 +4,7 @@ use super::hop::{Hop, bisect};
 use super::link::{Link, meets};
 
 impl Link {
-    /// Returns the farthest position, m, from `from_x` on to Rx, at which relay `k` meets the SIR `target`.
+    /// Returns the farthest position, m, between `from_x` and Rx at which relay `k` meets the SIR `target`.
     ///
     /// `k` is within 1 to N; `target` is linear and above 0. Relay k-1 is at `from_x` (for k = 1 Tx is at 0). `None`
     /// if no position meets the target. The cost is about 60 evaluations of the SIR, at most about 150.
@@ -49,9 +49,9 @@ impl Link {
     /// Returns the positions, m, of the greedy chain for a target SIR (linear). Each relay goes as far as `target`
     /// allows.
     ///
-    /// `None` if a relay has no position or Rx is out of reach of the last relay. The on-board protocol does the same
-    /// with a target. If all relays share one altitude, `None` proves that no chain meets the target; otherwise see
-    /// [`Link::placement`]. N reaches.
+    /// `None` if a relay has no position that meets the target, or if Rx is out of reach of the last relay. Relays use
+    /// the same method in flight. If all relays share one altitude, `None` proves that no chain meets the target;
+    /// otherwise [`Link::placement`] gives this proof. The cost is N calls of [`Link::farthest`].
     pub fn feasible(&self, target: f64) -> Option<Vec<f64>> {
         let mut from = 0.0;
         let mut x = Vec::with_capacity(self.len());

@@ -2,26 +2,26 @@
 
 use super::link::Link;
 
-/// Number of golden-section steps in one grid cell, which shrinks the cell by a factor of about 2e-9.
+/// Number of golden-section steps in one grid cell. They shrink the cell to about 2e-9 of its width.
 const STEPS: usize = 42;
 
 const PEAKS: usize = 4;
 
 impl Link {
-    /// Returns the best SIR (linear) of all chains with the minimum separation, by brute force. The grids are nested
-    /// and refined.
+    /// Returns the best SIR (linear) of all chains with the minimum separation, by brute force. The search has one grid
+    /// for each relay, nested in the grid of the previous relay, and refines its best points.
     ///
-    /// 0 if there is no such chain. `points` (>= 16) is the number of grid points per relay. The result may be below
-    /// the optimum, because the grid may miss it, but is not above, except for rounding. Costs about (4 `points` +
-    /// 170)^N SIR evaluations: use it for N of 1 or 2.
+    /// The result is 0 if there is no such chain. `points` (>= 16) is the number of grid points per relay. The result
+    /// may be below the optimum, because the grid may miss it. It is never above the optimum, except for rounding.
+    /// Costs about (4 `points` + 170)^N SIR evaluations: use it for N of 1 or 2.
     pub fn optimum_by_search(&self, points: u32) -> f64 {
         self.best_from(1, 0.0, points)
     }
 
-    /// Returns the best SIR of the worst of hops `k` to N+1, over all positions of the relays from `k` on.
+    /// Returns the best SIR of the worst of the hops `k` to N+1. The positions of relay `k` and of all relays after it
+    /// are varied.
     ///
-    /// The SIR of several hops is the SIR of the worst hop. Relay k-1 is at `from_x`; `points` is the number of grid
-    /// points per relay.
+    /// Relay k-1 is fixed at `from_x`; `points` is the number of grid points per relay.
     fn best_from(&self, k: usize, from_x: f64, points: u32) -> f64 {
         let worst_hop = |x: f64| {
             let here = self.sir_relay(k, from_x, x).unwrap_or(0.0);
@@ -61,7 +61,8 @@ impl Link {
     }
 }
 
-/// Returns the largest value of `f`. It is sampled at the sorted points `x` and refined around the best local maxima.
+/// Returns the largest value of `f`. The function is evaluated at the sorted points `x`, and then around the best local
+/// maxima.
 fn maximum(x: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<(f64, f64)> = x.iter().map(|&x| (x, f(x))).collect();
     let place = |i: Option<usize>| i.and_then(|i| samples.get(i)).copied();

@@ -14,8 +14,8 @@ type Interval = (f64, f64);
 impl Link {
     /// Returns the positions, m, of a chain that meets `target` (linear SIR).
     ///
-    /// Each relay is as far toward Rx as possible. `None` only if no chain meets the target, whatever altitudes the
-    /// relays have. The positions of a relay that can meet the target form intervals, seldom more than three; each
+    /// Each relay is as far toward Rx as possible. The altitudes of the relays may differ. `None` proves that no chain
+    /// meets the target. The positions of a relay that can meet the target form intervals, seldom more than three; each
     /// costs about 300 SIR evaluations.
     pub fn placement(&self, target: f64) -> Option<Vec<f64>> {
         let sets = self.sets(target, 0.0)?;
@@ -32,7 +32,7 @@ impl Link {
     /// Returns the best SIR (linear) of all chains that keep the minimum separation. Altitudes are fixed. Accurate to
     /// 1e-13 relative.
     ///
-    /// `None` as for [`Link::optimum`], or if the separation leaves no chain.
+    /// `None` without relays, if every chain has an SIR of zero, or if no chain keeps the minimum separation.
     pub fn optimum_apart(&self) -> Option<f64> {
         self.largest_target(|target| self.sets(target, self.min_separation_m).is_some())
     }
@@ -67,7 +67,8 @@ impl Link {
 
     /// Returns the positions that relay `k` (2 to N) can have if relay k-1 is within `set`.
     ///
-    /// The hop between the two must meet `target`, and relay `k` is at least `advance` m farther along x.
+    /// The hop between the two relays must meet `target`, and relay `k` must be at least `advance` m farther along x
+    /// than relay k-1.
     fn next_set(&self, k: usize, set: &[Interval], target: f64, advance: f64) -> Vec<Interval> {
         let mut pieces = Vec::new();
         let gap_ends = set
@@ -102,7 +103,8 @@ impl Link {
 
 /// Returns the parts of the interval `low` to `high` in which `holds` returns true.
 ///
-/// `turns` ascends; between two successive values `holds` must change at most once.
+/// `turns` are positions in ascending order. `holds` must change at most once between two neighbouring positions of
+/// `low`, `turns` and `high`.
 fn where_true(low: f64, turns: &[f64], high: f64, holds: impl Fn(f64) -> bool) -> Vec<Interval> {
     let corners = || turns.iter().copied().chain([high]);
     let froms = std::iter::once(low).chain(turns.iter().copied());

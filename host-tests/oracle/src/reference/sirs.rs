@@ -6,7 +6,8 @@ use super::link::{Link, received_w};
 impl Link {
     /// Returns the SIR (linear) of hop `k` in 1..=N. Relay `k` is at `x` metres, its sender at `from_x` metres.
     ///
-    /// Hop 1 is sent by Tx at 0, whatever `from_x`. `None` for any other `k`. Infinite if sender and receiver coincide.
+    /// For `k` = 1 the sender is Tx at 0, and `from_x` is ignored. `None` for `k` outside of this range. The SIR is
+    /// infinite if sender and receiver have the same position.
     pub fn sir_relay(&self, k: usize, from_x: f64, x: f64) -> Option<f64> {
         Hop::new(self, k, from_x).map(|hop| hop.sir(x))
     }
@@ -33,7 +34,7 @@ impl Link {
 
     /// Returns the SIR (linear) of the N+1 hops of a chain with relay k at `x[k-1]` metres.
     ///
-    /// Empty without relays, or unless `x` has one position per relay.
+    /// Empty without relays, or if the number of positions in `x` differs from the number of relays.
     pub fn sir_hops(&self, x: &[f64]) -> Vec<f64> {
         if x.len() != self.len() {
             return Vec::new();

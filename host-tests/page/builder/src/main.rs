@@ -25,9 +25,9 @@ const SCRIPTS: [&str; 7] = [
     "page.js",
 ];
 
-/// Options of the run that the page shows first, the same as in its `wish.js`.
+/// Options of the run that the page shows first. The page's script `wish.js` has the same options.
 ///
-/// The result is embedded in the page, so that it is visible before the WebAssembly code is loaded.
+/// The result of this run is embedded in the page, so that it is visible before the WebAssembly code is loaded.
 const FIRST_OPTIONS: &str = "--uavs 8 --method align";
 const FIRST_SCENARIO: &str = "[geometry]
 distance_m = 1000.0
@@ -52,7 +52,7 @@ It has no options but -h, --help; the target folder is that of CARGO_TARGET_DIR,
 
 /// Returns the text to print for the command line arguments, and true if they are valid.
 ///
-/// `None` without arguments: then the page is built.
+/// `None` without arguments: the program then builds the page.
 fn answer(arguments: &[String]) -> Option<(String, bool)> {
     match arguments {
         [] => None,

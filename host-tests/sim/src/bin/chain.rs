@@ -250,7 +250,7 @@ impl AirCapture {
         })
     }
 
-    /// Writes to the capture file the frames whose transmission has ended by now, or all if `to_the_end`.
+    /// Writes to the capture file the frames whose transmission has ended, or all frames if `to_the_end`.
     fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
         let until = if to_the_end {
             uav_relay::Instant::from_micros(u64::MAX)

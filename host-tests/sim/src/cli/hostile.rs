@@ -149,8 +149,9 @@ impl Hostile {
         Ok(())
     }
 
-    /// Rejects a `--kill` of a relay that is off already, and a first `--boot` before the first `--kill`. A `--boot`
-    /// of a relay without any `--kill` is a reboot, and allowed.
+    /// Rejects a `--kill` of a relay that is off, and a `--boot` of a relay before its first `--kill`.
+    ///
+    /// A `--boot` of a relay without any `--kill` is allowed: the relay reboots.
     fn in_order(&self) -> Result<(), Failure> {
         let kills = self.kill.iter().map(|one| (one, true));
         let mut all: Vec<(&RelayEvent, bool)> = kills
@@ -442,7 +443,7 @@ pub struct Flight {
     pub rotation: Rotation,
 }
 
-/// Largest |x|, |y| and height of the start position that an option gives a drone, m.
+/// Largest |x|, |y| and height, m, of a drone's start position in the file of `--start`.
 const START_WITHIN_M: f64 = 5_000.0;
 
 impl Flight {
@@ -486,7 +487,7 @@ impl Flight {
 
     /// Adds the drones to `setup` if `--fly` is given. Without `--start` they start evenly spaced from Tx to Rx.
     ///
-    /// `axis` is the geographic line from Tx to Rx. `None` takes an arbitrary place on Earth.
+    /// `axis` is the geographic line from Tx to Rx. If it is `None`, the line is at an arbitrary place on Earth.
     pub fn prepare(&self, setup: &mut Setup, axis: Option<Axis>) -> Result<(), Failure> {
         if !self.fly {
             return Ok(());

@@ -107,7 +107,7 @@ pub enum Method {
 }
 
 impl Options {
-    /// Returns the options with the number of relays of the fleet, if it is given.
+    /// Returns the options, with `--uavs` replaced by the number of drones in `--fleet`, if that is given.
     pub fn settled(mut self) -> Self {
         self.uavs = self.hostile.flight.fleet().unwrap_or(self.uavs);
         self

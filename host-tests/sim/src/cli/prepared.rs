@@ -143,7 +143,7 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Runs the simulation of `setup` and returns the chain at its end. `watch` runs a chain until the relays keep their positions.
+    /// Runs the simulation of `setup` and returns the chain at its end. The function `watch` runs a chain until no relay moves any more.
     ///
     /// With `--closed-loop`, the relays then measure the interference and agree on positions again, the requested number of times.
     ///

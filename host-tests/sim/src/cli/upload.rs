@@ -124,7 +124,7 @@ impl Uploads {
         !self.upload.is_empty()
     }
 
-    /// Returns true unless `--no-store` is given: relays then keep an uploaded mission over a reboot.
+    /// Returns true if relays keep an uploaded mission over a reboot, that is, without `--no-store`.
     pub fn are_stored(&self) -> bool {
         !self.no_store
     }

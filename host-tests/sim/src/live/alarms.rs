@@ -19,9 +19,9 @@ use uav_relay_screen::alarms::{Alarms, Reason};
 use crate::report::seconds;
 use crate::simulator::outcome::{Moment, TimelineEvent};
 
-/// Alarms that follow the events of a run.
+/// Updates the page's alarms from the events of a run.
 pub(super) trait Observe {
-    /// Updates the alarms after an event.
+    /// Begins or ends the alarms that the event `moment` concerns.
     fn observe(&mut self, moment: &Moment);
 }
 

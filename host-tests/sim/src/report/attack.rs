@@ -15,9 +15,10 @@ pub struct AttackCountsReport {
     pub sent: u64,
     /// Number of the attacker's frames that a relay accepted as frames of a neighbour.
     pub taken: u64,
-    /// Number of the attacker's frames for each receive counter that they incremented at a relay.
+    /// Number of the attacker's frames by the counter that they incremented at the receiver.
     ///
-    /// `received` counts accepted frames. Each other counter stands for a reason of rejection.
+    /// The counters are those of a relay. `received` counts accepted frames. Each other counter stands for a reason of
+    /// rejection.
     pub counted: BTreeMap<&'static str, u64>,
 }
 
@@ -30,7 +31,7 @@ pub struct AttackReport {
     pub forged: AttackCountsReport,
     /// Numbers of replayed frames: sent, accepted, and counted by the relays.
     pub replayed: AttackCountsReport,
-    /// True if the run with the attack ended differently from the run without the attack.
+    /// True if the run with the attack ended for another reason than the run without the attack.
     pub ended_otherwise: bool,
     /// Number of relays whose final position or target SIR differs from the run without the attack.
     pub moved: u64,
@@ -39,8 +40,8 @@ pub struct AttackReport {
     /// Absent if a moved relay has no position in one of the two runs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest_m: Option<f64>,
-    /// Number of positions that relays accepted for target SIRs that do not occur without the attack. It shows that
-    /// the attack misled the relays.
+    /// Number of positions that relays accepted for target SIRs that do not occur without the attack. Each such
+    /// position shows that the attack misled a relay.
     pub misled: u64,
     /// Number of different views (memberships of the chain) that the relays accepted.
     pub formed: u64,

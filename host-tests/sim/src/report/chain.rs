@@ -73,8 +73,8 @@ pub struct ChainReport {
     pub target: Option<f64>,
     /// True if `target` is proven optimal. No chain of equal relays can exceed it by more than the tolerance.
     ///
-    /// The leader computes an upper bound on the SIR in a random field. False if this bound is higher than `target`,
-    /// so that the optimum is unknown. Absent without a random field or a bound.
+    /// In a random field the leader computes an upper bound on the SIR. False if this bound is higher than `target`:
+    /// then the optimum is unknown. Absent without a random field or a bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub promised: Option<bool>,
     /// Linear SIR of the chain before the first round of Algorithm 2, and after each round. In a round of this
@@ -114,7 +114,8 @@ pub struct ChainReport {
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Availability of the chain: the part of the run in which it had the best positions.
+    /// Availability of the chain: fraction of the run in which the chain had the best positions. Also further
+    /// statistics.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
     /// Replacement of tired drones; absent without `--fleet`.
@@ -123,7 +124,9 @@ pub struct ChainReport {
     /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
     #[serde(flatten)]
     pub listened: Option<SensingReport>,
-    /// SIR with all interferers of the scenario, if the relays assume a single one in their place.
+    /// SIR of the worst hop with all interferers of the scenario.
+    ///
+    /// Absent unless the relays compute with a single interferer in place of several.
     #[serde(flatten)]
     pub against_all: Option<AllInterferersReport>,
     /// Number of relays in the chain at the end. Absent if the log, `timeline`, is empty.
@@ -371,8 +374,9 @@ impl ChainReport {
 
 /// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
-/// The chain is the largest view that all its relays have accepted; without such a view, all relays that are on. If
-/// every hop has a link of its own and a relay failed, it is all relays. Without a quorum it is empty.
+/// The chain is the largest view that all its relays have accepted. Without such a view, all relays that are on are
+/// returned. If every hop has a link of its own and a relay failed, all relays are returned. If no part of the chain
+/// has a quorum, the list is empty.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -395,7 +399,8 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` is a complete view: all its relays, ordered by index. A view is a membership of the chain.
+/// Returns true if `part` has all relays of their view, in the order of their indices. A view is a membership of the
+/// chain.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)

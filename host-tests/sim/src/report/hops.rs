@@ -31,16 +31,17 @@ pub struct RelayReport {
     pub version: Option<u16>,
 }
 
-/// Time slots of a hop in fitted slots: begin and end of each, as shares of the frame, 0 to 1.
+/// Time slots of a hop, if the slots are fitted to the hops. Times are fractions of the TDMA frame, 0 to 1.
 ///
-/// The slots toward Rx follow one another from hop 1 on, and after them the slots back from the last hop on.
+/// The TDMA frame begins with the slots toward Rx, from hop 1 to the last hop. Then the slots toward Tx follow, from
+/// the last hop to hop 1.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct HopSlots {
     /// Number of the hop, from 1: hop k connects the nodes k - 1 and k of the chain. Node 0 is Tx.
     pub hop: usize,
-    /// Begin and end of the slot in the direction to Rx.
+    /// Start and end of the slot in the direction to Rx.
     pub slot: [f64; 2],
-    /// Begin and end of the slot in the direction to Tx; absent without data in that direction.
+    /// Start and end of the slot in the direction to Tx; absent without data in that direction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slot_back: Option<[f64; 2]>,
 }
@@ -49,7 +50,7 @@ impl HopSlots {
     /// Returns the slots of all hops from the times that the hops need for their data. `there` is for the direction
     /// to Rx, `back` for the direction to Tx.
     ///
-    /// `back` is empty for one direction. The result is empty if a hop carries nothing, so that its time is infinite.
+    /// `back` is empty for one direction. The result is empty if a time is infinite, because the hop carries no data.
     pub fn of(there: &[f64], back: &[f64]) -> Vec<Self> {
         let frame: f64 = there.iter().chain(back.iter().rev()).sum();
         let mut spent = 0.0;
@@ -70,7 +71,7 @@ impl HopSlots {
         .collect()
     }
 
-    /// Returns the time slots of all hops. They follow from the time slots on which the relays have agreed, relay 1 first.
+    /// Returns the time slots of all hops from the slots on which the relays have agreed. `relays` begins with relay 1.
     pub fn agreed(relays: &[SlotShares]) -> Vec<Self> {
         let last = relays.last().map(|last| (last.to_rx, last.from_rx));
         let hops = relays.iter().map(|own| (own.from_tx, own.to_tx));

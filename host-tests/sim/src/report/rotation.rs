@@ -12,11 +12,11 @@ use crate::simulator::rotation::{GOOD, NearDrone, RESERVE_S, Rotated, RotationSp
 pub struct RotationReport {
     /// Number of drones that are meant to fly.
     pub flying: u16,
-    /// Figures of runs in which tired drones announce that they leave. Replacements then join first.
+    /// Figures of the run in which a tired drone announces that it leaves. A replacement then joins first.
     pub announced: RotationFigures,
-    /// Losses instead of departures.
+    /// Figures of the run without announcements; absent if this run was not made.
     ///
-    /// A tired drone flies home with its relay off; a spare in the air is switched on at that moment.
+    /// A tired drone flies home with its relay off, so that the chain loses it. At this moment a spare is switched on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unannounced: Option<RotationFigures>,
 }
@@ -27,29 +27,31 @@ pub struct RotationFigures {
     /// Time when the chain was first complete, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub complete_at_s: Option<f64>,
-    /// Time since then, s.
+    /// Time from `complete_at_s` to the end of the run, s.
     pub watched_s: f64,
-    /// Fraction of that time in which the worst hop had less than 0.99 of the optimum's SIR.
+    /// Fraction of `watched_s` in which the worst hop's SIR was below 0.99 of the optimum.
     pub below: f64,
-    /// Smallest SIR of the worst hop, as a fraction of the optimum.
+    /// Smallest SIR of the worst hop, as a fraction of the optimum, since the chain was complete.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst: Option<f64>,
     /// Virtual time of the smallest SIR, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_at_s: Option<f64>,
-    /// Number of relays that left.
+    /// Number of relays that left since the chain was complete.
     pub replaced: u32,
-    /// Number of these that left without permission.
+    /// Number of relays, among `replaced`, that left without permission.
     pub forced: u32,
-    /// Relays that left per hour.
+    /// Number of relays that left per hour.
     pub per_hour: f64,
-    /// Relays that would leave per hour if each stayed until only its reserve and way home remained.
+    /// Number of relays that would leave per hour if each used its battery as far as allowed.
+    ///
+    /// A battery may be used until only the reserve and the way home remain.
     pub arithmetic_per_hour: f64,
-    /// Mean time from the request to the permission to leave, s.
+    /// Mean time from a relay's request to leave until it left, s.
     pub mean_wait_s: f64,
-    /// Longest time from the request to the permission to leave, s.
+    /// Longest time from a relay's request to leave until it left, s.
     pub longest_wait_s: f64,
-    /// Least remaining endurance of a drone that left, beyond its way home, s.
+    /// Least remaining endurance beyond the way home, s, of a drone when it left the chain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_left_s: Option<f64>,
     /// Smallest true distance of two drones in the air, m. Drones flown by their pilots count, too.
@@ -58,7 +60,7 @@ pub struct RotationFigures {
     /// Time of the closest approach, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest_at_s: Option<f64>,
-    /// Two nearest drones at that time.
+    /// The two nearest drones at the time `nearest_at_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nearest: Option<[NearDrone; 2]>,
     /// Largest number of chains that flew by agreements of their own at the same time.
@@ -93,7 +95,9 @@ impl RotationFigures {
 }
 
 impl RotationReport {
-    /// Creates the report of runs with announced departures, and of runs without. Each has its number of chains.
+    /// Creates the report from one run with announced departures and one without.
+    ///
+    /// The second value of each pair is the largest number of chains that flew by separate agreements at the same time.
     pub fn new(
         spec: &RotationSpec,
         announced: (&Rotated, usize),

@@ -157,7 +157,7 @@ pub fn line(moment: &Moment) -> String {
 
 /// Longest time between two successive log entries that are grouped as one event, s.
 ///
-/// Neighbours may detect the same failure at different times.
+/// The neighbours of a relay can detect the same failure at different times.
 const TOGETHER_S: f64 = 10.0;
 
 /// Groups log entries about the same event, sorted by time.
@@ -352,7 +352,7 @@ fn count(relays: usize) -> String {
     format!("{relays} {}", if relays == 1 { "relay" } else { "relays" })
 }
 
-/// Number of lines that a shortened log keeps at its start, and again at its end.
+/// Number of lines at the start, and also at the end, that a shortened log keeps.
 const ENDS: usize = 20;
 
 /// Formats the log with a line for each event. If the log has more than 40 lines, the middle lines are left out.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::simulator::route::{ChainState, Period, Ps, SECOND};
 use crate::simulator::traffic::{Flow, Packets, QueueLength, Traffic, TrafficSpec, quantile_s};
 
-/// Number of periods that a shortened text lists at its start, and again at its end.
+/// Number of periods at the start, and also at the end, that a shortened text lists.
 const ENDS: usize = 10;
 
 /// Largest number of queues that the text lists completely. If there are more, it lists the 8 longest.
@@ -101,7 +101,7 @@ pub struct QueueReport {
 pub struct PeriodReport {
     /// Start of the period, s of virtual time.
     pub from_s: f64,
-    /// End of the period of the traffic, s of virtual time.
+    /// End of the period, s of virtual time.
     pub until_s: f64,
     /// Number of the view (membership of the chain) in this period.
     pub view: u32,

@@ -140,7 +140,7 @@ impl Attacker {
 
 /// Returns the name of the first counter that a frame has increased from `before` to `after`.
 ///
-/// It tells how the receiver classified the frame.
+/// This counter shows how the receiver classified the frame.
 pub(super) fn incremented_counter(before: &Stats, after: &Stats) -> &'static str {
     type Counter = (&'static str, fn(&Stats) -> u32);
     // A received but rejected frame increments two counters; the reason for the rejection comes first.
@@ -213,7 +213,9 @@ pub(super) fn forge(
     }
 }
 
-/// Changes one random byte of a frame after the first eight: in the frame counter, the body or the tag.
+/// Changes one random byte of a frame: in the frame counter, the body or the tag.
+///
+/// The first eight bytes stay as they are.
 fn with_altered_byte(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(HEADER - 2..plain.len().max(HEADER));
     if let Some(byte) = plain.get_mut(at) {

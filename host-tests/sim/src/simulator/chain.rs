@@ -329,7 +329,7 @@ struct Member {
     relay: Relay,
     /// Number of the relay in the mission, from 1.
     node: u16,
-    /// Outgoing serial lines of the relay: first toward Tx, or to a shared channel, then toward Rx.
+    /// Outgoing serial lines: the first toward Tx or to a shared channel, the second toward Rx.
     lines: [Line; 2],
     killed: Option<Instant>,
     /// True if the relay controlled its drone at the last time step of the flight.
@@ -345,8 +345,8 @@ struct Member {
     /// Last setpoint that [`Chain::check`] found within the limits. It is stored so that the same setpoint is not
     /// checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of the setpoints since the relay last had no setpoint. With a guard, a
-    /// setpoint may be outside the geofence only within this range.
+    /// Smallest and largest coordinates of all setpoints since the relay's first setpoint. They start anew when the
+    /// relay loses its setpoint. With a guard, a setpoint may be outside the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -377,7 +377,7 @@ pub struct Chain {
     flight: Option<Flight>,
     fleet: Vec<Vehicle>,
     rotation: Option<Rotation>,
-    /// Drones, from 0, that take off now, and their places on the ground.
+    /// Index (from 0) of each drone that takes off at the present step, and its place on the ground.
     take_off_from: Vec<(usize, Point)>,
     /// Distance of each pair of drones when both were last handed over to their relays, m.
     ///
@@ -452,8 +452,8 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults. The statistics compare the positions of the created chain with the
-    /// positions from `run`.
+    /// `run` simulates a chain without faults. The statistics compare the relays' positions with the positions of that
+    /// chain.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -556,7 +556,7 @@ impl Chain {
     }
 }
 
-/// Queues the values of the drones' endurances.
+/// Queues the events by which relays get the remaining endurance of their drones.
 fn put_endurances(setup: &Setup, queue: &mut Queue) {
     for &(index, at, left_s) in &setup.endurances {
         let event = QueuedEvent::Endurance(left_s);

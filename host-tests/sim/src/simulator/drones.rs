@@ -114,7 +114,7 @@ impl Body {
         sum(self.at, braked)
     }
 
-    /// Moves the body toward `goal` for `step_s` seconds, within its limits of speed and acceleration.
+    /// Moves the body toward `goal` for `step_s` seconds, with this speed and acceleration at most.
     pub fn fly(&mut self, goal: Point, speed_mps: f64, acceleration_mps2: f64, step_s: f64) {
         let axes = self.at.iter_mut().zip(&mut self.velocity_mps);
         for ((at, velocity), goal) in axes.zip(goal) {

@@ -12,7 +12,7 @@ use uav_relay::{Duration, Instant};
 pub struct Faults {
     /// Probability that a frame never arrives.
     pub loss: f64,
-    /// Probability that one to eight bytes of a frame change. The delimiter may be among them.
+    /// Probability that one to eight bytes of a frame change. The delimiter can be one of these bytes.
     pub corrupt: f64,
     /// Probability that a frame arrives twice.
     pub duplicate: f64,
@@ -187,7 +187,7 @@ pub struct LinkSpec {
 }
 
 impl Default for LinkSpec {
-    /// Returns a link of 115 200 baud and 2 ms latency, as of a telemetry radio at short range.
+    /// Returns a link of 115 200 baud and 2 ms latency, typical of a telemetry radio at short range.
     fn default() -> Self {
         Self {
             baud: 115_200,

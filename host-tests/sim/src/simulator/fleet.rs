@@ -62,7 +62,7 @@ impl FleetSpec {
 
 /// Returns a geographic line of `distance_m` metres at an arbitrary place. It is for a scenario without such a line.
 ///
-/// The line leads eastward from 47.4 N, 8.54 E. `None` for a length that no line may have.
+/// The line leads eastward from 47.4 N, 8.54 E. `None` if no line can have this length.
 pub fn somewhere(distance_m: f64) -> Option<Axis> {
     const TX: [f64; 2] = [47.4, 8.54];
     let tx = Geodetic::from_degrees(TX[0], TX[1], 420.0)?;
@@ -91,7 +91,7 @@ const ACCELERATION_MPS2: f64 = 3.0;
 /// Time without a position target after which a PX4 leaves OFFBOARD and hovers (`COM_OBL_RC_ACT` 5).
 const LOST: Duration = Duration::from_millis(1_000);
 
-/// Time with a stream of position targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
+/// Time with position targets after which a PX4 in its failsafe resumes OFFBOARD by itself.
 const RESUMES: Duration = Duration::from_millis(1_200);
 
 /// Time that the restart of an autopilot takes. The autopilot is silent meanwhile.
@@ -143,17 +143,16 @@ pub(super) struct Vehicle {
     /// True while the pilot of this drone sees no other drone moving nearby.
     pub(super) is_clear: bool,
     last_target_at: Option<Instant>,
-    /// True while a PX4 is in its failsafe. It resumes OFFBOARD once it receives a stream of targets again.
+    /// True while a PX4 is in its failsafe. The PX4 resumes OFFBOARD once it receives a stream of targets.
     is_failing: bool,
     streamed_since: Instant,
     began: Instant,
     away_until: Option<Instant>,
     rates: [Rate; 4],
     sequence: u8,
-    /// Time until which forbidden position targets of the relay do not count as errors.
+    /// Time until which position targets do not count as errors although the autopilot rejects them.
     ///
-    /// The autopilot has changed its mode or state, so that it no longer accepts targets, and the relay may not know
-    /// yet.
+    /// The autopilot has changed its mode or state, and the relay may not know this yet.
     unknown_until: Instant,
     pub(super) strays: u64,
     rng: ChaCha8Rng,
@@ -320,8 +319,8 @@ impl Vehicle {
 
     /// Updates the flight mode and the flight state, which the pilot and the autopilot decide.
     ///
-    /// After a change, position targets of the relay count as allowed for some time, until the relay must have
-    /// learned of the change.
+    /// For [`MODE_KNOWN_WITHIN`] after a change, position targets of the relay do not count as errors: the relay may
+    /// not know the change yet.
     fn choose(&mut self, now: Instant) {
         let before = (self.landed, self.mode);
         self.decide(now);

@@ -86,9 +86,9 @@ pub enum TimelineEvent {
     SensorOff,
     /// The relay is outside of the chain, and its drone may fly away.
     MayLeave,
-    /// The pilot is told to fly home, at each value of the endurance.
+    /// The relay's drone has to fly home. Logged for each value of the endurance that requires this.
     MustLeave,
-    /// Event that this relay has informed a node outside of the chain that its drone may fly away.
+    /// The relay informed a node outside of the chain that its drone may fly away.
     MayLeaveTold,
 }
 
@@ -218,7 +218,7 @@ pub struct Outcome {
     /// Closest approach of two flying drones; `None` if no flight was simulated.
     pub nearest: Option<Nearest>,
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
-    /// never two.
+    /// never two such drones at the same time.
     pub nearest_lent: Option<Nearest>,
     /// Smallest margin during the run, m. The margin is the distance of two drones minus the distance that they have
     /// to keep.
@@ -226,9 +226,10 @@ pub struct Outcome {
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
     pub margin_m: f64,
-    /// Drones that relay data at each time step: relay number from 1, and true position. Recorded for simple drones
-    /// with [`Setup::track`](super::setup::Setup::track). These are the living relays with a setpoint, without spares and relays
-    /// that may leave.
+    /// Relays that forward data at each time step: number from 1, and true position of the drone.
+    ///
+    /// Recorded for drones without autopilots if [`Setup::track`](super::setup::Setup::track) is set. These are the living relays with a
+    /// setpoint, without spares and relays that may leave.
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
     pub margin_at: Option<Nearest>,

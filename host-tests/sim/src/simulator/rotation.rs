@@ -40,32 +40,32 @@ pub fn duration(span_s: f64) -> Duration {
     Duration::from_millis((1e3 * span_s) as u64)
 }
 
-/// Remaining endurance at which a drone has to be at its landing place, s.
+/// Remaining endurance that a drone must still have when it lands, s.
 pub const RESERVE_S: f64 = 180.0;
 
-/// Share of the optimum of the SIR below which the chain counts as degraded.
+/// Fraction of the optimum of the SIR below which the chain counts as degraded.
 pub const GOOD: f64 = 0.99;
 
-/// Consumption of a drone that moves, relative to hover.
+/// Energy consumption of a moving drone, as a multiple of the consumption in hover.
 pub(super) const MOVING: f64 = 1.1;
 
 /// Horizontal speed of the drones, m/s.
 pub(super) const SPEED_MPS: f64 = 10.0;
-/// Vertical speed of pilots, m/s.
+/// Vertical speed at which pilots fly the drones, m/s.
 pub(super) const CLIMB_MPS: f64 = 4.0;
 
 /// Activity of a drone.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) enum Duty {
-    /// Drone on the ground, with a full battery from this time on.
+    /// Drone on the ground. Its battery is full from this time on.
     Ground(Instant),
-    /// Drone on the way to its place beside the line.
+    /// Drone on the way from the ground to its waiting place beside the line.
     Rising { path: VecDeque<Point> },
-    /// Spare beside the line, with its relay outside of the chain.
+    /// Drone that waits beside the line as a spare; its relay is outside of the chain.
     Standby,
     /// Drone flown by its relay.
     Serving,
-    /// Drone on the way home, in this tube; the relay is outside of the chain, or off.
+    /// Drone on the way home, in the flight corridor with the number `tube`. Its relay is outside of the chain, or off.
     Home { path: VecDeque<Point>, tube: usize },
 }
 
@@ -77,11 +77,13 @@ pub(super) struct Battery {
     pub(super) capacity_s: f64,
     /// Time in hover that corresponds to the energy consumed since take-off, s.
     pub(super) used_s: f64,
-    /// Time of the request to leave; `None` before.
+    /// Time at which the relay requested to leave; `None` without a request.
     pub(super) requested: Option<Instant>,
-    /// Tube at the side of take-offs, from take-off until the drone is in the line.
+    /// Flight corridor ("tube") for take-offs that the drone uses; `None` if it uses none.
+    ///
+    /// The drone uses it from take-off until it is settled in the chain.
     pub(super) tube: Option<usize>,
-    /// Time since which a spare hovers at its place.
+    /// Time from which the spare has hovered at its waiting place.
     pub(super) hovers_since: Instant,
     /// True once the drone, after it joined, has been within 3 m of its agreed position. From then on the data must
     /// be routed over this drone.
@@ -93,23 +95,25 @@ pub(super) struct Battery {
 pub struct Rotated {
     /// Time when the chain of all drones that are meant to fly was first complete and in place.
     pub complete_at: Option<Instant>,
-    /// Time since then in which the worst hop's SIR was below [`GOOD`] of the optimum, s.
+    /// Time since `complete_at` in which the worst hop's SIR was below [`GOOD`] of the optimum, s.
     pub below_s: f64,
-    /// Time since the chain was complete, s.
+    /// Time from `complete_at` to the end of the run, s.
     pub watched_s: f64,
-    /// Smallest share of the optimum since then, and when.
+    /// Smallest SIR of the worst hop since `complete_at`, as a fraction of the optimum, and its time.
     pub worst: Option<(f64, Instant)>,
-    /// Number of relays that left since the chain was complete.
+    /// Number of relays that left since `complete_at`.
     pub replaced: u32,
-    /// Number of these that left without permission, because their reserve was spent.
+    /// Number of relays, among `replaced`, that left without permission, at the end of their endurance.
     pub forced: u32,
-    /// Sum of the times that these could have stayed in the chain by their batteries, s.
+    /// Total time that the batteries allowed in the chain, s, over all relays that left.
+    ///
+    /// A battery allows a relay to stay until only the reserve and the way home remain.
     pub possible_s: f64,
-    /// Longest time from a relay's request to its permission to leave, s.
+    /// Longest time from a relay's request to leave until it left, s.
     pub longest_wait_s: f64,
-    /// Sum of these times, s.
+    /// Sum of the times from each relay's request to leave until it left, s.
     pub waits_s: f64,
-    /// Least remaining endurance of a drone of the chain beyond its way home, s.
+    /// Least remaining endurance beyond the way home, s, of a drone when it left the chain.
     pub least_left_s: Option<f64>,
     /// Closest approach of two drones in the air since the start.
     pub nearest: Option<Encounter>,
@@ -131,7 +135,7 @@ pub struct Encounter {
 pub struct NearDrone {
     /// Number of the drone's relay.
     pub relay: usize,
-    /// Activity of the drone, departure state of its relay, and what holds its setpoint on each side.
+    /// Activity of the drone, departure state of its relay, and reasons why its setpoint is held.
     pub state: String,
     /// True position: x, y and altitude, m.
     pub at_m: Point,
@@ -139,29 +143,31 @@ pub struct NearDrone {
     pub goal_m: Point,
 }
 
-/// State of the pilots, and the record.
+/// State of the simulated drones and pilots, and the record of the run.
 #[derive(Debug)]
 pub(super) struct Rotation {
     pub(super) spec: RotationSpec,
     pub(super) drones: Vec<Battery>,
-    /// SIR of the worst hop of the drones that are meant to fly, at their best places.
+    /// Linear SIR of the worst hop if all drones that are meant to fly are at their best positions.
     pub(super) best: f64,
-    /// Time of the last step of the flight, and that of the next one. Other steps in the queue are ignored.
+    /// Time of the last step of the flight. The time of the next step is `next`; other queued steps are ignored.
     pub(super) at: Instant,
     pub(super) next: Instant,
     pub(super) pilots_at: Instant,
     pub(super) last_take_off: Instant,
-    /// Moving average of the time that a replacement takes, s.
+    /// Moving average of the time from a request to leave until the relay has left, s.
     pub(super) slot_s: f64,
-    /// Distance of drones that pilots keep, m.
+    /// Distance that pilots keep between two drones, m.
     pub(super) spacing_m: f64,
-    /// Time since which each drone is in the chain; `None` outside of it.
+    /// Time at which each drone joined the chain; `None` for a drone outside of the chain.
     pub(super) since: Vec<Option<Instant>>,
     pub(super) record: Rotated,
 }
 
 impl Rotation {
-    /// Returns the lowest tube that no drone uses at the side of take-offs, or of returns.
+    /// Returns the lowest free flight corridor ("tube").
+    ///
+    /// Returns have corridors of their own: `home` is true for them, and false for take-offs.
     pub(super) fn free_tube(&self, home: bool) -> usize {
         let is_used = |tube: usize| {
             self.drones.iter().any(|drone| match &drone.duty {
@@ -174,7 +180,9 @@ impl Rotation {
             .unwrap_or(0)
     }
 
-    /// Returns the way from the ground to the place `x_m` beside the line, above all lower tubes.
+    /// Returns the path from the ground through corridor `tube` to `x_m`, beside the line.
+    ///
+    /// Corridors with a higher number are higher above the line.
     pub(super) fn way_out(&self, x_m: f64, altitude_m: f64, tube: usize) -> VecDeque<Point> {
         let spacing_m = self.spacing_m;
         let (pad_m, above_m) = self.tube(altitude_m, tube);
@@ -189,7 +197,7 @@ impl Rotation {
         .into()
     }
 
-    /// Returns the way from the place `at` in the chain to the ground.
+    /// Returns the path from the position `at` in the chain to the ground, through corridor `tube`.
     pub(super) fn way_home(&self, at: Point, tube: usize) -> VecDeque<Point> {
         let spacing_m = self.spacing_m;
         let [x_m, _, altitude_m] = at;
@@ -211,7 +219,7 @@ impl Rotation {
         (-20.0 - step_m, altitude_m + step_m)
     }
 
-    /// Returns the time that the rest of `path` takes from the position `at`, s.
+    /// Returns the flight time, s, from the position `at` along all points of `path`.
     pub(super) fn time_s(mut at: Point, path: &VecDeque<Point>) -> f64 {
         let mut time_s = 0.0;
         for to in path {
@@ -226,7 +234,7 @@ impl Rotation {
         time_s
     }
 
-    /// Returns the time until drone `index` (from 0), at `at`, has to leave for home, s.
+    /// Returns the time, s, until drone `index` (from 0) at `at` has to fly home; negative if it is late.
     pub(super) fn left_s(&self, index: usize, at: Point) -> f64 {
         let Some(drone) = self.drones.get(index) else {
             return 0.0;
@@ -235,7 +243,9 @@ impl Rotation {
         drone.capacity_s - drone.used_s - home_s - RESERVE_S
     }
 
-    /// Records the share of the optimum at `now`, which held since the last step.
+    /// Records that the SIR was the fraction `share` of the optimum for the time `span` up to `now`.
+    ///
+    /// Does nothing before the chain was complete for the first time.
     pub(super) fn count(&mut self, now: Instant, span: Duration, share: f64) {
         let record = &mut self.record;
         if record.complete_at.is_none() {

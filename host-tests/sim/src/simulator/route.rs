@@ -104,10 +104,10 @@ impl Track {
         }
     }
 
-    /// Returns this record with other positions: relay 1 has the first of `places` in all its states.
+    /// Returns this record with other positions: relay 1 gets the first of `places`, relay 2 the second.
     ///
-    /// The other relays follow in order. Positions are x, y and altitude, m. States in which a relay has no position
-    /// keep none.
+    /// The further relays follow in order. Positions are x, y and altitude, m. A state in which a relay has no position
+    /// is not changed.
     #[must_use]
     pub fn moved_to(mut self, places: &[Point]) -> Self {
         let states = self
@@ -123,7 +123,7 @@ impl Track {
     }
 }
 
-/// Computation of the true SIR of every hop, from the interference that is really present.
+/// Computation of the true SIR of every hop, from the true interference.
 #[derive(Debug)]
 pub struct TrueHops {
     /// Relays and interferers at time 0, and the interferers' velocity along and beside the line, m/s.
@@ -258,7 +258,7 @@ impl Window {
     }
 }
 
-/// Hop of the route while nothing changes. Node 0 is Tx, and the node after the last relay is Rx.
+/// Hop of the route during one stage. Node 0 is Tx, and the node after the last relay is Rx.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Hop {
     /// Number of the node that sends over this hop.
@@ -397,7 +397,8 @@ impl Members {
 
     /// Returns each relay's number (from 0) and agreed position; `None` unless all have one target SIR.
     ///
-    /// Positions that relays take only to measure an unknown interferer have no target SIR, and do not count.
+    /// `None` also while relays are at positions that serve only to measure an unknown interferer: these have no target
+    /// SIR.
     fn agreed(&self) -> Option<Vec<(usize, Point)>> {
         let target = |state: &RelayState| state.observed.target.map(f32::to_bits);
         let (_, first) = self.relays.first().copied().flatten()?;

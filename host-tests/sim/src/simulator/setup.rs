@@ -90,13 +90,15 @@ pub struct Setup {
     pub boots: Vec<(u16, Instant)>,
     /// Relays that request to leave the chain: number from 1, time, and remaining endurance, s, if known.
     ///
-    /// They are switched off once they may leave.
+    /// A relay is switched off once it has permission to leave.
     pub leaves: Vec<(u16, Instant, Option<u16>)>,
     /// Relays that cancel their departure: number from 1 and time.
     pub stays: Vec<(u16, Instant)>,
     /// Reserve of endurance with which relays leave by themselves; `None` if they do not.
     pub reserve: Option<Duration>,
-    /// Values of a drone's endurance beyond the way home: number from 1, time, and seconds.
+    /// Values of a drone's remaining endurance beyond the way home, as given to its relay.
+    ///
+    /// Each has the relay's number from 1, the time, and the endurance, s.
     pub endurances: Vec<(u16, Instant, u16)>,
     /// Relays that wait outside of the chain from the start until the leader calls them, by number from 1.
     pub spares: Vec<u16>,
@@ -104,10 +106,10 @@ pub struct Setup {
     pub partitions: Vec<Partition>,
     /// True if relays sign frames, with a key drawn from the seed. The epoch counts the starts of a relay.
     pub auth: bool,
-    /// Uploads of missions during the run. Without `auth` none takes place, because uploads must be signed.
+    /// Uploads of missions during the run. Without `auth` no upload takes place, because uploads must be signed.
     pub uploads: Vec<UploadSpec>,
-    /// Ends of the chain whose ground stations request reports from the relays, each with its start. None without
-    /// `auth`, as for uploads.
+    /// Ends of the chain whose ground stations request reports from the relays, each with its start. Without `auth` no
+    /// station requests reports.
     pub watches: Vec<(Side, Instant)>,
     /// Numbers, from 1, of relays that lose an uploaded mission at a reboot.
     pub forgetful: Vec<u16>,

@@ -160,7 +160,7 @@ pub fn quantile_s(delays: &[Ps], fraction: f64) -> Option<f64> {
     delay.map(|delay| *delay as f64 / SECOND)
 }
 
-/// Simulates packets through the chain of a run from its first agreement on; `None` if there was none.
+/// Simulates packets through a chain from its first agreement on; `None` if the relays never agreed.
 ///
 /// `outcome` has the recorded states of `relays` relays. After a run that ends by itself, the traffic goes on in the
 /// final state: in each direction for 1000 packets, and 30 more for each hop.
@@ -394,7 +394,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Processes the packets that are created or arrive until `until`.
+    /// Processes all creations and arrivals of packets up to the time `until`.
     fn pass(&mut self, until: Ps) {
         loop {
             let end = self.ends.peek().map_or(Ps::MAX, |Reverse((at, ..))| *at);

@@ -295,7 +295,7 @@ pub(super) fn draw_axes(canvas: &mut Canvas, frame: &Frame, upright: &str) {
     canvas.upward((14.0, f64::midpoint(top, bottom)), "axis", upright);
 }
 
-/// Half of the width that lines are assumed to have, when labels must not touch them.
+/// Half of the width that is assumed for lines, so that labels do not touch them.
 const HALF_LINE: f64 = 1.6;
 
 #[derive(Clone, Copy)]
@@ -382,7 +382,7 @@ impl Labels {
         !self.taken.iter().any(|area| area.crossed(line))
     }
 
-    /// Marks the area as occupied if it is inside the plot and free; returns false if it is not.
+    /// Marks the area as occupied if it is inside the plot and free; otherwise returns false.
     pub(super) fn try_take(&mut self, area: Area) -> bool {
         let free = area.inside(&self.plot)
             && !self.taken.iter().any(|other| area.meets(other))
@@ -394,7 +394,8 @@ impl Labels {
     }
 }
 
-/// Estimates the width of a text in picture units, for the font size `size`. Rather too wide than too narrow.
+/// Estimates the width of a text in picture units, for the font size `size`. The estimate is rather too wide than too
+/// narrow.
 ///
 /// It takes the mean width of a character in a wide sans-serif font.
 pub(super) fn width(words: &str, size: f64) -> f64 {

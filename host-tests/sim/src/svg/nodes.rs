@@ -68,8 +68,8 @@ pub(super) fn cross(canvas: &mut Canvas, (x, y): Point, arm: f64) {
 
 /// Writes the numbers of the relays where there is free space.
 ///
-/// In a chain of at most twelve relays every relay gets a number. In a longer chain only every second, fifth, tenth
-/// and so on does, and each lost relay.
+/// In a chain of at most twelve relays every relay gets a number. In a longer chain only every second relay gets a
+/// number, in a still longer chain every fifth, and so on. Lost relays always get a number.
 pub(super) fn label(canvas: &mut Canvas, labels: &mut Labels, frame: &Frame, picture: &Picture) {
     let radius = radius(picture, frame);
     let step = round_step((picture.nodes.len() as f64 / 12.0).max(1.0));

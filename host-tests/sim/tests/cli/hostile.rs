@@ -106,7 +106,8 @@ fn the_larger_of_two_parts_goes_on_until_they_merge() {
     assert_eq!(healed["sir"], json("")["sir"]);
 }
 
-/// Checks that relay 1 of two, the leader, has a quorum alone if relay 2 fails, and relay 2 has none.
+/// Checks that the leader, relay 1 of two relays, keeps a quorum if relay 2 fails. If relay 1 fails, relay 2 has no
+/// quorum.
 #[test]
 fn too_few_relays_with_positions_give_status_1() {
     let output = chain("--json --uavs 2 --kill 1@20");

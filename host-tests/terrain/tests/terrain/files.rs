@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
-/// GeoTIFF that a test writes: north-west height, size of a cell, EPSG code and nodata value.
+/// GeoTIFF that a test writes: position of the north-west height, cell size, EPSG code, nodata value.
 pub(crate) struct Raster {
     pub(crate) corner: [f64; 2],
     pub(crate) cell: [f64; 2],
     pub(crate) size: [u32; 2],
     pub(crate) epsg: u16,
     pub(crate) nodata: Option<f32>,
-    /// True if the tie point is a height, false if it is the corner of a cell.
+    /// True if the file's tie point is the position of a height, false if it is the corner of a cell.
     pub(crate) is_point: bool,
     /// GDAL's metadata, XML.
     pub(crate) metadata: Option<&'static str>,

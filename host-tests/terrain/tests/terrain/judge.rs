@@ -102,7 +102,7 @@ fn first_term(d_km: f64, h1: f64, h2: f64, a_km: f64, path: &Path) -> f64 {
 
 /// Returns the diffraction loss of the smooth earth, dB.
 ///
-/// The place of the smallest clearance, where the antennas have the same elevation (as for a reflection), is found by bisection.
+/// A bisection finds the point of the smallest clearance. From there both antennas have the same elevation angle, as for a reflection.
 fn spherical(d_km: f64, h1: f64, h2: f64, path: &Path) -> f64 {
     let horizon = (2.0 * AE_KM / 1000.0).sqrt() * (h1.sqrt() + h2.sqrt());
     if d_km >= horizon {

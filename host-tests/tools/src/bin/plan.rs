@@ -183,7 +183,7 @@ fn planned_by(
     }
 }
 
-/// Returns the report of a data rate that no number of relays carries.
+/// Returns the report of a failed request: no number of relays carries the requested data rate.
 fn slower(rates: Option<RateReport>, options: &Options) -> PlanReport {
     let error = rates.as_ref().map(too_fast).unwrap_or_default();
     let why = Why::Plain(error);
@@ -250,7 +250,7 @@ fn plain(scenario: &Scenario, ask: &PlanRequest, radio: Option<&Radio>) -> Resul
     })
 }
 
-/// Plans a given number of relays with the terrain in the objective.
+/// Plans a given number of relays. The hops' SIRs include the diffraction losses of the terrain.
 fn above_terrain(
     scenario: &Scenario,
     ask: &PlanRequest,
@@ -282,7 +282,7 @@ fn above_terrain(
     })
 }
 
-/// Compares a plan over `terrain` with the plan that ignores it.
+/// Compares a plan over `terrain` with the plan that ignores the terrain.
 fn compared(
     scenario: &Scenario,
     ask: &PlanRequest,
@@ -345,8 +345,7 @@ fn companion(options: &Options) -> Result<Companion, Failure> {
     Ok(sections.companion)
 }
 
-/// Returns the terrain below `plan`, and the reason why the plan is refused above this terrain. Draws the terrain for
-/// `--profile`.
+/// Returns the terrain below `plan`, and the reason why the plan is refused; `None` if it is accepted. Draws the terrain for `--profile`.
 fn terrain(
     options: &Options,
     scenario: &Scenario,
@@ -375,7 +374,7 @@ fn terrain(
     Ok((Some(report), problem.or(missed)))
 }
 
-/// Returns the terrain below `plan`, and the reason why it cannot be flown above this terrain.
+/// Returns the terrain below `plan`, and the reason why the plan cannot be flown; `None` if it can.
 fn over(
     options: &Options,
     elevation: &Elevation,
@@ -597,7 +596,7 @@ enum Altitude {
 }
 
 impl Altitude {
-    /// Returns the method by which relays in flight choose such positions.
+    /// Returns the method by which relays in flight choose positions with these altitudes.
     const fn method(self) -> PlannedMethod {
         match self {
             Self::Given | Self::Terrain => PlannedMethod::Align,
@@ -707,9 +706,9 @@ fn joined(lines: [Option<String>; 2]) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("; "))
 }
 
-/// Computes the location of the interferer by relays with `[listen]`, and writes the maps.
+/// Computes how well relays with `[listen]` locate the interferer, and writes the maps.
 ///
-/// They are the files of `--area-svg`, `--area-geojson` and `--listen-svg`.
+/// The maps are the files of `--area-svg`, `--area-geojson` and `--listen-svg`. `None` without `[listen]`.
 fn over_area(
     options: &Options,
     scenario: &Scenario,
@@ -798,11 +797,11 @@ fn check_out(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
 
 /// Positions on which the relays of a plan agree in flight.
 struct InFlight {
-    /// Scenario with an altitude of each relay, if the altitudes were chosen for the terrain.
+    /// Scenario with the altitudes that were chosen for the terrain; `None` if none were chosen.
     own: Option<Scenario>,
     flown: Flown,
     flight: Option<Flight>,
-    /// Reason why the relays cannot fly to these positions.
+    /// Reason why the relays cannot fly to these positions; `None` if they can.
     problem: Option<String>,
 }
 
@@ -856,13 +855,13 @@ struct Flying {
     /// Text that tells the user the next command; empty without `--out`.
     next: String,
     flight: Option<Flight>,
-    /// Reason why the flight over the terrain was not simulated.
+    /// Reason why the flight over the terrain was not simulated; `None` if it was, or without terrain.
     unknown: Option<String>,
-    /// Reason why the relays cannot fly over the terrain.
+    /// Reason why the relays cannot fly over the terrain; `None` if none was found.
     problem: Option<String>,
 }
 
-/// Returns the flight of a plan over the terrain without `--out`; nothing without terrain.
+/// Simulates the flight of a plan over the terrain, for a request without `--out`. Empty without terrain.
 fn flying(
     options: &Options,
     scenario: &Scenario,

@@ -289,7 +289,7 @@ impl<'a> Asked<'a> {
         Ok(Some(flown))
     }
 
-    /// Simulates the flight over terrain and no-fly areas. Returns it if there is terrain, and the positions are known.
+    /// Simulates the flight over terrain and no-fly areas. `None` without terrain, or if the positions are not known.
     ///
     /// # Errors
     /// A hop that is blocked, a relay too low or too high, or elevation files that cannot be used.
@@ -336,7 +336,7 @@ impl<'a> Asked<'a> {
         Ok(Some(flight))
     }
 
-    /// Prints that terrain and no-fly areas of the scenario are not checked, and why.
+    /// Prints why terrain and no-fly areas of the scenario are not checked. Returns `None`: no flight is simulated.
     fn unchecked(&self, why: &str) -> Option<Simulated> {
         let has_terrain = self.scenario.terrain.is_some();
         for (what, is_there) in [
@@ -350,7 +350,7 @@ impl<'a> Asked<'a> {
         None
     }
 
-    /// Returns true if files for the whole flight are asked for.
+    /// Returns true with the option `--all` or `--bundle`.
     const fn is_whole(&self) -> bool {
         self.options.folder.all || self.options.folder.bundle.is_some()
     }
@@ -680,9 +680,9 @@ fn within(text: &str, least: f32, most: f32) -> Result<f32, String> {
         .ok_or_else(|| format!("must be a number within {least:?} to {most:?}"))
 }
 
-/// Tells the user which options override the scenario's section `network`.
+/// Prints which options override values of the scenario's section `network`.
 ///
-/// Users must not rely on a value of the file that is not used.
+/// Otherwise a user could rely on a value of the file that is not used.
 fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, name: &str) {
     let say = |option: &str, key: &str| {
         command::print_line(&format!(
@@ -715,11 +715,10 @@ fn overridden(options: &Options, section: &Network, key_file: Option<&Path>, nam
     }
 }
 
-/// Returns the method to provision. It comes from the command line or plan, else from the section; else it is
-/// `align`.
+/// Returns the method to provision: `method`, else that of the section `network`, else `align`.
 ///
-/// `of_file` is the method in section `network`. A plan made with another method is rejected; an option that
-/// overrides the section is reported.
+/// `method` is from the command line, or from the scenario's plan if `is_planned`. `of_file` is from the section. If the two differ, the
+/// plan's method is rejected; the command line's method is used, and the user is told.
 fn chosen_method(
     method: Option<Method>,
     of_file: Option<&str>,

@@ -49,7 +49,7 @@ struct RoundRow {
 
 /// Simulates at most `rounds` rounds of Algorithm 2, for `relays` relays that start at `altitude_m`.
 ///
-/// Each relay searches its best position by `local`. The interferer is at (500, 150) m.
+/// `local` is the search for a relay's best position. The interferer is at (500, 150) m.
 pub fn adjusted(
     relays: u16,
     altitude_m: f64,

@@ -82,9 +82,9 @@ fn row(y_m: f64, altitude_m: f64) -> Result<Row, FigureError> {
 
 /// Returns the best common altitude within 20 m to 300 m, m, and its SIR, linear.
 ///
-/// The interferer is at (500, `y_m`) m. Tries altitudes 5 m apart, then searches around the best altitude to 0.1 m.
-/// The second result counts only if its SIR is higher by more than twice the tolerance with which a chain's SIR is
-/// computed.
+/// The interferer is at (500, `y_m`) m. The search tries altitudes 5 m apart, then searches around the best of them to
+/// 0.1 m. It keeps the refined altitude only if the SIR is higher by more than twice the tolerance with which a chain's
+/// SIR is computed.
 pub fn best_common(relays: u16, y_m: f64) -> Result<(f64, f64), FigureError> {
     let sir = |altitude_m: f64| -> Result<f64, FigureError> {
         let mission = paper::mission(&paper::altitudes(y_m, altitude_m), relays)?;

@@ -18,7 +18,8 @@ pub const STEPS: u32 = 100;
 struct Row {
     alpha: f64,
     beta: f64,
-    /// Largest interference power `I_max` times Upsilon = E[1/I]. 1 / Upsilon is the effective power that relays use.
+    /// Product of Upsilon = E[1/I] and the largest interference power `I_max`. Relays use 1 / Upsilon as interference
+    /// power.
     upsilon_times_i_max: f64,
     /// Interference power I as a fraction of its maximum `I_max`, 0 to 1.
     interference_over_i_max: f64,

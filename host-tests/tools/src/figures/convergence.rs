@@ -25,8 +25,8 @@ struct Row {
     sir_linear: f64,
 }
 
-/// Returns table rows for the passes of messages of each chain, until it settles. Some passes are left out, because
-/// all are too many to draw.
+/// Returns table rows for the passes of messages of each chain, until the chain settles. Some passes are left out,
+/// because they are too many to draw.
 fn data(relays: &[u16]) -> Result<Vec<Row>, FigureError> {
     let chains: Result<Vec<Vec<Row>>, FigureError> =
         relays.par_iter().map(|&relays| sweeps(relays)).collect();

@@ -18,7 +18,7 @@ pub const PASSES: u64 = 6;
 /// Speeds of the moving interferer, m/s.
 pub const SPEEDS_MPS: [f64; 5] = [1.2, 3.0, 5.0, 7.0, 9.0];
 
-/// Table row: SIR of chains over the best possible SIR, after a number of agreements on positions.
+/// Table row: ratio of the SIR to the best possible SIR after a number of agreements on positions.
 ///
 /// The row summarises many random arrangements of the interferers.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -38,9 +38,9 @@ struct AgreementShare {
 struct Tracked {
     relays: u16,
     speed_mps: f64,
-    /// Mean ratio of the SIR to the best possible SIR of the moment, if the chain tracks the interferer.
+    /// Mean ratio of the SIR to the best possible SIR at the same time, if the chain tracks the interferer.
     followed_linear: f64,
-    /// Mean ratio of the SIR to the best possible SIR of the moment, if the chain does not move.
+    /// Mean ratio of the SIR to the best possible SIR at the same time, if the chain does not move.
     ///
     /// The chain keeps the positions that were best after the first minute.
     stayed_linear: f64,

@@ -175,11 +175,11 @@ struct GainRow {
     reading: Reading,
     /// Average gain over a random position, percent.
     ///
-    /// `None` if the random position's average is not above 0, as an average in dB may be.
+    /// `None` if the random position's average is 0 or negative: an average in dB can be negative.
     over_random_percent: Option<f64>,
     /// Average gain over the position that ignores the interference, percent.
     ///
-    /// `None` if that position's average is not above 0, as an average in dB may be.
+    /// `None` if that position's average is 0 or negative: an average in dB can be negative.
     over_blind_percent: Option<f64>,
     over_middle_percent: Option<f64>,
     /// Largest gain over a random position, percent, in linear SIR: the maximum over all altitudes.
@@ -275,10 +275,10 @@ fn read(rows: &[Row], reading: Reading) -> Option<GainRow> {
     })
 }
 
-/// Returns the larger difference of a row's two average gains from the printed gains.
+/// Returns the larger of the differences between a row's two average gains and the printed gains.
 ///
-/// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, else over the
-/// blind method.
+/// It is in percentage points. If `middle`, the second average is the gain over a relay in the middle, else the gain
+/// over the blind method.
 fn off(row: &GainRow, middle: bool) -> f64 {
     let other = if middle {
         row.over_middle_percent

@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-12;
 pub struct Chain {
     /// Positions (x, altitude) of the relays from Tx to Rx, m.
     ///
-    /// x is between 0 (Tx) and the distance to Rx. From each relay to the next, x rises by at least the least
+    /// x is between 0 (Tx) and the distance to Rx. From each relay to the next, x rises by at least the minimum
     /// separation, except for rounding (1e-12 of the separation).
     pub places: Vec<(f64, f64)>,
     /// SIR of the worst hop, linear, by [`Scene::hop_sirs`].
@@ -42,9 +42,9 @@ impl Chain {
 /// (`for_one_source_the_optimum_is_that_of_the_reference`, `brute_force_finds_the_same` in
 /// `host-tests/tests/multi_interferer`).
 ///
-/// If the minimum separation binds, the SIR is the best of the chains that keep it. Without one, relays may share a
-/// position when another hop is the bottleneck. `None` without relays or interferers, if altitudes differ, if the
-/// relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
+/// If the minimum separation binds, the SIR is the best of the chains that keep it. Without a minimum separation,
+/// relays may share a position when another hop is the bottleneck. `None` without relays or interferers, if altitudes
+/// differ, if the relays do not fit on the line, and if no chain has an SIR above zero (an interferer at Rx).
 ///
 /// Work: about 50 targets, twice with a minimum separation. For each target: some thousand points of the line per
 /// change of power along the chain, and a few intervals per relay.
@@ -55,7 +55,7 @@ pub fn optimum(scene: &Scene) -> Option<Chain> {
     alike.then(|| at_altitude(scene, altitude_m)).flatten()
 }
 
-/// Returns the best chain with all relays at `altitude_m` (> 0), whatever their altitudes in `scene`.
+/// Returns the best chain with all relays at `altitude_m` (> 0). The altitudes in `scene` are ignored.
 pub(super) fn at_altitude(scene: &Scene, altitude_m: f64) -> Option<Chain> {
     let line = Line::new(scene, altitude_m);
     let apart = scene.min_separation_m * (1.0 - ROUNDING);
@@ -229,7 +229,7 @@ pub(super) fn golden(
 struct Step {
     from: Span,
     to: Span,
-    /// Largest x of a receiver that a sender at the smallest x reaches, within `to`, m.
+    /// x of the receiver, m, that meets the target with the sender at the smallest x of `from`.
     farthest: f64,
 }
 
@@ -238,7 +238,7 @@ struct Stage {
     steps: Vec<Step>,
 }
 
-/// Intervals of x in which each relay may be, so that all hops from it on to Rx meet one target SIR.
+/// Intervals of x in which each relay may be, so that all hops from there to Rx meet one target SIR.
 ///
 /// They are computed from Rx to Tx. The hop from Tx to the first relay is not checked.
 pub(super) struct Stages<'a> {
@@ -344,10 +344,10 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Returns the feasible hops from a relay to the next one, whose x is in one of the intervals `spans`.
+/// Returns the feasible hops from a relay to the next relay, which must be in an interval of `spans`.
 ///
-/// Each hop meets the target SIR with the sender's power, for which `reach` is computed, and is at least `apart`
-/// metres long. The search calls this for each relay, from the last relay but one back to the first relay.
+/// Each hop meets the target SIR with the sender's power, for which `reach` is computed, and is at least `apart` metres
+/// long. The search calls this for each relay, from the last relay but one back to the first relay.
 fn steps(line: &Line, reach: &Reach, spans: &[Span], apart: f64) -> Vec<Step> {
     let receivers = common(spans, &reach.hearing);
     receivers
@@ -508,7 +508,7 @@ impl<'a> Line<'a> {
         }))
     }
 
-    /// Returns the intervals of x in which a receiver can be at least `apart` metres from its sender.
+    /// Returns the intervals of x in which a receiver meets the target at `apart` metres from its sender.
     pub(super) fn hearing(&self, stride: Stride, apart: f64) -> Vec<Span> {
         let level = apart / stride.0;
         let turns = crossings(&self.nodes, &self.quiet, level, |x| {
@@ -609,7 +609,7 @@ mod tests {
     }
 }
 
-/// Largest number of bisection steps; fewer reduce any f64 interval in metres to adjacent numbers.
+/// Largest number of bisection steps. After fewer steps any f64 interval in metres has shrunk to two adjacent numbers.
 const HALVINGS: u32 = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -621,8 +621,8 @@ pub(super) struct Crossing {
 
 /// Returns the points, in rising order, at which the function `exact` crosses `level`.
 ///
-/// `values` are the values of the function at the rising `nodes`. Two crossings between neighbouring nodes are
-/// missed. The cost is about 60 evaluations for each crossing.
+/// `nodes` are arguments in rising order, `values` the function's values there. Two crossings between neighbouring
+/// nodes are missed. The cost is about 60 evaluations for each crossing.
 pub(super) fn crossings(
     nodes: &[f64],
     values: &[f64],

@@ -53,9 +53,10 @@ struct Turn<'a> {
 /// Improves the chain `start` by moving one relay at a time within the limits `room`.
 ///
 /// The result is never worse than `start`. Order and minimum separation are kept if the start has them; a relay with a
-/// fixed altitude moves along x and sideways only. At most 200 rounds, fewer when three in a row gain less than a
-/// millionth each. A round is 2 N moves, a move about 50 SIRs at one altitude, 2 400 in a band and as many again with
-/// lateral room. `None` unless the start has one position per relay and at least one relay.
+/// fixed altitude moves along x and sideways only. The search ends after 200 rounds, or after three rounds in a row
+/// that each gain less than a millionth. A round is 2 N moves. A move computes about 50 SIRs at one altitude, 2 400 in
+/// a band of altitudes, and as many again with lateral room. `None` unless the start has one position per relay and at
+/// least one relay.
 pub fn polish(
     scene: &Scene,
     start: &[impl Copy + Into<Place>],
@@ -129,8 +130,8 @@ impl Turn<'_> {
 
     /// Returns the best position found for the relay, and the SIR of its worse hop.
     ///
-    /// The search first tries other altitudes, and then other lateral positions, than the position `own` has. The SIR
-    /// is 0 if no position is allowed.
+    /// From the position `own`, the search first changes the altitude, and then the lateral position. The SIR is 0 if
+    /// no position is allowed.
     fn best(&self, own: Place, room: Corridor, window: f64) -> (Place, f64) {
         let start = if self.relay.holds {
             own.h

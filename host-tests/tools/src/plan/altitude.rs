@@ -20,8 +20,8 @@ type Chain = Solver<MOST, { MOST / 10 }>;
 
 /// Returns the plan of the joint method, which chooses x, lateral position and altitude of each relay.
 ///
-/// With fitted slots the positions have the largest data rate. If the method finds no positions, the relays keep the
-/// altitudes that the scenario gives them.
+/// With fitted slots (as long as each hop needs) the positions have the largest data rate. If the method finds no
+/// positions, the relays keep the altitudes that the scenario gives them.
 ///
 /// # Errors
 /// [`NoPlan`] if the scenario is not a valid mission, or for fitted slots with a table of rate steps.

@@ -32,22 +32,22 @@ const MOST_SEARCHED: u16 = 50;
 /// Quantile that is reported if no other quantile is requested.
 pub const QUANTILE: f64 = 0.95;
 
-/// Numbers of draws of the interferers with which a quantile is optimised, and reported.
+/// Numbers of draws of the interferers: first to optimise a quantile, second to compute its result.
 const DRAWS: [usize; 2] = [400, 4000];
 
 /// Seed of the draws, so that equal scenarios have equal plans.
 const SEED: u64 = 36;
 
-/// Largest number of rounds in which the decisive draws of the interferers are chosen again.
+/// Largest number of rounds of the search for a quantile. Each round leaves out the draws with the lowest SIRs.
 const ROUNDS: u32 = 8;
 
-/// Factor on the SIR of a hop whose way crosses a no-fly area: other chains come first.
+/// Factor for the SIR of a hop that crosses a no-fly area. It ranks such chains behind all others.
 const CROSSING: f64 = 1e-30;
 
 /// Tolerance for rounding, m: depth in a no-fly area, or length of a path in it, that does not count.
 const ROUNDING_M: f64 = 0.01;
 
-/// Number of x, y and altitudes of the first grid, where they are free.
+/// Numbers of x, y and altitudes of the first grid. A coordinate that a relay may not choose has one value.
 const GRID: [u32; 3] = [40, 7, 5];
 
 /// Largest number of search windows around the relays, and factor on the width of a window. The factor applies to a
@@ -238,9 +238,9 @@ fn places_of(plan: &Plan) -> Vec<Place> {
 /// Position x, y and altitude, m.
 type Point = [f64; 3];
 
-/// Returns the ways of two neighbours that close the gap between their positions.
+/// Returns the paths of two neighbours: each flies to the other's position to close a gap in the chain.
 ///
-/// A relay flies straight to its new position. One that `keeps` its altitude, as with Algorithm 1, flies level.
+/// A relay flies straight to its new position. A relay that `keeps` its altitude, as with Algorithm 1, flies level.
 pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
     let at = |place: Point, altitude_m: f64| [place[0], place[1], altitude_m];
     [
@@ -300,7 +300,7 @@ pub fn problem(
     (!lines.is_empty()).then(|| lines.join("; "))
 }
 
-/// Returns true if relay `index` flies at one altitude.
+/// Returns true if relay `index` keeps its altitude in flight.
 fn keeps(scenario: &Scenario, index: u16, is_free: bool) -> bool {
     let own = scenario.relays.get(&index);
     !is_free || own.is_some_and(|own| own.altitude_m.is_some())
@@ -444,7 +444,7 @@ impl<'a> Search<'a> {
         there.min(rx_w / (factor * squared) / from.disturbance_w / scene.reverse)
     }
 
-    /// Returns the factor on the SIR of a hop between two relays for the no-fly areas on the way.
+    /// Returns the factor for a hop's SIR: [`CROSSING`] if its relays' paths cross a no-fly area, else 1.
     fn preference(&self, node: usize, from: Spot, to: Spot) -> f64 {
         let is_inner = node > 1 && node <= self.scene.relays.len() && !self.allow_crossing;
         let keeps = |relay: usize| {
@@ -465,7 +465,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns the chain with the best worst hop, if relay k is at a spot of `grids[k - 1]`, and that SIR.
+    /// Returns the chain with the best worst hop, and this hop's SIR. Relay k is at a spot of `grids[k - 1]`.
     fn best_on(&self, grids: &[Vec<Spot>]) -> Option<(Vec<Spot>, f64)> {
         // For each spot of a relay: the worst hop up to it, and the spot of the relay before it. The best ones are first.
         let mut layers: Vec<Vec<(f64, Spot, usize)>> = Vec::new();
@@ -669,7 +669,7 @@ impl<'a> Search<'a> {
 
 /// Draws of the positions and powers of all interferers.
 ///
-/// A position has the same probability everywhere in its area, a power at each level in decibels.
+/// A position is uniformly distributed over its area, and a power is uniformly distributed in decibels.
 #[derive(Debug)]
 pub struct Draws {
     scene: Scene,

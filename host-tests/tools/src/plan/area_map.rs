@@ -28,7 +28,7 @@ const COLOURS: [[f64; 3]; 5] = [
 /// Number of steps of the legend.
 const STEPS: u32 = 5;
 
-/// Quantity of a map.
+/// Quantity that a map shows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Shown {
     /// SIR of the worst hop.
@@ -54,7 +54,7 @@ impl Shown {
     }
 }
 
-/// Largest error of a map, m.
+/// Largest error that a map distinguishes, m. Larger errors have the same colour.
 const MOST_M: f64 = 1e5;
 
 /// Returns the picture of `cells` from above: x points to the right, y (right of the line) down.

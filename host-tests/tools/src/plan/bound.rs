@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use uav_relay_scenario::scene::{Relay, Scene};
 
-/// Number of equal cells along the line Tx-Rx in which a relay may be at first.
+/// Number of equal cells along the line Tx-Rx with which the proof begins. A relay may be in any of them.
 const FIRST: usize = 256;
 
 /// Number of equal parts into which a cell is divided.

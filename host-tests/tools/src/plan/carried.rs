@@ -27,8 +27,8 @@ use super::{NoPlan, Plan, PlanRequest, ProfiledMission, source, steps};
 
 /// Largest excess of time per bit, relative, for which a number of relays gets a precise search.
 ///
-/// The time per bit is for the best positions on a coarse grid. The excess is the difference to the number of relays
-/// with the least time per bit. A precise search for positions cannot make up for a larger excess.
+/// The times per bit are those of the best positions on a coarse grid. The excess is relative to the smallest time of
+/// all numbers of relays. A precise search for positions cannot make up for a larger excess.
 const WORTH: f64 = 0.05;
 
 /// Number of bisection steps that find the largest data rate.
@@ -84,8 +84,8 @@ impl<'a> Carried<'a> {
 
     /// Returns the largest number of relays for which a precise search for positions is worthwhile.
     ///
-    /// Such a search is used for time slots as long as each hop needs. With more relays, one bit needs over 5 % more
-    /// time on the coarse grid than with the best number, which a precise search cannot make up for.
+    /// A precise search is used for time slots as long as each hop needs. With more relays, one bit on the coarse grid
+    /// takes over 5 % more time than with the best number of relays. A precise search cannot make up for this.
     pub fn most_worth(&self) -> u16 {
         self.table().map_or(0, |table| table.largest_within(WORTH))
     }

@@ -19,16 +19,16 @@ pub struct Flown {
     pub plan: Plan,
     /// Best SIR of the worst hop, linear, that the planner finds for this number of relays.
     pub best_sir: f64,
-    /// Data rate at the relays' positions, and the best rate found. Both divided by the bandwidth, bit/s/Hz. Only for
-    /// fitted slots (as long as each hop needs): the rate then counts instead of the SIR.
+    /// Data rate at the relays' positions, and the best rate found, both per bandwidth, bit/s/Hz. `None` unless the
+    /// slots are fitted (as long as each hop needs): then these rates decide, not the SIRs.
     pub rates: Option<[f64; 2]>,
     /// True if the relays use one hypothetical interferer instead of the scenario's interferers.
     pub stand_in: bool,
 }
 
 impl Flown {
-    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots it is a fraction
-    /// of the best data rate.
+    /// Returns the loss by the relays' positions, as a fraction of the best SIR. With fitted slots (as long as each hop
+    /// needs) it is a fraction of the best data rate.
     pub fn loss(&self) -> f64 {
         let [own, best] = self.rates.unwrap_or([self.plan.sir(), self.best_sir]);
         (1.0 - own / best).max(0.0)

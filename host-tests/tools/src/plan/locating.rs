@@ -30,7 +30,7 @@ const SIMULATED: usize = 5;
 /// SIR of a chain that has located the interferer well, as a fraction of the best SIR: 1 dB less.
 const SHARE: f64 = 0.794;
 
-/// Longest time of a simulated search, s, besides the time that a drone flies from Tx to Rx at 10 m/s.
+/// Longest time of a simulated search, s, in addition to the time of a flight from Tx to Rx at 10 m/s.
 const SEARCH_S: f64 = 180.0;
 
 /// Simulated search for the interferer at one position.
@@ -56,12 +56,12 @@ pub struct Search {
     pub error_m: Option<f64>,
 }
 
-/// Report of the places of an area from which relays can locate the interferer.
+/// Report of the part of an area in which relays can locate the interferer.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Locating {
-    /// Fraction of the area, 0 to 1, from which the relays locate the interferer.
+    /// Fraction of the area, 0 to 1, in which the relays can locate the interferer.
     ///
-    /// The error is then at most a tenth of its distance from the line.
+    /// The error is then at most a tenth of the interferer's distance from the line.
     pub located: f64,
     /// Median over the area of the standard deviation of the location, m; absent if it is infinite.
     #[serde(skip_serializing_if = "Option::is_none")]

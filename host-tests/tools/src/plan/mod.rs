@@ -145,9 +145,10 @@ pub struct Fitted {
     /// against all interferers.
     pub kept: bool,
     /// Loss by the positions for the hypothetical interferer, as a fraction of the plan's SIR, 0 to 1. It is a loss of
-    /// data rate if the relays fit their slots. `None` if no such positions were found.
+    /// data rate if each time slot is as long as its hop needs. `None` if no such positions were found.
     pub loss: Option<f64>,
-    /// True if the relays fit their slots, so that the data rate decides which positions are better.
+    /// True if the data rate decides which positions are better, because the time slots are fitted. A fitted slot is as
+    /// long as its hop needs.
     pub by_rate: bool,
 }
 
@@ -278,7 +279,8 @@ impl Plan {
     }
 }
 
-/// Returns the data link of relays that fit their slots, with a bandwidth of 1 Hz; else `None`.
+/// Returns the data link, with a bandwidth of 1 Hz, if the relays maximise the data rate. Their time slots are then
+/// fitted: as long as each hop needs. `None` if the relays maximise the SIR.
 fn fitted_radio(scenario: &Scenario, free_altitude: bool) -> Option<Radio> {
     let fits = free_altitude && scenario.has_fitted_slots();
     let link = scenario.link.clone().filter(|_| fits)?;
@@ -348,7 +350,7 @@ fn fewest_of<T>(
     Ok(found)
 }
 
-/// Largest number of relays that the planner tries when it looks for the number.
+/// Largest number of relays that the planner tries when it searches the fewest relays for a target.
 const MOST_RELAYS: u16 = Mission::MAX_RELAYS;
 
 /// Mission with the relays' own profiles (power, altitude), and the indices of fixed-altitude relays.

@@ -30,13 +30,13 @@ pub const MOST_RELAYS: u16 = 50;
 /// Number of altitudes of the first grid at each x.
 const LEVELS: u32 = 12;
 
-/// Largest number of points of a hop's profile during the search, relative to the whole line.
+/// Largest number of terrain points along the whole line during the search. A hop has its share of them.
 const POINTS: f64 = 800.0;
 
 /// Largest number of points of a profile at the end of the search, as in reports.
 pub(super) const FINE_POINTS: f64 = 20_000.0;
 
-/// Width of a column of the grid above which the highest ground in the column is a column, too, m.
+/// Smallest width of a grid's columns, m, with which the highest ground of each column is tried, too.
 const WIDE_M: f64 = 100.0;
 
 /// Number of finer grids, each with cells half as large.
@@ -52,7 +52,7 @@ const AROUND: i32 = 2;
 /// Comparison of the positions for the terrain with the positions that ignore the terrain.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OverTerrain {
-    /// SIR of the worst hop with terrain, dB, at the positions that ignore it. Absent without such positions.
+    /// SIR of the worst hop with terrain, dB, at the positions that ignore the terrain. Absent without such positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blind_sir_db: Option<f64>,
     /// Gain of the plan compared with the positions that ignore the terrain, dB.
@@ -80,7 +80,7 @@ impl fmt::Display for OverTerrain {
     }
 }
 
-/// Position that a relay may have: x, altitude above the datum, and height above the sea, m.
+/// Position that a relay may have: x, altitude above the line Tx-Rx, and height above the sea, m.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Candidate {
     /// Distance from Tx, m.
@@ -99,10 +99,10 @@ pub struct Search<'a> {
     /// Heights of the ground along the line, at equal steps.
     line: Vec<f64>,
     step_m: f64,
-    /// Least and greatest height above the ground, and the position error, m.
+    /// Least and greatest permitted height of a relay above the ground, m.
     clearance_m: [f64; 2],
     position_error_m: f64,
-    /// True if the altitudes are limited by the scenario's band, too.
+    /// True if the scenario's band of altitudes limits the altitudes in addition to `clearance_m`.
     is_banded: bool,
     losses: HashMap<[[u64; 2]; 2], f64>,
     no_fly: Vec<NoFly>,
@@ -111,7 +111,7 @@ pub struct Search<'a> {
 impl<'a> Search<'a> {
     /// Creates a search above the line of the scenario, with at most 800 points of a profile.
     ///
-    /// On a longer line each point has the height of the highest ground near it.
+    /// If the line has more terrain cells, each point has the height of the highest ground near it.
     ///
     /// # Errors
     /// A line that names the position: the elevation files do not cover it, or have no height there.
@@ -171,7 +171,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Returns the error of a search without positions: the limits with their keys, the lowest ground.
+    /// Returns the error message for a search without positions. It contains the permitted heights with the scenario keys that set them,
+    /// and the lowest ground.
     fn nowhere(&self, scenario: &Scenario) -> String {
         let [least_m, most_m] = self.clearance_m;
         let relays = self.scene.relays.len();
@@ -316,9 +317,9 @@ impl<'a> Search<'a> {
         Ok(factor * self.worst_sir(chain))
     }
 
-    /// Returns the candidates on the highest ground of each of `columns` columns, if these are wide.
+    /// Returns the candidates on the highest ground of each of `columns` columns; none in narrow columns.
     ///
-    /// A hilltop between two columns of the grid is then a position, too.
+    /// A hilltop between two columns of the grid is then a position, too. Columns are narrow below [`WIDE_M`].
     fn crests(&self, relay: usize, columns: u32, levels: u32) -> Result<Vec<Candidate>, String> {
         let wide_m = self.scene.distance_m / f64::from(columns + 1);
         if wide_m < WIDE_M {
@@ -537,7 +538,7 @@ impl<'a> Search<'a> {
         Some((chain, sir))
     }
 
-    /// Returns the largest worst-hop SIR of the chains that end at `to`, and the index of the place before.
+    /// Returns the largest worst-hop SIR of the chains from Tx to `to`, and its place before `to`. The place is an index in `before`.
     fn reached(
         &mut self,
         node: usize,

@@ -76,7 +76,7 @@ impl Rate {
         Some([there, plan.sirs_back(scenario)])
     }
 
-    /// Returns the fitted time slots of the hops in `plan`; empty without them, or without data.
+    /// Returns the time slot of each hop in `plan`. Empty without data, or if slots are not as long as each hop needs.
     pub fn hop_slots(plan: &Plan, scenario: &Scenario, radio: &Radio) -> Vec<HopSlots> {
         if radio.link.access != Access::Fitted {
             return Vec::new();

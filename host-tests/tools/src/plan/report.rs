@@ -41,11 +41,11 @@ pub struct HypotheticalReport {
     /// the same. With fitted slots the value is the lost data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<f64>,
-    /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer. It is the
-    /// gain in data rate if the relays fit their slots.
+    /// Relative gain of the plan in SIR, in comparison with the positions for the hypothetical interferer. With fitted
+    /// slots (as long as each hop needs) it is the gain in data rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
-    /// True if the data rate decides which positions are better: the relays fit their slots.
+    /// True if the data rate decides which positions are better: the slots are as long as each hop needs.
     #[serde(skip)]
     by_rate: bool,
 }
@@ -381,7 +381,7 @@ pub struct PlanReport {
     /// SIRs over the areas of the interferers; absent if none has an area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub area: Option<AreaReport>,
-    /// Location of the interferer in its area by relays with `[listen]`; absent without.
+    /// Location of the interferer in its area by relays with `[listen]`; absent without `[listen]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub locating: Option<Locating>,
     /// True if relays may leave the line sideways: the table then has a column for y.

@@ -258,7 +258,7 @@ pub(super) fn enough(
     Err(NoPlan::Unmet(why, Some(best)))
 }
 
-/// Returns the profiles of all relays that the scenario lists, whatever their number.
+/// Returns the index and profile of every relay that the scenario lists, even beyond the plan.
 fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
     let common = mission.config().common;
     scenario

@@ -319,9 +319,9 @@ impl Search<'_> {
         }
     }
 
-    /// Returns those of `labels` (first hops of chains) that may lead to the best chain. A label is left out if
-    /// another label ends farther from Tx, takes no more time, and can receive from a next node at as large an x in
-    /// the return direction.
+    /// Returns those of `labels` (first hops of chains) that can lead to the best chain. A label is left out if another
+    /// label ends farther from Tx, takes no more time, and receives a next node at the same x or farther away in the
+    /// return direction.
     fn undominated(&self, mut labels: Vec<Label>, backward: &Backward) -> Vec<Label> {
         let share = SAME * self.below / (self.times.relays() + 1) as f64;
         let order = |label: &Label| (label.time / share).floor();
@@ -358,8 +358,8 @@ struct Backward {
     ///
     /// The x is at most the x of Rx.
     farthest: Vec<Vec<f64>>,
-    /// x of the grid points, m, at which a relay may be better than at some grid point farther from Tx. The reason is
-    /// the return direction: there, the relay can receive from a next node at a larger x.
+    /// x of the grid points, m, that can be better than some grid point with a larger x. In the return direction, a
+    /// useful point receives a next node that is farther from Tx.
     useful: Vec<f64>,
 }
 
@@ -402,8 +402,8 @@ impl Backward {
         reach(&self.hop, sinr, point).map_or(f64::NEG_INFINITY, |reach| (point.x + reach).min(end))
     }
 
-    /// Returns the smallest x, m, from which up to `point` no position is better than `point`. A position is better
-    /// if it receives the next relay's signal from farther away, at some rate step of the way back.
+    /// Returns the smallest x, m, such that no position between this x and `point` is better than `point`. A position
+    /// is better if it receives the next relay's signal from farther away, at some rate step of the way back.
     fn dominated_from(&self, search: &Search<'_>, point: Point) -> f64 {
         let below = search.grid.partition_point(|x| *x < point.x);
         let slight = SLIGHT * search.times.scene.distance_m;

@@ -67,7 +67,7 @@ impl Elevation {
 
     /// Returns the scene of `relays` relays, whose interferers stand on the ground.
     ///
-    /// `None` in a random field. An interferer that the files do not cover is at altitude 0.
+    /// `None` in a field of interference. An interferer that the files do not cover is at altitude 0.
     ///
     /// # Errors
     /// Those of [`ground`](Self::ground).
@@ -83,7 +83,7 @@ impl Elevation {
         }))
     }
 
-    /// Returns the altitudes of the interferers.
+    /// Returns the lowest and highest altitude of each interferer; none if the interference is a field.
     fn interferers(&self, scenario: &Scenario) -> Result<Vec<InterfererHeight>, String> {
         let Interference::Sources(sources) = &scenario.interference else {
             return Ok(Vec::new());
@@ -167,7 +167,7 @@ impl Elevation {
 /// Largest number of samples along one side of an area.
 const SAMPLES: f64 = 200.0;
 
-/// Returns points of an area and its boundary at most `step_m` apart, or at a 200th of its sides.
+/// Returns points of an area and its boundary, spaced at most `step_m` or a 200th of the area's side.
 fn sampled(area: &Area, step_m: f64) -> Vec<[f64; 2]> {
     let [low, high] = area.bounds();
     #[expect(

@@ -27,19 +27,19 @@ use super::{NoPlan, Plan, ProfiledMission, source};
 /// Number of altitudes of a relay that are tried between the lowest and the highest altitude.
 const LEVELS: u32 = 40;
 
-/// Largest number of searches, each at the x of the search before.
+/// Largest number of searches for altitudes. Each search keeps the x that the relays choose with the last altitudes.
 const ROUNDS: u32 = 6;
 
-/// First and last step of the altitude of a single relay, m.
+/// First and last step, m, by which the search changes the altitude of one relay.
 const STEPS_M: [f64; 2] = [16.0, 0.5];
 
-/// Largest relative loss of SIR for higher altitudes: 0.01 dB.
+/// Largest relative loss of SIR that is accepted for higher, safer altitudes: 0.01 dB.
 const SLACK: f64 = 0.0023;
 
-/// Least relative gain of a step.
+/// Least relative gain in SIR for which the search accepts other altitudes.
 const GAIN: f64 = 1e-4;
 
-/// Explanation of the rooms for the user.
+/// Text for the user: the meaning of a relay's room, the interval of x in which it may move.
 pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, and no clear hop becomes grazing (ground in the first Fresnel zone); none: a drift by the position error is too much";
 
 /// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
@@ -160,7 +160,7 @@ pub fn with_altitudes(
     Ok(best.scenario)
 }
 
-/// Position of a relay in flight, and its room.
+/// Position of a relay in flight, and its room: the interval of x in which it may move.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct FlownRelay {
     /// Number of the relay; 1 is next to Tx.
@@ -169,22 +169,22 @@ pub struct FlownRelay {
     pub x_m: f32,
     /// Altitude of its position above the line between the sites, m.
     pub altitude_m: f32,
-    /// Interval of x, m, in which no hop gets worse while its neighbours are in their intervals.
+    /// Interval of x, m, in which no hop gets worse while this relay's neighbours are in their intervals.
     ///
     /// Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub room_m: Option<[f64; 2]>,
 }
 
-/// Terrain below the chain after the loss of one relay, when the others have closed the gap.
+/// Terrain below the chain after the loss of one relay, when the other relays have closed the gap.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Without {
     /// Number of the lost relay.
     pub lost: u16,
-    /// SIR of the worst hop with terrain, dB; absent if the others find no positions.
+    /// SIR of the worst hop with terrain, dB; absent if the other relays find no positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub terrain_sir_db: Option<f64>,
-    /// Blocked hops, relays and ways too low or in a no-fly area; absent if there are none.
+    /// Problems in this chain: blocked hops; relays or paths that are too low or in a no-fly area. Absent if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
 }
@@ -194,10 +194,10 @@ pub struct Without {
 pub struct Flight {
     /// SIR of the worst hop with terrain at these positions, dB.
     pub terrain_sir_db: f64,
-    /// Gain of the plan over these positions, dB; absent if the plan has these positions.
+    /// Gain of the plan for the terrain over these positions, dB; absent if the plan has these positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
-    /// Largest distance of a relay from its position in that plan, m.
+    /// Largest distance of a relay from its position in the plan for the terrain, m. Absent if the plan has these positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub off_m: Option<f64>,
     /// Positions of the relays.
@@ -207,7 +207,7 @@ pub struct Flight {
     position_error_m: f64,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
-    /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high.
+    /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high. `None` if they can.
     #[serde(skip)]
     pub problem: Option<String>,
 }
@@ -265,7 +265,7 @@ impl Flight {
         })
     }
 
-    /// Adds the difference from a `plan` with other positions, and `terrain_sir_db` with terrain.
+    /// Adds the differences from `plan`. `terrain_sir_db` is the SIR of its worst hop with terrain.
     #[must_use]
     pub fn compared(self, plan: &Plan, terrain_sir_db: f64) -> Self {
         let apart = plan.places.iter().zip(&self.relays).map(|((from, _), to)| {
@@ -285,7 +285,7 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns the lines about relays without a room, and about the loss of one relay that name a problem.
+    /// Returns the warnings: relays without a room, and problems of the chain after the loss of one relay.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let error_m = self.position_error_m;
         let confined = self.relays.iter().filter(|relay| relay.room_m.is_none());
@@ -386,7 +386,7 @@ fn settled(
     Ok(ProfiledMission::new(scenario, relays, tolerance)?.plan(places, "", false))
 }
 
-/// Positions of the others after the loss of one relay, in a simulated flight.
+/// Positions of the other relays after the loss of one relay, in a simulated flight.
 struct Loss {
     lost: u16,
     /// Numbers of the other relays.
@@ -435,7 +435,7 @@ fn losses(
 /// Reason for the user why nothing is known after the loss of a relay.
 const NOWHERE: &str = "the other relays find no positions";
 
-/// Returns a warning for each relay whose loss leads another one into a no-fly area.
+/// Returns a warning for each relay whose loss leads another relay into a no-fly area.
 ///
 /// The flight is simulated without terrain. There are no warnings without no-fly areas.
 ///
@@ -467,14 +467,14 @@ pub fn no_fly_warnings(
 }
 
 impl Loss {
-    /// Returns the positions of the others in a chain at `places`.
+    /// Returns the positions of the other relays before the loss. `places` are the positions of all relays.
     fn before(&self, places: &[Placement]) -> Vec<Placement> {
         let left = (1..).zip(places).filter(|(index, _)| *index != self.lost);
         left.map(|(_, place)| *place).collect()
     }
 }
 
-/// Returns terrain and no-fly areas below the others, after a loss in a chain at `places`.
+/// Checks terrain and no-fly areas below the other relays after a loss. `places` are all positions before the loss.
 fn without(
     scenario: &Scenario,
     elevation: &Elevation,
@@ -527,9 +527,9 @@ fn without(
     })
 }
 
-/// Returns x and height above the ground, m, at the lowest point of a straight way.
+/// Returns the x and the height above the ground, m, of the lowest point of a straight path.
 ///
-/// `None` if the ends are the same.
+/// The lowest point is the point closest to the ground. `None` if the ends are the same.
 fn lowest(ground: &Ground<'_>, from: Placement, to: Placement) -> Result<Option<[f64; 2]>, String> {
     let [start, end] = [ground.relay(from)?, ground.relay(to)?];
     if start == end {

@@ -151,10 +151,10 @@ impl Flight {
         Self { method, ..self }
     }
 
-    /// Sets the slots of the relays as `scenario` describes them, if their method is the joint method.
+    /// Sets the time slots of the relays as `scenario` describes them, if their method is the joint method.
     ///
     /// # Errors
-    /// [`BlockError::Refused`] if the relays cannot fit their slots.
+    /// [`BlockError::Refused`] if the relays cannot use slots that are as long as each hop needs.
     pub fn with_access(self, scenario: &Scenario) -> Result<Self, BlockError> {
         if self.method != Method::Joint {
             return Ok(self);

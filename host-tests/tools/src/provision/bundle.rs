@@ -21,7 +21,7 @@ const LINK: &str = "uav-relay-";
 
 const RELAY_UNIT: &str = include_str!("../../../../examples/linux_companion/uav-relay@.service");
 
-/// Folders in which the units may write.
+/// Folders in which the systemd units of relay and ground station may write.
 const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
 
 /// Largest MAVLink system number of a drone; ground stations have the next numbers.
@@ -40,9 +40,9 @@ const FLOAT: u8 = 9;
 /// Flight for which a bundle is made.
 #[derive(Debug)]
 pub struct Bundle<'a> {
-    /// Scenario file, with its plan if the positions are known.
+    /// Text of the scenario file, with a plan if the positions of the relays are known.
     pub text: String,
-    /// Sections of the scenario file for the programs.
+    /// Sections of the scenario file that set up the programs on the computers.
     pub deployment: &'a Deployment,
     /// Number of relays.
     pub uavs: u16,
@@ -56,13 +56,13 @@ pub struct Bundle<'a> {
     pub profiles: &'a [(u16, Profile)],
     /// Positions on which the relays will settle; empty if unknown.
     pub places: &'a [(Placement, Profile)],
-    /// Simulated flight over the terrain, if there is any.
+    /// Simulated flight over the terrain; `None` without terrain.
     pub simulated: Option<&'a Flight>,
     /// Line from Tx to Rx.
     pub line: &'a Line,
     /// Key of the network.
     pub key: [u8; 32],
-    /// Signing key of the autopilots, if they have one.
+    /// Signing key of the autopilots; `None` for unsigned messages.
     pub autopilot_key: Option<[u8; 32]>,
 }
 
@@ -297,7 +297,8 @@ impl Bundle<'_> {
 
     /// Returns the parameters that the chain needs in the autopilot of relay `index`.
     ///
-    /// Drones return at different altitudes, because a returning drone crosses the line of the others.
+    /// Drones return at different altitudes, because a returning drone crosses the line along which the other drones
+    /// fly.
     ///
     /// # Errors
     /// The highest altitude is above the range of a fence.
@@ -468,7 +469,9 @@ fn default(section: &mut dyn TableLike, key: &str, text: &str) {
     }
 }
 
-/// Moves relative paths of files that the unit writes, if given, into the folder that it may write.
+/// Moves the relative paths in the entries `keys` into the folder in which the unit may write.
+///
+/// The entries name files that the program writes. A missing entry stays missing.
 ///
 /// # Errors
 /// An absolute path is in another folder.
@@ -510,14 +513,14 @@ fn absolute(section: &dyn TableLike, name: &str, keys: &[&str]) -> Result<(), St
     Ok(())
 }
 
-/// Moves a relative path of a written file into the folder that the unit may write.
+/// Moves a relative path of a written file into the folder in which the unit may write.
 fn state_file(section: &mut dyn TableLike, key: &str, name: &str) {
     let given = section.get(key).and_then(Item::as_str).unwrap_or(name);
     let path = Path::new("/var/lib/uav-relay").join(given);
     section.insert(key, value(path.display().to_string()));
 }
 
-/// Returns the udev rules for the ports `ports`; ports with another name need no rules.
+/// Returns the udev rules for the ports `ports` whose names begin with [`LINK`]. Other ports need no rule.
 ///
 /// # Errors
 /// A name of a port has other characters than letters, digits, `.`, `_` and `-`: in a rule they could be a command.

@@ -124,21 +124,20 @@ impl AsideCase {
     }
 }
 
-/// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The x is
-/// between Tx and Rx, and y in the allowed lateral range.
+/// Returns the optimal position of a relay with `profile`, and its case. `None` in an interference field. The x is between Tx and Rx, and y
+/// in the allowed lateral range.
 ///
-/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64; with noise each of them takes 48
-/// more. If the optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral
-/// range some 23 000 more.
+/// The mission's range of altitudes is ignored. Work: 48 bisection steps in f64; with noise 48 further steps for each of them. If the
+/// optimum without limits is not allowed, some 300 evaluations of both hops; with noise and a lateral range some 23 000 more.
 pub fn best_at(mission: &Mission, profile: Profile) -> Option<(Found, AsideCase)> {
     best_within(mission, Band::at(profile.altitude_m), profile.power_w)
 }
 
-/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The x
-/// is between Tx and Rx; y and altitude are in their allowed ranges.
+/// Returns the optimal position of a relay of `power_w` watts, and its case. `None` in an interference field. The x is between Tx and Rx; y
+/// and altitude are in their allowed ranges.
 ///
-/// Work: 48 bisection steps in f64; with noise each of them takes 48 more. If the optimum without limits is not
-/// allowed, some 800 evaluations of both hops; with noise and a lateral range some 46 000 more.
+/// Work: 48 bisection steps in f64; with noise 48 further steps for each of them. If the optimum without limits is not allowed, some 800
+/// evaluations of both hops; with noise and a lateral range some 46 000 more.
 pub fn best_place(mission: &Mission, power_w: f32) -> Option<(Found, AsideCase)> {
     best_within(mission, mission.config().band, power_w)
 }

@@ -178,7 +178,7 @@ impl Edge {
     }
 }
 
-/// Returns the four values in ascending order; a NaN is replaced by another of the four values.
+/// Returns the values in ascending order. A NaN is replaced by one of the other values.
 fn in_order([a, b, c, d]: [f32; 4]) -> [f32; 4] {
     let (a, b) = (a.min(b), a.max(b));
     let (c, d) = (c.min(d), c.max(d));

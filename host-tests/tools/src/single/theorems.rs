@@ -208,8 +208,8 @@ pub enum AltitudeCase {
     /// Optimum at the altitude where the first hop's SIR equals the second hop's SIR. The first hop's SIR rises with
     /// altitude.
     Crossing = 2,
-    /// Optimum at the lowest altitude, or at the highest altitude up to which the first hop's SIR rises. The two
-    /// hops' SIRs are equal at no altitude in between.
+    /// Optimum at the lowest altitude, or at the altitude of the first hop's largest SIR. The two hops' SIRs are
+    /// equal at no altitude in between.
     End = 3,
     /// Optimum at the lowest altitude: the interferer is at Rx, so the second hop's SIR is 0 everywhere.
     Drowned = 4,
@@ -336,11 +336,10 @@ pub struct Guide {
     pub c1: f32,
     /// Ratio C_2: if p_t / p_u is above C_2, the first hop is better than the second even right above Rx.
     pub c2: f32,
-    /// Ratio C_3. If p_t / p_u is above C_3, the first hop is better than the second hop even at the minimum of its
-    /// SIR.
+    /// Ratio C_3. If p_t / p_u is above C_3, the first hop is better than the second hop even at the minimum of the first hop's SIR.
     ///
-    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, as for an interferer at X <= 0.
-    /// With noise the SIR has a minimum and then a maximum; C_3 belongs to the minimum.
+    /// This minimum is between Tx and Rx, or beyond Rx. `None` without a minimum, for example with an interferer at X <= 0. With noise the
+    /// SIR has a minimum and then a maximum; C_3 belongs to the minimum.
     pub c3: Option<f32>,
 }
 
@@ -369,11 +368,11 @@ pub fn power_ratios(mission: &Mission, altitude_m: f32) -> Option<Guide> {
     })
 }
 
-/// Returns the altitudes at which both hops have the same SIR, m, lower first: the paper's h^- and h^+. The relay has
-/// `power_w` watts and is at `x_m`.
+/// Returns the altitudes at which both hops have the same SIR, m, lower first: the paper's h^- and h^+. The relay has `power_w` watts and
+/// is at `x_m`.
 ///
-/// Any `x_m`, m, and `power_w`, W. Altitudes are above 0, and not limited to the mission's range. `None` for each
-/// that does not exist, and for both in an interference field. Constant work.
+/// `x_m` and `power_w` are not limited. Altitudes are above 0, and not limited to the mission's range. An altitude that does not exist is
+/// `None`; in an interference field both are `None`. Constant work.
 pub fn equal_altitudes(mission: &Mission, x_m: f32, power_w: f32) -> [Option<f32>; 2] {
     let Some(interferer) = mission.interferer() else {
         return [None; 2];

@@ -42,8 +42,8 @@ pub struct Noise {
 
 /// Returns the optimal position of a relay with `profile` against `noise` only, and its SNR (linear).
 ///
-/// Only the mission's distance, Tx power and channel are used. The altitude is that of `profile`; a lower one is
-/// always better. Constant work.
+/// Only the mission's distance, Tx power and channel are used. The relay flies at the altitude of `profile`; a lower altitude would always
+/// be better. Constant work.
 pub fn best_in_noise(mission: &Mission, profile: Profile, noise: Noise) -> Found {
     let config = mission.config();
     let (d, h) = (config.distance_m, profile.altitude_m);
@@ -133,11 +133,10 @@ fn turns(upsilon: impl Fn(f32) -> f32, low: f32, high: f32, altitude_m: f32) -> 
     [one.min(other), one.max(other)]
 }
 
-/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without
-/// a field.
+/// Runs the paper's Algorithm 3, which lowers the target SIR in steps of `epsilon` (linear, above 0). `None` without a field.
 ///
-/// It only evaluates positions where the second hop's mean SIR is one of its targets, so it may miss the optimum of a
-/// field that changes much between two of them. Work: gamma_0 / `epsilon` evaluations, at most `most`.
+/// The algorithm evaluates only positions at which the second hop's mean SIR equals one of its targets. It can miss the optimum of a field
+/// that changes much between two such positions. Work: gamma_0 / `epsilon` evaluations, at most `most`.
 pub fn stepped(mission: &Mission, profile: Profile, epsilon: f32, most: u32) -> Option<Found> {
     mission.field()?;
     let two = Two::new(mission, profile);

@@ -164,9 +164,9 @@ fn mean(link: &Link, of: impl Fn(f64) -> f64) -> f64 {
     sum / f64::from(points)
 }
 
-/// Returns the chain's SIR with the relay where the weaker received signal is strongest, linear.
+/// Returns the chain's SIR, linear, with the relay at a position that ignores the interference.
 ///
-/// That position ignores the interference. It is found by trying 200 001 positions.
+/// At that position the weaker of the two received signals is as strong as possible. It is found by trying 200 001 positions.
 fn blind(link: &Link) -> f64 {
     let relay = link.relays[0];
     let h2 = relay.altitude_m.powi(2);

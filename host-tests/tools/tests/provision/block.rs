@@ -305,7 +305,8 @@ fn a_number_out_of_range_is_named() {
     assert_eq!(reads(&[0; LEN]), Err(ConfigError::Blank));
 }
 
-/// Checks the limits of `explore`, `rounds`, `i_max_w` and `samples` from just inside and outside.
+/// Checks the allowed ranges of `explore`, `rounds`, `i_max_w` and `samples`. Values just outside must be rejected,
+/// values just inside accepted.
 #[test]
 fn the_ranges_of_adjust_and_measure_are_those_of_a_relay() {
     for (explore_m, rounds, good) in [

@@ -292,7 +292,9 @@ fn fitted_slots_of_every_hop_are_in_the_plan() {
     assert_eq!(equal["hop_slots"], Value::Null);
 }
 
-/// Checks that `--out` judges fitted slots against several interferers by the data rate.
+/// Checks that `--out` accepts or refuses a plan by its data rate: fitted slots, several interferers.
+///
+/// Fitted slots are as long as each hop needs.
 #[test]
 fn plans_in_fitted_slots_against_several_interferers_are_written_by_their_rate() {
     let folder = tempfile::tempdir().unwrap();
@@ -377,7 +379,7 @@ fn fitted_slots_with_free_altitudes_are_planned_as_on_board() {
     }
 }
 
-/// Checks that the list of rates with free altitudes has the rates of the plans, in both directions.
+/// Checks that the list of rates with free altitudes has the rates of single plans, in both directions.
 #[test]
 fn rates_with_free_altitudes_are_those_of_the_plans() {
     for access in ["slots", "fitted"] {

@@ -210,12 +210,12 @@ impl Chain {
         all
     }
 
-    /// Returns the x of the relays with the largest rate, m, for a radio with rate steps. There is a list of x for
-    /// each number of relays from 1.
+    /// Returns the x of the relays with the largest rate, m, for a radio with rate steps. There is a list of x for each
+    /// number of relays from 1.
     ///
-    /// Each cell of a grid keeps a few first parts of chains, at their exact positions: those with the least times,
-    /// and of two with equal times the farther one. The next relay is tried at all grid points, and at all x, found
-    /// by bisection, where the time of the hop changes.
+    /// The search extends chains from Tx relay by relay. For each cell of a grid it keeps the few unfinished chains
+    /// with the least times that end in this cell, and of two with equal times the chain that ends farther from Tx. The
+    /// next relay is tried at all grid points, and at all x, found by bisection, where the time of the hop changes.
     fn by_changes(&self) -> Vec<Vec<f64>> {
         let mut grid = self.grid();
         grid.extend((0..=CELLS).map(|i| self.distance_m * i as f64 / CELLS as f64));

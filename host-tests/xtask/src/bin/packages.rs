@@ -35,7 +35,7 @@ fn is_allowed(expression: &str) -> bool {
     plain.split(" AND ").all(|part| part.split(" OR ").any(one))
 }
 
-/// Packages of which the library may need two versions at once.
+/// Packages of which the library is permitted to need two versions at once.
 ///
 /// embedded-hal 1.0 needs the older defmt, which re-exports the newer defmt.
 const TWICE: [&str; 1] = ["defmt"];

@@ -20,8 +20,8 @@
 use super::super::chain::{Chain, Gains, SeatOf};
 use super::super::hop::{Triple, minus};
 
-/// Amount added to each squared hop length, so that its logarithm is finite. In units of the squared distance Tx to
-/// Rx.
+/// Amount added to each squared hop length, so that its logarithm is finite. The unit is the squared distance from Tx
+/// to Rx.
 const SHORTEST: f32 = 1e-8;
 
 /// Levels of a hop: ln(forward SIR) and ln(backward SIR / r).
@@ -90,7 +90,8 @@ impl LogGains {
         }
     }
 
-    /// Returns the logarithms of both gains of hop `k`, the backward one divided by r. `k` is 1 (from Tx) to N + 1 (to Rx).
+    /// Returns the logarithms of both gains of hop `k`; the backward gain is divided by r. `k` is 1 (from Tx) to N + 1
+    /// (to Rx).
     fn of(&self, k: u16, chain: &Chain<'_, impl SeatOf>) -> Levels {
         let [there, back] = self.gains.of(k, chain.relays(), |gain, index| {
             let power_w = chain.seat(index).power_w;

@@ -37,15 +37,15 @@ use core::task::Poll;
 use hop::{Derivatives, Levels, LogGains, add_scaled, dot};
 use newton::{Factor, Front, Sums, Weights};
 
-/// First barrier weight for a start far from the result.
+/// First barrier weight of the interior-point method, for a start far from the result.
 const FIRST_MU: f32 = 0.03;
-/// First barrier weight for a start near the result.
+/// First barrier weight of the interior-point method, for a start near the result.
 const CLOSE_MU: f32 = 3e-3;
 /// Last barrier weight. The result differs from a local optimum by at most this value, in ln(SIR), if the problem is
 /// concave around the optimum.
 const LAST_MU: f32 = 1e-4;
 
-/// Factor by which the barrier weight falls once the positions have settled. A step then gains little.
+/// Factor by which the barrier weight falls once a Newton step gains little.
 const LESS: f32 = 0.3;
 
 /// Gain below which the positions count as settled after more than half of a Newton step. The gain is the increase of
@@ -103,7 +103,8 @@ struct Node {
     hop: Hop,
 }
 
-/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32: three digits.
+/// Newton step of a relay in x, y and h. Each value is stored as the upper half of an f32, which
+/// keeps two to three significant decimal digits.
 type Step = [u16; 3];
 
 #[derive(Clone, Copy, Debug)]
@@ -364,7 +365,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.work = Work::Levels(1);
     }
 
-    /// Continues the interior-point method by one bounded portion. Ready at the end, with a target in ln(SIR)
+    /// Continues the interior-point method by one bounded portion. `Ready` at the end, with a target in ln(SIR)
     /// slightly below all [levels](Levels) of the hops at the stored positions.
     pub(super) fn step(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let relays = chain.relays();
@@ -528,8 +529,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. Ready after the maximum
-    /// number of steps, with the target, in ln(SIR).
+    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. The result is `Ready`
+    /// after the maximum number of steps, with the target, in ln(SIR).
     fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -548,8 +549,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight and continues; after the last one, ready with the target, in ln(SIR). `resets` is true
-    /// to replace the Lagrange multipliers, because no step with them has raised the merit.
+    /// Lowers the barrier weight and continues. After the last weight the result is `Ready` with the target, in
+    /// ln(SIR). `resets` is true to replace the Lagrange multipliers, because no step with them has raised the merit.
     fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
@@ -680,7 +681,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Lowers the common factor on all Newton steps, so that the relay at `spot` stays within its limits. `step` is
-    /// that relay's whole step.
+    /// that relay's step without this factor.
     fn limit(&mut self, spot: &Spot, step: Triple) {
         let (below, above) = (spot.room_below(), spot.room_above());
         for (step, (below, above)) in step.iter().zip(below.iter().zip(&above)) {

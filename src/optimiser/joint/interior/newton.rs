@@ -158,8 +158,8 @@ impl Front {
         barrier(mu, c, f, h, hh);
     }
 
-    /// Adds the hop to the next node to this relay's equations, and then eliminates this relay. `None` if a pivot is
-    /// not positive.
+    /// Adds the terms of the hop to the next node to this relay's equations, then eliminates this relay. `None` if a
+    /// pivot is not positive.
     fn eliminate(
         &mut self,
         hop: &Derivatives,

@@ -337,7 +337,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         STARTS.get(at).copied()
     }
 
-    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best one so far. Returns the next work. If
+    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best target so far. Returns the next work. If
     /// Algorithm 1 has found positions worth an improvement, the next work leads to another run of the interior-point
     /// method. Otherwise the next work begins the next initial chain.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
@@ -359,7 +359,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Chooses the positions at which the interior-point method starts, and starts it. The lateral offsets and
-    /// altitudes are the stored ones. The x come from Algorithm 1, or are evenly spaced. The first `done` relays have
+    /// altitudes are the stored values. The x come from Algorithm 1, or are evenly spaced. The first `done` relays have
     /// their positions already.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
@@ -529,5 +529,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// First target to try minus the interior-point method's result, in ln(SIR). It is the possible error of this method.
+/// Difference of the first target to try and the result of the interior-point method, in ln(SIR). The first target is
+/// higher by this difference, which is the possible error of this method.
 const ABOVE: f32 = 1e-4;

@@ -16,8 +16,8 @@ use core::task::Poll;
 /// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). A chain within
-/// this tolerance of the bound ends the search for better ones.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). If a chain is
+/// within this tolerance of the bound, the search for better chains ends.
 pub(super) const CEILING: f32 = 5e-5;
 
 /// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
@@ -46,9 +46,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Checks in one more segment (ten relays) that each relay has a position that meets the target.
     ///
-    /// A relay may have to stay short of its farthest position for the sake of the next relay. The segments are
-    /// checked from the last to the first; `place_m` is the x that the last relay of the segment has to take, m.
-    /// Bounded by twenty relays.
+    /// Some relays have to stay short of their farthest position, so that the next relay meets the target, too. The
+    /// segments are checked from the last to the first; `place_m` is the x that the last relay of the segment has to
+    /// take, m. Bounded by twenty relays.
     pub(super) fn try_hold_back(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -183,7 +183,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// exactly as the relays compute them from their messages.
     ///
     /// The chain is the result of an ascent (improvement in steps) that ended at the target `sigma`. `ceiling` is the
-    /// upper bound of all chains. Both are in ln(SIR). Relays may stay short of their farthest position.
+    /// upper bound of all chains. Both are in ln(SIR). Relays are allowed to stay short of their farthest position.
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -194,7 +194,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Work::Seek(seek, Purpose::Last)
     }
 
-    /// Returns true if the current chain may still become the best chain. Such a chain is improved again.
+    /// Returns true if the current chain can still become the best chain. Such a chain is improved again.
     pub(super) fn is_promising(&self) -> bool {
         let higher = || self.best.is_none_or(|(best, _)| self.ascent.sigma > best);
         self.again || (higher() && self.ascent.is_kept_up_with())
@@ -237,7 +237,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 }
 
 /// Maximum number of relays for which the last phase tries moves of single relays. If some relays have a fixed
-/// altitude, the phase always tries them, because the path then has kinks.
+/// altitude, the phase always tries such moves, because the chain's path then has kinks.
 const POLISHED: u16 = 5;
 
 /// Number of times that the trial moves of single relays are halved, in the last phase of the solution.

@@ -98,7 +98,7 @@ enum Purpose {
 impl Purpose {
     /// Returns true for the sweep's rules: hops are computed as the relays compute them from messages.
     ///
-    /// Some relays may then stay short of their farthest position.
+    /// By these rules a relay is allowed to stay short of its farthest position.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -115,8 +115,8 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Target that the improvement of the best chain reached, in ln(SIR). The improvement of another chain stops if
-    /// it is predicted to end below this target.
+    /// Highest target reached by the improvement of a chain, ln(SIR). The improvement of a chain stops if it is
+    /// predicted to end below this target.
     highest: f32,
     /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
@@ -126,10 +126,10 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, and if
     /// it was stopped early.
     judged_at: Option<f32>,
-    /// True unless the current chain's improvement was stopped early. It is stopped if the chain would not become the
-    /// best chain.
+    /// True if the current chain's improvement has not been stopped early. It is stopped if the chain would not become
+    /// the best chain.
     is_whole: bool,
-    /// True in the last phase, which searches the best chain's target more finely, and moves single relays.
+    /// True in the last phase. It searches the best chain's target more finely, and moves single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
@@ -425,8 +425,8 @@ mod tests {
         (mission.expect("in range"), held)
     }
 
-    /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is
-    /// the target, the others are each relay's lateral offset and altitude. If `once_more`, the best chain is
+    /// Returns the result of the solver as bits of f32 numbers, and the number of `step` calls. The first number is the
+    /// target, the others are each relay's lateral offset and altitude. If `once_more` is true, the best chain is
     /// computed again instead of stored.
     fn solved(
         mission: &Mission,

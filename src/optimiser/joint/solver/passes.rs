@@ -109,7 +109,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 
     /// Runs the forward pass through one more segment, or first computes the moves of its relays. The pass tries the
-    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept`.
+    /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept` is true.
     pub(super) fn forward(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -150,8 +150,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share` of their computed moves. If `kept`, their new lateral
-    /// offsets and altitudes are stored. `None` if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share` of their computed moves. If `kept` is true, it stores
+    /// their new lateral offsets and altitudes. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -195,8 +195,8 @@ const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     /// Continues a pass that computes only the relays' x, for the target `sigma` = ln(SIR). Lateral offsets and
-    /// altitudes stay unchanged. Stores the chain if `kept`. At the end of the pass returns the chain's slack, m, or
-    /// `None` if a hop cannot meet the target.
+    /// altitudes stay unchanged. Stores the chain if `kept` is true. At the end of the pass returns the chain's slack,
+    /// m, or `None` if a hop cannot meet the target.
     pub(super) fn plain(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,

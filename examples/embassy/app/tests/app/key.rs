@@ -39,10 +39,10 @@ fn neighbours_accept_the_epoch_of_every_start() {
     assert_eq!(bench.signature_rejections(), 0);
 }
 
-/// Checks that a relay is rejected if it restarts with an older epoch, or with the same epoch and seed.
+/// Checks that a relay is rejected if it restarts with an old epoch, or with its last epoch and seed.
 ///
-/// Reason: its frames could be replays of earlier frames. (The library's tests cover the same epoch with another
-/// seed, a duplicate index.)
+/// The reason is that its frames could be replays of earlier frames. Another test, in the library, covers the same
+/// epoch with another seed: two relays with the same index.
 #[test]
 fn frames_with_a_forgotten_epoch_are_rejected() {
     for (epoch, seed) in [(1, 2), (2, 1)] {

@@ -14,8 +14,8 @@ mod vehicle;
 mod votes;
 mod watchdog;
 
-/// Logger that discards all lines. With this logger the firmware builds each line, so that the tests would find a
-/// panic in a log line.
+/// Logger that discards all lines. With this logger the firmware formats each line, so a panic in a log line makes a
+/// test fail.
 #[defmt::global_logger]
 struct Logger;
 

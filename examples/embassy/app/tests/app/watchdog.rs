@@ -32,8 +32,8 @@ fn a_loop_that_hangs_stops_feeding_the_watchdog() {
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
-/// Checks that the watchdog is not fed while the relay's task hangs for 12 s each time it runs. The task still polls
-/// the future that feeds, but the relay's timers are late.
+/// Checks that the watchdog is not fed if the relay's task hangs for 12 s each time it runs. The executor still polls
+/// the future that feeds the watchdog, but the relay's timers are late.
 #[test]
 fn late_timers_stop_feeding_the_watchdog() {
     let mut bench = Bench::new();

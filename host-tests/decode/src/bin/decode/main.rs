@@ -58,7 +58,8 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Returns the signing key at the end of a simulation's capture comment, if there is one.
+/// Returns the signing key that a simulation has written at the end of the capture's comment. `None` if there is no
+/// key.
 fn of_comment(comment: &str) -> Option<[u8; 32]> {
     let (_, digits) = comment.rsplit_once(", key ")?;
     key::parse(digits).ok()

@@ -7,10 +7,10 @@ use rand::SeedableRng;
 
 use super::{Scenario, in_space};
 
-/// Number of scenarios whose optimum is stored.
+/// Number of random scenarios whose optimum is stored.
 pub const COUNT: u32 = 2000;
 
-/// File with the stored optima; its head names their origin.
+/// File with the stored optima. Comments at its beginning name their origin.
 const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/joint.csv");
 
 const SEED: u64 = 2021;
@@ -25,7 +25,7 @@ pub fn numbered(number: u32) -> Scenario {
 /// Returns the stored optimum SIR (linear) of each scenario, by number; 0 if no chain is possible.
 ///
 /// # Errors
-/// If the file cannot be read, or a row is not a number and an SIR.
+/// If the file cannot be read, or a row is not a scenario's number and an SIR.
 pub fn optima() -> io::Result<Vec<f64>> {
     let mut optima = Vec::new();
     for row in csv::ReaderBuilder::new()

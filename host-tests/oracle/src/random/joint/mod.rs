@@ -81,12 +81,12 @@ impl Scenario {
     }
 }
 
-/// Range of minimum separations that hardly ever limit a chain, as a fraction of the equal spacing.
+/// Range of minimum separations that hardly ever limit a chain, as fractions of the equal spacing.
 ///
 /// The equal spacing of N relays is D / (N + 1), with D the distance from Tx to Rx.
 pub const ROOMY: (f64, f64) = (0.01, 0.1);
 
-/// Range of minimum separations that often limit a chain, as a fraction of the equal spacing.
+/// Range of minimum separations that often limit a chain, as fractions of the equal spacing.
 ///
 /// The equal spacing of N relays is D / (N + 1), with D the distance from Tx to Rx. The separation lowers the optimum
 /// SIR in about a tenth of these scenarios.
@@ -162,7 +162,8 @@ pub fn in_space(rng: &mut impl Rng, relays: &RangeInclusive<u32>) -> Scenario {
     drawn
 }
 
-/// Gives some relays their own power, and fixes the lateral position and altitude of some.
+/// Changes a scenario so that its relays differ. Some relays get their own power; for some the lateral position and
+/// altitude are fixed.
 ///
 /// The distribution is in the module's last table.
 #[must_use]

@@ -52,8 +52,8 @@ impl StochasticLink {
         Some(places)
     }
 
-    /// Returns the first hop's expected SIR in the chain built backward for `gamma`, but at most `gamma`. 0 without a
-    /// chain.
+    /// Returns the first hop's expected SIR in the chain built backward from Rx for `gamma`. The result is at most
+    /// `gamma`, and 0 if there is no chain.
     pub fn backward_sir(&self, gamma: f64) -> f64 {
         self.backward(gamma)
             .and_then(|places| self.hop_sirs(&places).first().map(|sir| sir.min(gamma)))
@@ -63,8 +63,9 @@ impl StochasticLink {
     /// Runs the paper's Algorithm 4: lowers the target SIR by `step` until the first hop meets it. The first target
     /// is [`StochasticLink::ceiling`].
     ///
-    /// In two points it differs from the printed algorithm: the last hop follows the target, and no relay is before
-    /// Tx. `None` if no target above 0 is met, as with a step larger than the optimum.
+    /// The function differs from the printed algorithm in two points: the length of the last hop depends on the target,
+    /// and no relay is before Tx. `None` if no target above 0 is met, for example because `step` is larger than the
+    /// optimum.
     pub fn algorithm4(&self, step: f64) -> Option<Backward> {
         let mut gamma = self.ceiling();
         let mut iterations = 1;
@@ -85,11 +86,11 @@ impl StochasticLink {
         None
     }
 
-    /// Returns the best [`StochasticLink::backward_sir`] that a search over the target SIR finds.
+    /// Returns the largest value of [`StochasticLink::backward_sir`] that a search over target SIRs finds.
     ///
-    /// It tries `points` targets down to 1e-8 of the ceiling, evenly spaced in their logarithm, and then four times
-    /// as many targets around the best target. This search is for interference with which the SIR has several maxima.
-    /// A maximum narrower than the spacing may be missed.
+    /// The search tries `points` targets from the ceiling down to 1e-8 of it, evenly spaced in their logarithm, and
+    /// then four times as many targets around the best target. It is used for interference for which the SIR has
+    /// several maxima as a function of the target. It can miss a maximum that is narrower than the spacing.
     pub fn backward_best(&self, points: u32) -> f64 {
         let (mut low, mut high) = (1e-8_f64.ln(), 0.0);
         let mut best = (0.0, 0.0);
@@ -107,10 +108,11 @@ impl StochasticLink {
         best.1
     }
 
-    /// Solves the paper's problem 1: the fewest relays that meet the target SIR `gamma` if built backward.
+    /// Solves the paper's problem 1: the smallest number of relays whose backward chain meets `gamma`. The backward
+    /// chain is built from Rx to Tx.
     ///
-    /// All relays are like the first relay; there are at most `most` relays. The result's `iterations` is the number
-    /// of relays. `None` if more relays are needed, or if the target cannot be met.
+    /// All relays have the power and altitude of the first relay. `None` if more than `most` relays are needed, or if
+    /// the target cannot be met. The result's `iterations` is the number of relays.
     pub fn fewest(&self, gamma: f64, most: usize) -> Option<Backward> {
         let like: Relay = *self.relays.first()?;
         (1..=most).find_map(|n| {

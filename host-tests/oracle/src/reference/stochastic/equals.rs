@@ -5,10 +5,10 @@ use super::link::StochasticLink;
 impl StochasticLink {
     /// Returns the best expected SIR (linear) of identical relays if interference is the same everywhere.
     ///
-    /// It solves the equation that all hops have one SIR and together span the distance from Tx to Rx, with at most
-    /// about 2000 evaluations. It is never above the SIR of the outer hops with their relays straight above Tx and
-    /// Rx. `None` without relays, or if the relays or the table's values of Upsilon = E[1/I] (I is the interference
-    /// power) differ.
+    /// It solves the equation that all hops have the same SIR and together span the distance from Tx to Rx, with at
+    /// most about 2000 evaluations. The result is at most the SIR of the first hop with its relay straight above Tx,
+    /// and of the last hop with its relay straight above Rx. `None` without relays, if the relays differ, or if the
+    /// table has different values of Upsilon = E[1/I] (I is the interference power).
     pub fn iid_optimum(&self) -> Option<f64> {
         let (first, (_, u)) = (self.relays.first()?, *self.upsilon.first()?);
         let alike = self.relays.iter().all(|relay| relay == first)

@@ -15,7 +15,7 @@ pub struct StochasticLink {
     pub mu_los: f64,
     /// Path-loss factor between a relay and the ground, 1/m^2, > 0.
     pub eta: f64,
-    /// Table of the random interference along the line: strictly rising x, m, each with Upsilon, 1/W.
+    /// Table of the random interference along the line: ascending x, m, each with Upsilon, 1/W.
     ///
     /// Upsilon = E[1/I], with the interference power I, is linear between two positions, and constant beyond the
     /// first and the last position.
@@ -44,7 +44,8 @@ impl StochasticLink {
 
     /// Returns the expected SIR (linear) of the N+1 hops with relay k at `x[k-1]` metres.
     ///
-    /// Empty without relays or if the lengths differ. Infinite if two relays share a position.
+    /// Empty without relays, or if the number of positions in `x` differs from the number of relays. Infinite if two
+    /// relays share a position.
     pub fn hop_sirs(&self, x: &[f64]) -> Vec<f64> {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return Vec::new();

@@ -7,7 +7,7 @@ use super::link::StochasticLink;
 pub struct Single {
     /// Position of the relay along the line from Tx, m.
     pub x_m: f64,
-    /// Smaller one of the target SIR and the first hop's expected SIR, linear.
+    /// Smaller of two SIRs, linear: the target SIR, and the first hop's expected SIR.
     pub sir: f64,
     /// Number of target SIRs tried.
     pub iterations: usize,
@@ -17,15 +17,15 @@ impl StochasticLink {
     /// Runs Algorithm 3 as printed: it stops at the first target SIR that the first hop meets.
     ///
     /// The targets fall by `step` from the largest SIR that the second hop can have. If the first hop meets none of
-    /// them, the best position seen is returned. `None` unless there is exactly one relay.
+    /// them, the function returns the best position that it has tried. `None` unless the link has exactly one relay.
     pub fn algorithm3_printed(&self, step: f64) -> Option<Single> {
         self.descend(step, |here, _, gamma| (here.sir >= gamma).then_some(here))
     }
 
-    /// Runs the corrected Algorithm 3: it continues while a lower target SIR could still be better.
+    /// Runs the corrected Algorithm 3: it continues as long as a lower target SIR can be better.
     ///
-    /// It returns the best position seen. If the interference is the same everywhere, this may be one step away from
-    /// the position of the printed algorithm, with an SIR at least as high.
+    /// The function returns the best position that it has tried. If the interference is the same everywhere, this
+    /// position can differ by one step from the position of the printed algorithm; its SIR is at least as high.
     pub fn algorithm3(&self, step: f64) -> Option<Single> {
         self.descend(step, |_, best, gamma| {
             (best.sir >= gamma - step).then_some(best)
@@ -69,8 +69,8 @@ impl StochasticLink {
 
     /// Returns the best position (m) and expected SIR (linear) of one relay by brute force.
     ///
-    /// It tries `points` positions between two successive positions of the interference table, then refines four
-    /// times around the best position. `None` unless there is exactly one relay.
+    /// It tries `points` positions between each two neighbouring positions of the interference table, then refines the
+    /// search four times around the best position. `None` unless the link has exactly one relay.
     pub fn single_optimum(&self, points: u32) -> Option<(f64, f64)> {
         let [_] = self.relays.as_slice() else {
             return None;

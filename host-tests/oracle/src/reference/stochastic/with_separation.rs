@@ -30,9 +30,10 @@ fn joined(mut all: Stretches) -> Stretches {
 impl StochasticLink {
     /// Returns the best expected SIR (linear) of all chains with relays at least `apart_m` apart.
     ///
-    /// It follows the sets of all possible positions of each relay, from Rx back to Tx. These sets are intervals: as
-    /// the receiver of a hop moves along an interval, so do the possible positions of its sender. No chain is left out,
-    /// not even one in which relays stop short of their farthest position. 0 if no chain is possible.
+    /// It computes the set of all possible positions of each relay, from Rx back to Tx. Such a set consists of
+    /// intervals: as the receiver of a hop moves along an interval, the possible positions of its sender move, too. No
+    /// chain is left out, not even a chain in which relays stop short of their farthest position. 0 if no chain is
+    /// possible.
     pub fn best_apart(&self, apart_m: f64) -> f64 {
         let (Some(first), Some(last)) = (self.relays.first(), self.relays.last()) else {
             return 0.0;
@@ -62,7 +63,7 @@ impl StochasticLink {
 
     /// Splits an interval of positions at the positions of the interference table.
     ///
-    /// In each part Upsilon = E[1/I] (I is the interference power) is then linear.
+    /// In each part Upsilon = E[1/I] is then linear; I is the interference power.
     fn pieces(&self, (low, high): (f64, f64)) -> Stretches {
         let inside = self.upsilon.iter().map(|point| point.0);
         let inside = inside.filter(|x| *x > low && *x < high);

@@ -81,7 +81,7 @@ fn a_finger_drags_what_it_touches_and_else_scrolls_the_page() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks that a typed number takes effect at once, while the input field still has the focus.
+/// Checks that a typed number takes effect at once, while the input field still has the keyboard focus.
 #[test]
 fn a_number_counts_as_soon_as_it_is_typed() {
     let mut browser = opened(1280, 900);

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::chromium::Browser;
 use super::opened::{address, choose, number, opened, press, root, settled};
 
-/// JavaScript that lists the labels in the page's pictures that overlap or are clipped.
+/// JavaScript that lists the faulty labels in the page's pictures: overlapping, or beyond the picture.
 const CLASHES: &str = "(() => { const clashes = []; \
     for (const svg of document.querySelectorAll('svg')) { \
       const out = svg.getBoundingClientRect(); \
@@ -95,7 +95,8 @@ fn all_of_it_can_be_heard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks that no hop is drawn in red, as the worst, if the SIRs of all hops differ by less than 0.1 %.
+/// Checks that no hop is marked in red as the worst hop if the SIRs of all hops are nearly equal. They differ by less
+/// than 0.1 %.
 #[test]
 fn no_hop_is_red_where_all_are_equal() {
     let mut browser = opened(1280, 900);
@@ -139,9 +140,9 @@ fn median(mut all: Vec<f64>) -> f64 {
     all[all.len() / 2]
 }
 
-/// Returns the median computing time, ms, of `times` runs without a recording.
+/// Returns the median computing time, ms, of `times` simulation runs without a recording.
 ///
-/// The page makes such runs while the user drags something.
+/// The page makes such a run while the user drags a symbol.
 fn took(browser: &mut Browser, times: u32) -> f64 {
     let all = (0..times).map(|_| {
         let runs = number(browser, "window.last.runs");

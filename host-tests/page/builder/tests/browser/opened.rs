@@ -94,7 +94,7 @@ fn native(browser: &mut Browser) -> String {
     String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
-/// Returns the report that is part of `told`, the JSON result of a run in the page.
+/// Returns the part `report` of `told`, the JSON result of a run in the page.
 ///
 /// The text of the report is not changed, so that a test can compare it with the report of `cargo chain` byte by
 /// byte.
@@ -138,8 +138,8 @@ fn the_numbers_are_those_of_the_command_to_the_bit() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// Checks the percentage of the best possible SIR that the page states for the chain. The best possible SIR has to be
-/// that of the relays that are switched on.
+/// Checks the percentage that the page states: the chain's SIR as a part of the best possible SIR. The best possible
+/// SIR must be that of the five relays that are switched on, without the sixth.
 #[test]
 fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
     let mut browser = opened(1280, 900);

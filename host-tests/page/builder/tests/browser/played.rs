@@ -7,8 +7,8 @@ use crate::opened::{choose, middle, number, opened, press, said, settled};
 
 /// Returns the playback steps (ticks) of the page as JSON objects.
 ///
-/// Each has the time in s, the sender of a frame, the least SIR, the number of hops, the relays that are off, and the
-/// number of relays with a position.
+/// Each object has the time in s, the sender of a frame, the lowest SIR of a hop, the number of hops, the relays that
+/// are off, and the number of relays with a position.
 fn ticks(browser: &mut Browser) -> Vec<Value> {
     let ticks = browser.value(
         "player.ticks.map((tick) => ({ at_s: tick.at_s, says: tick.says, worst: Math.min(...tick.sirs), hops: tick.sirs.length, \

@@ -24,7 +24,7 @@ use uav_relay_sim::live::LiveView;
 use super::chromium::Browser;
 use super::opened::number;
 
-/// A screen that shows snapshots until it is dropped.
+/// Running screen (page of a ground station) that shows new snapshots until it is dropped.
 struct Shown {
     screen: Arc<Screen>,
     has_ended: Arc<AtomicBool>,
@@ -32,7 +32,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// Starts a screen that shows ten snapshots a second, which `next` returns.
+    /// Starts a screen that shows ten snapshots a second. Each call of `next` returns a snapshot.
     fn begin(next: impl FnMut() -> Snapshot + Send + 'static) -> Self {
         let screen = Screen::start("127.0.0.1:0".parse().unwrap()).unwrap();
         Self::on(screen, next)
@@ -166,7 +166,7 @@ fn a_server_that_ends_is_noticed() {
     );
 }
 
-/// Makes the page draw its map again, and returns the texts in it as a JSON array.
+/// Makes the page redraw its map, and returns the texts in the map as a JSON array.
 fn written(browser: &mut Browser) -> String {
     browser.text(
         "(() => { const texts = [], plain = map.write; map.write = function (text, ...rest) { const is = plain.call(this, text, ...rest); if (is) texts.push(text); return is; }; map.draw(); delete map.write; return texts.join('|'); })()",
@@ -497,7 +497,7 @@ fn a_preview_of_other_values_or_of_an_earlier_start_cannot_be_uploaded() {
     drop(task);
 }
 
-/// Returns a snapshot of `relays` relays that move, with everything that the map can show.
+/// Returns a snapshot of `relays` moving relays, with everything that the map can show.
 fn full(relays: u16, time_s: f64) -> Snapshot {
     let distance_m = 2_000.0;
     let place = |number: u16, time_s: f64| {
@@ -599,7 +599,7 @@ fn png([red, green, blue]: [u8; 3]) -> Vec<u8> {
     file
 }
 
-/// Colours of the map tiles in turn.
+/// Colours of the map tiles, red, green and blue. Neighbouring tiles have different colours.
 const TILE_COLOURS: [[u8; 3]; 2] = [[200, 220, 170], [235, 215, 190]];
 
 /// Returns the line of a chain on earth of 2 km, to the north-east.
@@ -613,7 +613,7 @@ fn line() -> Axis {
     Axis::between(Sites { tx, rx }).unwrap()
 }
 
-/// Returns a screen with map tiles of the zoom levels 8 to 17. Those of even columns in even rows are missing.
+/// Returns a screen with map tiles of the zoom levels 8 to 17. Tiles with an even column and an even row are missing.
 fn tiled() -> Screen {
     let pictures = TILE_COLOURS.map(png);
     let tiles = Tiles {
@@ -849,7 +849,8 @@ fn it_fits_a_phone_a_notebook_and_a_wall_light_and_dark() {
     println!("pictures took {:?}", start.elapsed());
 }
 
-/// Returns the time of the fastest of 20 drawings of `canvas`, an object of the page, in ms.
+/// Returns the time of the fastest of 20 drawings of `canvas`, ms. `canvas` is the name of a JavaScript object of the
+/// page.
 fn drawing(browser: &mut Browser, canvas: &str) -> f64 {
     let draw = format!("{canvas}.draw(); {canvas}.pen.getImageData(0, 0, 1, 1)");
     let timed = format!("const from = performance.now(); {draw}; return performance.now() - from;");
@@ -859,7 +860,7 @@ fn drawing(browser: &mut Browser, canvas: &str) -> f64 {
     )
 }
 
-/// Returns the time of the first paint, ms, of a load of `url` in a running browser.
+/// Loads `url` in a running browser, and returns the time until the first paint, ms.
 fn first_paint(browser: &mut Browser, url: &str) -> f64 {
     let paint =
         "performance.getEntriesByType('paint').find((it) => it.name === 'first-contentful-paint')";
@@ -871,7 +872,7 @@ fn first_paint(browser: &mut Browser, url: &str) -> f64 {
 
 #[test]
 fn the_first_paint_comes_within_a_tenth_of_a_second() {
-    /// Number of loads at most: other programs of the machine slow single ones down.
+    /// Maximum number of loads. Several are tried, because other programs of the machine slow single loads down.
     const LOADS: usize = 200;
     let shown = shown_full(100);
     let mut browser = Browser::start("about:blank", 1920, 1080);
@@ -971,7 +972,7 @@ fn the_screen_can_be_heard_and_used_by_keyboard() {
     assert_eq!(browser.errors(), Vec::<String>::new());
 }
 
-/// JavaScript that returns the texts with a contrast below 4.5 to 1 (WCAG 2.1 AA).
+/// JavaScript that returns the texts with a contrast ratio below 4.5, the limit of WCAG 2.1 AA.
 ///
 /// Texts of disabled buttons and of the canvas are left out.
 const FAINT: &str = r"(() => {
@@ -990,9 +991,10 @@ const FAINT: &str = r"(() => {
   return faint;
 })()";
 
-/// Checks contrast, names and keyboard focus of everything on the page, with alarms of each urgency.
+/// Checks contrast, names and keyboard focus of all elements of the page. The page shows an alarm of each urgency.
 ///
-/// With `AXE=axe.min.js`, a copy of axe-core 4, it also runs all rules of axe-core.
+/// If the environment variable `AXE` names a copy of axe-core 4 (`axe.min.js`), the test also runs all rules of
+/// axe-core.
 #[test]
 fn the_page_has_no_serious_fault_of_accessibility() {
     let alarm = |number, urgency, cleared_s| Alarm {

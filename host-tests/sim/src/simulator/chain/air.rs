@@ -274,7 +274,7 @@ pub(super) fn link(index: usize, port: Port) -> Link {
     }
 }
 
-/// Largest difference of the numbers of two neighbours in the chain. It applies even if the radio range is larger.
+/// Largest difference between the numbers of two neighbours, even if the radio range is larger.
 const NEIGHBOUR: usize = 4;
 
 impl Chain {
@@ -294,9 +294,9 @@ impl Chain {
             .any(|part| part.parts(number(one), number(other), self.now))
     }
 
-    /// Returns true unless a failure keeps relay `by` from receiving relay `of` (both from 0) at present.
+    /// Returns true if no failure prevents relay `by` from receiving relay `of` (both from 0) at present.
     ///
-    /// The radio range is not checked.
+    /// A failure is a partition or a one-way link failure. The radio range is not checked.
     pub(super) fn hears(&self, by: usize, of: usize) -> bool {
         let deaf = &self.setup.deaf;
         !self.are_parted(by, of)

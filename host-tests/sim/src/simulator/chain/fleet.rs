@@ -116,7 +116,7 @@ impl Chain {
 
     /// Moves drone `index` (from 0) for one time step, and lets its relay and autopilot exchange messages.
     ///
-    /// If the relay is off, the pilot lands the drone after a while.
+    /// If the relay is off, the pilot lands the drone after [`LANDS_AFTER`].
     fn drive(&mut self, index: usize) {
         let now = self.now;
         #[expect(clippy::cast_precision_loss, reason = "some milliseconds")]
@@ -165,7 +165,8 @@ impl Chain {
     /// Simulates an operator who confirms to a relay that the drones of lost neighbours have landed.
     ///
     /// The relay then no longer keeps away from these drones. The operator waits until two relays have controlled their
-    /// drones for [`LANDS_AFTER`]: this relay, and the nearest relay with a flying drone beyond the lost ones.
+    /// drones for [`LANDS_AFTER`]: this relay, and the nearest relay beyond the lost neighbours whose drone still
+    /// flies.
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {
@@ -297,7 +298,7 @@ impl Chain {
         self.flight = Some(flight);
     }
 
-    /// Returns the drones that relay data now, by relay number from 1, with their true positions.
+    /// Returns the relays that forward data now, by number from 1, with the true positions of their drones.
     fn serving(&self, flight: &Flight) -> Vec<(u16, Point)> {
         let serves = |member: &Member| {
             let is_out = matches!(

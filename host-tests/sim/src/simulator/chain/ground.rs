@@ -390,7 +390,7 @@ impl Chain {
 
     /// Draws the destination and the claimed sender of a forged frame.
     ///
-    /// The destination is a relay, the sender a relay or ground station that may be its neighbour.
+    /// The destination is a relay, the sender a relay or ground station that can be the neighbour of this relay.
     fn forged_route(&self, attacker: &mut Attacker) -> ForgedRoute {
         let relays = self.setup.mission.relays();
         let reach = match self.setup.settings.wiring {

@@ -36,7 +36,8 @@ impl ChangedRelays {
 impl Chain {
     /// Starts the statistics of the run.
     ///
-    /// `run` simulates a chain without faults. This chain should have the positions that `run` reaches.
+    /// `run` simulates a chain without faults. The statistics compare the relays' positions with the positions of that
+    /// chain.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -103,11 +104,10 @@ impl Chain {
         }
     }
 
-    /// Returns true if the chain is available: one of the longest possible chains has its best positions.
+    /// Returns true if the chain is available: it has the positions that it would reach without faults.
     ///
-    /// A possible chain consists of living relays that can be neighbours. Its best positions are those in which the
-    /// relays settle without faults. If such chains are too small for a quorum, their relays have no positions, and
-    /// the result is false.
+    /// This is checked for the longest chains that the living relays can form; one such chain at its positions
+    /// suffices. If these chains are too small for a quorum, their relays have no positions, and the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -248,7 +248,8 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` is a complete view: all its relays, ordered by index. A view is a membership of the chain.
+/// Returns true if `part` has all relays of their view, in the order of their indices. A view is a membership of the
+/// chain.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()

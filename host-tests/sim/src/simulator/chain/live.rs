@@ -22,7 +22,8 @@ pub struct LiveRelay {
 }
 
 impl Chain {
-    /// Processes all events up to the virtual time `until`, also after the chain has settled. Returns true at the setup's deadline.
+    /// Processes all events up to the virtual time `until`, also after the chain has settled. Returns true once the run has reached the
+    /// setup's deadline or the limit on the number of events.
     pub fn advance(&mut self, until: Instant) -> bool {
         let by = until.min(self.setup.deadline);
         while self.events < MAX_EVENTS
@@ -37,7 +38,9 @@ impl Chain {
         has_ended
     }
 
-    /// Passes an input of its firmware to relay `number`, from 1, at the time `now`. The chain has been advanced to that time.
+    /// Applies `input` to relay `number` (from 1) at the time `now`, and handles the relay's outputs.
+    ///
+    /// This simulates an input by the relay's firmware. The chain must have been advanced to `now`.
     pub fn input(&mut self, now: Instant, number: u16, input: impl FnOnce(&mut Relay)) {
         self.now = now;
         let index = usize::from(number).saturating_sub(1);

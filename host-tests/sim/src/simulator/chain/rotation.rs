@@ -15,10 +15,10 @@ use crate::simulator::rotation::{
 };
 use crate::simulator::watch::{has_agreed, undisturbed};
 
-/// Time step while a drone moves.
+/// Time step of the simulation while a drone moves.
 const STEP: Duration = Duration::from_millis(100);
 
-/// Time between two steps while all drones hover.
+/// Time step of the simulation while all drones hover.
 const IDLE: Duration = Duration::from_millis(1_000);
 
 /// Period of the pilots' decisions.
@@ -30,10 +30,10 @@ const TAKE_OFFS: Duration = Duration::from_millis(8_000);
 /// Distance from a position below which a drone has arrived, m.
 const ARRIVED_M: f64 = 0.5;
 
-/// Time by which a spare is early at its place, s.
+/// Time by which a spare reaches its place beside the line before it is needed, s.
 const EARLY_S: f64 = 25.0;
 
-/// Time before a drone has to leave from which on it asks to leave even without a spare, s.
+/// Time before a drone has to fly home, s, from which its relay requests to leave even without a spare.
 const DEADLINE_S: f64 = 80.0;
 
 /// Time for which a drone must hover at its waiting place before it counts as a spare. Only then is a departure
@@ -55,7 +55,7 @@ fn seconds(span: Duration) -> f64 {
 }
 
 impl Chain {
-    /// Puts the drones of `spec` that fly first at their best places, and the others on the ground.
+    /// Creates the drones of `spec`: the first drones at their best positions, the others on the ground.
     pub(super) fn begin_rotation(&mut self, spec: &RotationSpec) {
         let all = self.setup.mission.relays();
         let flying = spec.flying.clamp(1, all);
@@ -123,7 +123,7 @@ impl Chain {
         self.queue.put(Instant::ZERO, 0, QueuedEvent::Fly);
     }
 
-    /// Returns the SIR of the worst hop over relays at these places, in order; 0 without any.
+    /// Returns the linear SIR of the worst hop over relays at `places`, in order from Tx; 0 without any.
     fn worst_hop(&self, places: &[Point]) -> f64 {
         let mission = &self.setup.mission;
         let common = mission.config().common;
@@ -144,8 +144,10 @@ impl Chain {
         all.fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the SIR of the worst hop now. The data takes the best route over the relays of the chain; it may leave out relays that
-    /// leave or have just joined. The positions are the drones' own estimates: a constant error of the positions is not the chain's.
+    /// Returns the linear SIR of the worst hop now, on the best route of the data.
+    ///
+    /// The route may leave out relays that are about to leave or have just joined, at most six of them. The positions are the drones' own
+    /// estimates, without noise: a constant position error is no fault of the chain.
     fn served(&self, rotation: &Rotation, flight: &Flight) -> f64 {
         let mut fixed = Vec::new();
         let mut optional = Vec::new();
@@ -175,7 +177,7 @@ impl Chain {
         routes.fold(0.0, f64::max)
     }
 
-    /// Schedules a step of the flight soon after the setpoint of relay `index` (from 0) has changed.
+    /// Brings forward the next step of the flight if the setpoint of relay `index` (from 0) has changed.
     pub(super) fn on_setpoint(&mut self, index: usize) {
         let soon = self.now + STEP;
         let (Some(rotation), Some(flight)) = (&mut self.rotation, &self.flight) else {
@@ -200,7 +202,7 @@ impl Chain {
         }
     }
 
-    /// Moves all drones up to now, measures the SIR, and lets the pilots decide.
+    /// Moves all drones up to the present time, records the SIR, and makes the pilots' decisions.
     pub(super) fn rotate(&mut self) {
         let now = self.now;
         let (Some(mut rotation), Some(mut flight)) = (self.rotation.take(), self.flight.take())
@@ -294,7 +296,7 @@ impl Chain {
         }
     }
 
-    /// Returns drone `index` (from 0) as part of an encounter.
+    /// Describes drone `index` (from 0) for the record of a closest approach.
     fn near_drone(&self, rotation: &Rotation, flight: &Flight, index: usize) -> NearDrone {
         let duty = match rotation.drones.get(index).map(|it| &it.duty) {
             Some(Duty::Rising { .. }) => "on its way to its place beside the line",
@@ -326,7 +328,9 @@ impl Chain {
         }
     }
 
-    /// Returns true if all serving relays that stay are one chain with leases and positions.
+    /// Returns true if all serving relays are in one view, with leases and agreed positions.
+    ///
+    /// Relays that have left the chain do not count.
     fn is_whole(&self, rotation: &Rotation) -> bool {
         let members = self.members.iter().zip(&rotation.drones);
         let on: Vec<_> = members
@@ -348,7 +352,10 @@ impl Chain {
         leased && same && count && has_agreed(&on)
     }
 
-    /// Follows the setpoint or the pilot's path with drone `index` (from 0). Returns true if the drone moves.
+    /// Sets the goal of drone `index` (from 0): the relay's setpoint, or the next point of its path.
+    ///
+    /// Also switches the relay on or off if the drone arrives, and lets the drone fly home if it may leave. Returns
+    /// true if the drone moves.
     fn steer_drone(&mut self, rotation: &mut Rotation, flight: &mut Flight, index: usize) -> bool {
         let now = self.now;
         let Some(drone) = flight.drones.get_mut(index) else {
@@ -446,7 +453,8 @@ impl Chain {
         }
     }
 
-    /// Switches relay `index` (from 0) on, as a spare or as a relay that was lost.
+    /// Switches relay `index` (from 0) on. If `spare` is true, the relay waits outside of the chain; otherwise the
+    /// relay joins as a lost relay that returns.
     fn switch_on(&mut self, index: usize, spare: bool) {
         let node = u16::try_from(index + 1).unwrap_or(u16::MAX);
         self.setup.spares.retain(|other| *other != node);
@@ -457,7 +465,7 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Flies drone `index` (from 0) home from its place; `forced` if the relay may not leave yet.
+    /// Lets drone `index` (from 0) fly home. `forced` is true if its relay has no permission to leave the chain.
     fn go_home(&mut self, rotation: &mut Rotation, flight: &Flight, index: usize, forced: bool) {
         let now = self.now;
         let Some(at) = flight.drones.get(index).map(Drone::estimated_position) else {
@@ -500,7 +508,7 @@ impl Chain {
         }
     }
 
-    /// Lets the pilots send spares, request departures, and report drones that are gone.
+    /// Makes the pilots' decisions: they send spares, request departures, and report drones that are gone.
     fn decide(&mut self, rotation: &mut Rotation, flight: &Flight) {
         let now = self.now;
         let mut tired: Vec<(usize, f64)> = Vec::new();
@@ -565,7 +573,9 @@ impl Chain {
         self.report_gone(rotation, flight);
     }
 
-    /// Sends spares to the line. There is one for each drone that has to leave before a later spare could arrive.
+    /// Sends at most one spare to the line, if fewer spares wait there than are needed soon.
+    ///
+    /// A spare is needed for each drone that has to leave soon, and for each missing drone.
     fn send_spares(
         &mut self,
         rotation: &mut Rotation,
@@ -630,7 +640,9 @@ impl Chain {
         }
     }
 
-    /// Returns the serving drones next to the number of drone `index` (from 0), toward Tx and toward Rx.
+    /// Returns the nearest serving drones on both sides of drone `index` (from 0) by their numbers.
+    ///
+    /// The first is toward Tx, the second toward Rx. `None` if no drone serves on that side.
     fn gap(rotation: &Rotation, index: usize) -> [Option<usize>; 2] {
         let serves = |other: &usize| {
             rotation
@@ -674,7 +686,7 @@ impl Chain {
         }
     }
 
-    /// Switches the spares on that wait for a loss, so that they join as relays that were lost.
+    /// Switches on the relay of one waiting spare after a loss. It joins as a lost relay that returns.
     fn join_as_lost(&mut self, rotation: &Rotation) {
         let waits = |index: &usize| {
             let off = self
@@ -691,7 +703,7 @@ impl Chain {
         }
     }
 
-    /// Simulates operators who report to the relays that a lost drone has left the line.
+    /// Simulates operators: they report to a relay that the drones of lost neighbours have left the line.
     fn report_gone(&mut self, rotation: &Rotation, flight: &Flight) {
         let now = self.now;
         let is_on_line = |index: usize| {
@@ -732,7 +744,7 @@ impl Chain {
         }
     }
 
-    /// Puts the drones that take off now on the ground at their pads.
+    /// Puts the drones that take off at this step on the ground at their starting places.
     fn put_on_pads(&mut self, flight: &mut Flight) {
         for (index, pad) in std::mem::take(&mut self.take_off_from) {
             if let Some(drone) = flight.drones.get_mut(index) {
@@ -742,5 +754,5 @@ impl Chain {
     }
 }
 
-/// Time after its latest start for home at which a pilot takes a drone without permission, s.
+/// Time by which a drone without permission exceeds its latest start for home before it flies home, s.
 const RETREAT_S: f64 = 60.0;

@@ -77,7 +77,8 @@ pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
 /// Number of inputs that are run for each fuzz target.
 ///
-/// With a fixed seed they are the same each time, so this finds regressions. A long run finds new faults.
+/// With a fixed seed the inputs are the same in each run, so that the run finds regressions. A long run finds new
+/// faults.
 const EXECUTIONS: u32 = 10_000;
 
 fn step(name: impl Into<String>, command: impl Into<String>) -> Step {

@@ -49,8 +49,8 @@ type Image = (
 
 /// Firmware images whose costs are measured, with the largest permitted flash, static RAM and stack.
 ///
-/// The code that relay and ground station share costs an image with `auth` 0.4 KB of flash, and saves it 0.8 KB of
-/// stack.
+/// Relay and ground station share some code. This sharing costs an image with `auth` 0.4 KB of flash, and saves it 0.8
+/// KB of stack.
 const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",

@@ -185,9 +185,9 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     Ok([results, readme])
 }
 
-/// Returns true if the documents state their costs for the installed versions of compiler and emulator.
+/// Returns true if the costs in the documents are for the installed versions of compiler and emulator.
 ///
-/// The costs depend on both, so other versions are not compared.
+/// The costs depend on both, so costs for other versions are not compared.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
     let results = std::fs::read_to_string(root.join("examples/RESULTS.md"));
     results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))

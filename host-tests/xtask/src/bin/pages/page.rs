@@ -28,7 +28,7 @@ pub(crate) struct Block {
     pub(crate) kind: Kind,
     /// True for a block `console`: lines that begin with `$ ` are commands, the others are output.
     is_console: bool,
-    /// True if numbers in the output may differ from those on the page, such as times.
+    /// True if numbers in the output, such as times, are permitted to differ from those on the page.
     pub(crate) noisy: bool,
     lines: Vec<String>,
 }
@@ -49,7 +49,7 @@ impl Block {
         commands.join("\n")
     }
 
-    /// Returns the lines of output that the block expects, without commands.
+    /// Returns the expected lines of output in a code block of a page, without the lines of commands.
     pub(crate) fn printed(&self) -> Vec<&str> {
         let lines = self.lines.iter().map(String::as_str);
         match self.kind {
