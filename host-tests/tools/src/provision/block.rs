@@ -331,7 +331,7 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
     let dead = ms(dead_after);
     let own = section.dead_after_ms.filter(|_| given_ms.is_none());
     if let Some(after) = own.filter(|after| *after != dead) {
-        let why = "the firmware always uses three times probe_after_ms";
+        let why = "the firmware always uses three times probe_after_ms as dead_after_ms";
         return Err(refuse("dead_after_ms", after, dead, why));
     }
     // The explicit default and 0 give the same block.
