@@ -53,7 +53,7 @@ error_texts!(ChannelError {
     Carrier => "carrier frequency must be within 1e6 to 1e12 Hz",
     ExcessLoss => "excess losses, given as factors, must be within 1 to 1e20 (0 to 200 dB)",
     LossOrder => "the excess loss without line of sight must be at least the excess loss with line of sight",
-    Weight => "weight of line of sight must be within 0 to 1",
+    Weight => "the weight of the line-of-sight loss in the mean loss must be within 0 to 1",
 });
 
 impl Channel {

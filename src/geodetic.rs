@@ -127,9 +127,9 @@ pub enum LineError {
 
 error_texts!(LineError {
     Distance => "the mission's distance must be equal to the distance between its sites (positions of Tx and Rx on earth); a mission without sites uses the sites loaded before flight",
-    Sites => "the sites must have valid coordinates, 10 m to 100 km apart",
+    Sites => "Tx and Rx must have valid coordinates, and be 10 m to 100 km apart",
     Altitude => "the mission's altitudes must be within this relay's geofence",
     Lateral => "the mission's lateral range must be within this relay's geofence",
-    Length => "the mission's distance must be within this relay's geofence",
-    Slots => "the mission's fitted slots (fitted_gap above 0) need the method joint and a known interferer, without listen",
+    Length => "the mission's distance must be at most the greatest x of this relay's geofence, or the distance of the mission loaded before flight",
+    Slots => "the mission's fitted_gap above 0 (time slots fitted to the hops) needs the method joint and a known interferer, and listen must be None",
 });

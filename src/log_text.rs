@@ -110,10 +110,14 @@ fn text(event: Event) -> defmt::Str {
         ),
         Event::Adopted => defmt::intern!("the chain flies the uploaded mission"),
         Event::MayLeaveTold { .. } => {
-            defmt::intern!("may fly away; when it has left, report to this relay that it is gone")
+            defmt::intern!(
+                "has permission to leave; when its drone has left, report to this relay that the drone is gone"
+            )
         }
         Event::MayLeave => {
-            defmt::intern!("the chain works without this relay now: this drone may fly away")
+            defmt::intern!(
+                "the chain works without this relay now: this drone has permission to leave"
+            )
         }
         Event::EnduranceUnknown => defmt::intern!("unknown endurance: watch the battery"),
         Event::AtReserve => defmt::intern!("battery at the reserve: fly this drone home"),
@@ -149,13 +153,13 @@ mod autopilot {
     });
 
     texts!(FlightMode {
-        FlightMode::Companion => "still OFFBOARD or GUIDED",
+        FlightMode::Companion => "OFFBOARD or GUIDED, unchanged",
         FlightMode::Sticks => "manual",
         FlightMode::Hold => "Hold or LOITER",
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        FlightMode::Other => "other, for example mission or take-off",
+        FlightMode::Other => "another mode, for example mission or take-off",
     });
 
     impl defmt::Format for Release {

@@ -146,7 +146,7 @@ impl FileOptions {
             .find_map(|(option, key)| Some((key, file_value(option)?.1.as_ref()?)));
         key.map_or(Ok(()), |(key, value)| {
             Err(format!(
-                "companion.{key} = {}: needs companion.autopilot, a tty, or {FORM}; add it, or leave {key} out",
+                "companion.{key} = {}: needs companion.autopilot (a tty, or {FORM}): add companion.autopilot, or leave {key} out",
                 value.to_string_lossy()
             ))
         })

@@ -295,10 +295,10 @@ impl Companion {
                 tty.baud()
             ),
             (Received::Noise, port) => format!(
-                "the bytes received at {} are not MAVLink 2: check that {} and sends MAVLink 2",
+                "the bytes received at {} are not MAVLink 2: check that {}, and that the autopilot sends MAVLink 2",
                 self.plan.port,
                 match port {
-                    Port::Udp(_) => "this is the address of the autopilot, which".to_owned(),
+                    Port::Udp(_) => "this is the address of the autopilot".to_owned(),
                     Port::Tty(tty) => format!("the autopilot's port has {} bit/s", tty.baud()),
                 }
             ),
@@ -450,13 +450,13 @@ const fn cause(cause: ReleaseCause) -> &'static str {
 
 const fn mode(mode: FlightMode) -> &'static str {
     match mode {
-        FlightMode::Companion => "still OFFBOARD or GUIDED",
+        FlightMode::Companion => "OFFBOARD or GUIDED, unchanged",
         FlightMode::Sticks => "manual",
         FlightMode::Hold => "Hold or LOITER",
         FlightMode::Brake => "BRAKE",
         FlightMode::Return => "RTL",
         FlightMode::Land => "LAND",
-        _ => "other, for example mission or take-off",
+        _ => "another mode, for example mission or take-off",
     }
 }
 
@@ -507,7 +507,7 @@ const fn mistrusted(why: Mistrust) -> &'static str {
         Mistrust::Old => {
             "signs with an old timestamp, so its frames are ignored: check the autopilot's clock"
         }
-        _ => "is not trusted",
+        _ => "sends frames that are not trusted",
     }
 }
 

@@ -125,9 +125,9 @@ impl Battery {
         {
             self.told_at = now;
             let text = match departure {
-                Departure::Requested => Some("asks the chain to close up"),
-                Departure::Outside => Some("waits for the others to close up"),
-                Departure::Free => Some("may fly away now"),
+                Departure::Requested => Some("asks others to fill its place"),
+                Departure::Outside => Some("waits for others to fill its place"),
+                Departure::Free => Some("has permission to leave"),
                 Departure::Member => Some("is in the chain, or joins it"),
                 _ => refusal,
             };
@@ -158,9 +158,9 @@ impl Battery {
             "stay" => {
                 relay.stay(now);
                 if relay.is_at_reserve() {
-                    "this relay stays in the chain, as the operator commands; only the way home and the reserve are left: fly the drone home"
+                    "this relay stays in the chain, as the operator commands; the battery has only the way home and the reserve left: fly the drone home"
                 } else if relay.endurance_limit_s().is_some() {
-                    "this relay stays in the chain, as the operator commands, until half of its time of flight beyond the way home has passed, or longer, until its usual limit"
+                    "this relay stays in the chain, as the operator commands; it asks again to leave when half of its remaining time of flight (without the way home) has passed, or at its usual limit if that is later"
                 } else {
                     "this relay stays in the chain, as the operator commands"
                 }
@@ -202,8 +202,8 @@ const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
         Departure::NeedsGuard => "refused: no guard",
         Departure::NeedsChannel => "refused: needs a shared radio",
-        Departure::NeedsQuorum => "refused: others lack a quorum",
-        Departure::WideGap => "refused: gap in the numbers",
+        Departure::NeedsQuorum => "refused: others would lack a quorum",
+        Departure::WideGap => "refused: too many absent relays",
         Departure::Blocked => "refused: neighbours lack a link",
         _ => return None,
     })
@@ -232,7 +232,7 @@ const fn describe(departure: Departure) -> &'static str {
             "this relay asks to leave the chain, and holds its position until the leader's order"
         }
         Departure::NeedsGuard => {
-            "this relay asks to leave and is refused: without --positions or --autopilot its neighbours would fly close to it"
+            "this relay asks to leave and is refused: without --positions or --autopilot no guard keeps its neighbours away from this drone"
         }
         Departure::NeedsChannel => {
             "this relay asks to leave and is refused: over --upstream and --downstream its neighbours do not receive each other, use --shared"
@@ -241,7 +241,7 @@ const fn describe(departure: Departure) -> &'static str {
             "this relay asks to leave and is refused for now: the remaining relays would have no quorum"
         }
         Departure::WideGap => {
-            "this relay asks to leave and is refused for now: the numbers of its neighbours differ by more than four"
+            "this relay asks to leave and is refused for now: too many relays beside it are absent (the numbers of its neighbours differ by more than four)"
         }
         Departure::Blocked => {
             "this relay asks to leave and is refused for a minute: its neighbours do not receive each other"
@@ -250,9 +250,11 @@ const fn describe(departure: Departure) -> &'static str {
             "this relay waits outside of the chain as a spare, until the leader calls it"
         }
         Departure::Outside => {
-            "this relay is outside of the chain and holds its position until the others have closed up"
+            "this relay is outside of the chain and holds its position until the other relays have filled its place"
         }
-        Departure::Free => "this drone may fly away; its relay has no place in the chain",
-        _ => "the departure has another state",
+        Departure::Free => {
+            "this drone has permission to leave; its relay has no place in the chain"
+        }
+        _ => "the relay's departure is in a state that this program does not know",
     }
 }

@@ -97,7 +97,7 @@ impl Datagrams {
             );
         }
         format!(
-            "{peer} (from local port {local}): check that the autopilot is switched on and sends to local port {local}; a PX4 sends only to the first port that has sent to it: restart the PX4, or give that first port as LOCAL in udp:HOST:PORT@LOCAL"
+            "{peer} (from local port {local}): check that the autopilot is switched on and sends to local port {local}. A PX4 answers only the first port that has sent to it: restart the PX4, or give that port as LOCAL in udp:HOST:PORT@LOCAL"
         )
     }
 

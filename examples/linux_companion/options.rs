@@ -239,7 +239,7 @@ impl BatteryOptions {
             return Ok(());
         }
         Err(format!(
-            "--flight-time {full}: must be above {least}, which is --reserve {reserve} and {replacement} s of a replacement"
+            "--flight-time {full}: must be above {least} s, the sum of --reserve {reserve} s and {replacement} s for the replacement of this relay"
         ))
     }
 }

@@ -57,9 +57,9 @@ impl Positions {
             Ok(Line::Endurance(times)) => endurance_s = Some(times),
             Err(why) => {
                 let expected = if *listens {
-                    "x_m y_m altitude_m [POWER], receiver POWER or endurance SECONDS HOME"
+                    "one of `x_m y_m altitude_m [POWER]`, `receiver POWER`, `endurance SECONDS HOME` (remaining time of flight and way home, s)"
                 } else {
-                    "x_m y_m altitude_m or endurance SECONDS HOME"
+                    "one of `x_m y_m altitude_m`, `endurance SECONDS HOME` (remaining time of flight and way home, s)"
                 };
                 bad.refuse(
                     now,

@@ -109,7 +109,7 @@ impl Report {
         self.log.line(
             Instant::ZERO,
             "restored",
-            "this relay's votes on the chain's membership before this start were read from --view-file; remove that file before another flight",
+            "this relay's earlier votes on the chain's membership were read from --view-file; on the ground, remove that file before the next flight",
         );
     }
 
@@ -158,13 +158,13 @@ impl Report {
             ),
             Event::MayLeave => tell(
                 "may leave",
-                "the chain works without this relay now, so this drone may fly away",
+                "the chain works without this relay now, so this drone has permission to leave",
             ),
             Event::EnduranceUnknown => self.log.event(
                 now,
                 "endurance unknown",
                 json!({ "leaves_below_s": relay.endurance_limit_s() }),
-                "the drone's remaining time of flight is invalid, or has not been received for 10 s; the last confirmed one counts down, if there was one; watch the battery",
+                "the drone's remaining time of flight is invalid, or has not been received for 10 s; the relay counts down from the last valid value, if there is one; watch the battery",
             ),
             Event::AtReserve => self.log.event(
                 now,
@@ -233,7 +233,7 @@ impl Report {
             Event::MayLeaveTold { .. } => say(
                 "told",
                 format_args!(
-                    "{name} {toward} may fly away; when it has left, send the command `clear-lost` with its number"
+                    "{name} {toward} has permission to leave; when its drone has left, send the command `clear-lost` with its number"
                 ),
             ),
             Event::NotHeard { .. } => say(
@@ -370,7 +370,7 @@ impl Report {
             .chain(back.into_iter().filter(|_| end > begin));
         let used = used.collect::<Vec<_>>().join(", ");
         let text = format_args!(
-            "time slots as shares of the frame: {used}; the chain carries {:.6} bit/s/Hz",
+            "time slots, as shares of the period of all slots: {used}; the chain carries {:.6} bit/s/Hz",
             Exact(slots.bits_per_hz)
         );
         self.log.event(now, "slots", status::slots(slots), text);

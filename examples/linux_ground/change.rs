@@ -85,7 +85,9 @@ fn values(basis: &Basis) -> Vec<(&'static str, String)> {
         (
             "time slots",
             if fitted_gap > 0.0 {
-                format!("fitted to the data rate of each hop, SNR gap {fitted_gap}")
+                format!(
+                    "of a length fitted to the data rate of each hop; SNR gap to the Shannon limit: factor {fitted_gap}"
+                )
             } else {
                 "equal for all hops".to_owned()
             },

@@ -127,7 +127,10 @@ fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'sta
             "in the air",
         ),
         (position.is_none(), "no position"),
-        (neighbours != expected, "neighbours are not the next relays"),
+        (
+            neighbours != expected,
+            "neighbours are not the relays with the next numbers",
+        ),
         (report.silent.contains(&true), "a neighbour is silent"),
         (phase == Phase::NoQuorum, "no quorum"),
         (phase == Phase::Infeasible, "no feasible positions"),

@@ -134,7 +134,7 @@ impl Desk {
         let reply = match task.filter(|_| parts.plan.options.stand) {
             Some((task, body)) => self.perform(now, log, &mut parts, task, &body.to_string(), by),
             None => Err(format!(
-                "command {line:?}: must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, which need a station with --stand, or empty to read the state"
+                "command {line:?}: must be empty (reads the state) or, for a station with --stand, `preview NAME=VALUE ...` or `upload NUMBER DIGEST`"
             )),
         };
         let is_done = reply.is_ok();

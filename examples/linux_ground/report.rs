@@ -56,7 +56,7 @@ pub(crate) fn progress(log: &Log, now: Instant, upload: &Upload, progress: Progr
             "adopted",
             json!({ "version": version, "flown_by": 1, "relays": all }),
             format_args!(
-                "relay {by} flies version {version} of the mission, as the first of {all} relays; the station asks relay {by} how many relays fly it, until all do"
+                "relay {by} is the first of {all} relays to report that it flies version {version} of the mission; the station asks relay {by} again until all relays fly this version"
             ),
         ),
         Progress::Flown { by, view, relays } => log.event(
@@ -180,7 +180,7 @@ impl FenceViolation {
         };
         let [least, most] = range_m;
         let what = format!(
-            "{what} {is} m: must be within {least} to {most} m, the relays' geofence by {options} of the mission loaded before flight"
+            "{what} {is} m: must be within {least} to {most} m (the relays' geofence, set before flight by {options})"
         );
         Some(Self {
             what,
@@ -221,7 +221,7 @@ pub(crate) fn timed_out(plan: &Plan, version: u16, progress: Progress, ground: &
             )
         }
         Progress::Adopted { by } => format!(
-            "relay {by} flies version {version} of the mission, but has not reported that all other relays do, too; they may still adopt it"
+            "relay {by} flies version {version} of the mission, but has not reported that all relays fly it; the other relays may still adopt it"
         ),
         // The ground has only asked so far.
         Progress::Idle => format!(

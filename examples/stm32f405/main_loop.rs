@@ -62,7 +62,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
             #[cfg(panic_on_purpose)]
             assert!(
                 relay.setpoint().is_none_or(|place| place.x_m < 1e6),
-                "put there on purpose"
+                "deliberate panic of the check: it must not link"
             );
             if let Some(autopilot) = &mut drone.autopilot {
                 autopilot.handle_event(event);

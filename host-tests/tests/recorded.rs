@@ -310,7 +310,7 @@ fn one_relay_agrees_with_brute_force() {
 #[test]
 fn an_unknown_scene_is_an_error_and_rules_are_checked() {
     let error = optimum(&paper(7, 123.0, 4.0), BAND, &[]).unwrap_err();
-    assert!(error.to_string().contains("no recorded optimum"), "{error}");
+    assert!(error.to_string().contains("no stored optimum"), "{error}");
     let link = Link {
         min_separation_m: 50.0,
         ..Link::paper(2)

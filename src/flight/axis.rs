@@ -69,11 +69,11 @@ impl core::fmt::Display for AxisError {
             Self::Rx(at) => site(f, "rx", at),
             Self::TooShort { distance_m } => write!(
                 f,
-                "the sites are {distance_m:.2} m apart: must be within {SHORTEST_M} to {LONGEST_M} m"
+                "Tx and Rx are {distance_m:.2} m apart: must be within {SHORTEST_M} to {LONGEST_M} m"
             ),
             Self::TooLong { distance_m } => write!(
                 f,
-                "the sites are {distance_m:.0} m apart: must be within {SHORTEST_M} to {LONGEST_M} m"
+                "Tx and Rx are {distance_m:.0} m apart: must be within {SHORTEST_M} to {LONGEST_M} m"
             ),
         }
     }

@@ -63,7 +63,7 @@ impl core::fmt::Display for CourseError {
             Self::Axis(error) => error.fmt(f),
             Self::Distance(along_m) => write!(
                 f,
-                "the sites are {along_m} m apart: the mission's distance must be the same"
+                "Tx and Rx are {along_m} m apart: the mission's distance must be the same"
             ),
         }
     }

@@ -166,8 +166,8 @@ error_texts!(MissionError {
     Reverse => "reverse (SIR required from Rx to Tx, as a share of the SIR from Tx to Rx) must be within 0 to 1",
     ReverseFeature => "a reverse above 0 needs the cargo feature `reverse`",
     RxPower => "rx_power_w must be within 1e-6 to 1e6",
-    FittedGap => "fitted_gap (SNR gap of fitted slots, linear) must be 0 for equal slots, or within 1 to 1000",
-    FittedFeature => "a fitted_gap above 0 (fitted slots) needs the cargo feature `altitude`",
+    FittedGap => "fitted_gap must be 0 (equal time slots), or within 1 to 1000 (time slots fitted to the hops; linear SNR gap to the Shannon limit)",
+    FittedFeature => "a fitted_gap above 0 (time slots fitted to the hops) needs the cargo feature `altitude`",
     Tolerance => "tolerance must be within 1e-6 to 0.1",
 });
 

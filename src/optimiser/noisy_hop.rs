@@ -316,7 +316,7 @@ mod tests {
                         let far = ours.zip(theirs).map(|(a, b)| (a - b).abs());
                         let agrees =
                             ours.is_some() == theirs.is_some() && far.is_none_or(|far| far < 0.06);
-                        assert!(agrees, "{ours:?} {theirs:?} of {hop:?}");
+                        assert!(agrees, "result {ours:?}, expected {theirs:?}, hop {hop:?}");
                         found += u32::from(ours.is_some());
                     }
                 }

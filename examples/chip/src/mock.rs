@@ -128,7 +128,7 @@ impl MockRegisters {
         assert_eq!(
             config >> 28 & 0b111,
             2,
-            "PLLR, or reserved, as at the reset"
+            "bits 28 to 30 of PLLCFGR (PLLR or reserved) must keep their reset value"
         );
         vco / (2 + 2 * (config >> 16 & 0b11))
     }
@@ -265,14 +265,17 @@ impl Registers for MockRegisters {
                 );
                 assert!(changed & 0xC000 == 0 || !self.is_pll_on());
                 let raised = changed & value;
-                assert!(raised & 0x3_0000 == 0 || self.over_drive, "no over-drive");
+                assert!(
+                    raised & 0x3_0000 == 0 || self.over_drive,
+                    "this chip has no over-drive"
+                );
                 assert!(
                     raised >> 17 & 1 == 0 || value >> 16 & 1 != 0,
-                    "ODEN comes first"
+                    "ODEN (over-drive enable) must be set before ODSWEN (over-drive switching)"
                 );
                 assert!(
                     !(changed & 0x3_0000 != 0 && self.is_on_pll()),
-                    "at full speed"
+                    "the over-drive was changed while the PLL is the clock"
                 );
             }
             Register::ClockControl => {

@@ -371,7 +371,7 @@ impl Drone {
         }
         if companion {
             return Err(
-                "OFFBOARD or GUIDED: choose another mode; the pilot chooses it in the air"
+                "the mode is OFFBOARD or GUIDED: choose another mode now; the pilot chooses OFFBOARD or GUIDED in the air"
                     .to_owned(),
             );
         }
@@ -398,7 +398,7 @@ impl Drone {
         let Some(place) = self.axis.place(at) else {
             let away_m = self.axis.away_m(at).unwrap_or(f64::INFINITY);
             return Err(format!(
-                "the drone is {:.0} km from the line between the sites: are these the sites of this flight?",
+                "the drone is {:.0} km from the line from Tx to Rx: are these the positions of Tx and Rx for this flight?",
                 away_m / 1e3
             ));
         };
@@ -407,7 +407,7 @@ impl Drone {
             let along_m = x_m.clamp(0.0, self.axis.distance_m());
             let beyond_m = (x_m - along_m).hypot(place.y_m.into());
             let text = format!(
-                "the drone is {beyond_m:.0} m from the line between the sites; its planned place is unknown, because the file has no [plan]"
+                "the drone is {beyond_m:.0} m from the line from Tx to Rx; its planned position is unknown, because the file has no [plan]"
             );
             return if beyond_m <= f64::from(self.within_m) {
                 Ok(text)

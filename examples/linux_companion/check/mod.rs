@@ -100,7 +100,7 @@ pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
             lines.push((
                 "epoch",
                 Ok(format!(
-                    "{used} is used by this check, the flight uses a later one"
+                    "{used} is used by this check; the flight will use a later epoch"
                 )),
             ));
             Ok(auth)

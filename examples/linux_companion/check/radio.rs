@@ -301,7 +301,7 @@ impl Radio {
                 Ok("no flying relay was received".to_owned())
             } else {
                 Err(format!(
-                    "the chain may fly: these relays were received, and did not report that their drones are on the ground: {}; check before flight only",
+                    "the chain is possibly in flight: these relays were received, and did not report that their drones are on the ground: {}; use --check only before flight",
                     flying.join(", ")
                 ))
             },

@@ -122,7 +122,7 @@ pub(crate) fn off_course(error: CourseError) {
     match error {
         CourseError::Axis(error) => error!("configuration refused: sites: {}", error),
         CourseError::Distance(along) => error!(
-            "configuration refused: the sites are {=f64} m apart: the mission's distance must be the same",
+            "configuration refused: Tx and Rx are {=f64} m apart: the mission's distance must be the same",
             along
         ),
         other => error!("configuration refused: sites: {}", other),
@@ -230,7 +230,7 @@ pub(crate) fn refused(error: ConfigError) {
         }
         ConfigError::Fitted => {
             error!(
-                "configuration refused: a fitted_gap above 0 (fitted slots) needs the method joint and a known interferer"
+                "configuration refused: a fitted_gap above 0 (time slots fitted to the hops) needs the method joint and a known interferer"
             );
         }
         ConfigError::Interferer => {

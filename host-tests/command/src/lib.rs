@@ -176,7 +176,7 @@ pub fn file(text: &str) -> Result<PathBuf, String> {
     match text {
         "" => Err("must be the name of a file".to_owned()),
         "-" => Err(
-            "must be the name of a file, because standard output has the report; for a file named - give ./-"
+            "must be the name of a file: standard output is used for the report; a file whose name is - is written ./-"
                 .to_owned(),
         ),
         name => Ok(name.into()),

@@ -89,7 +89,9 @@ fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
         return;
     }
     let Some((&tag, body)) = opened.body.split_first() else {
-        frame.refusal = Some(Refusal::Malformed("there is no body".to_owned()));
+        frame.refusal = Some(Refusal::Malformed(
+            "the body of the message is empty".to_owned(),
+        ));
         return;
     };
     let Some(Layout { name, fields }) = format.message(tag) else {
@@ -104,7 +106,7 @@ fn open<'f>(format: &'f Format, plain: &[u8], frame: &mut Frame<'f>) {
         (Err(MessageError::Value), None) => Some(Refusal::Range),
         (_, Some(error)) => Some(Refusal::Malformed(error)),
         (Err(_), None) => Some(Refusal::Malformed(
-            "it is not in the canonical encoding".to_owned(),
+            "the message is not in the canonical encoding".to_owned(),
         )),
     };
 }

@@ -117,5 +117,5 @@ pub fn bytes(digits: &str) -> Option<Vec<u8>> {
 
 fn hex<'d, D: Deserializer<'d>>(from: D) -> Result<Vec<u8>, D::Error> {
     let digits = String::deserialize(from)?;
-    bytes(&digits).ok_or_else(|| D::Error::custom(format!("no bytes: {digits}")))
+    bytes(&digits).ok_or_else(|| D::Error::custom(format!("not hexadecimal bytes: {digits}")))
 }

@@ -28,21 +28,23 @@ impl Rest<'_> {
         for shift in (0..64).step_by(7) {
             let byte = self.byte()?;
             if byte == 0 && shift > 0 {
-                return Err("a varint in it is not in the shortest form".to_owned());
+                return Err("a varint in the message is not in the shortest form".to_owned());
             }
             number |= u64::from(byte & 0x7F) << shift;
             if byte < 0x80 {
                 return Ok(number);
             }
         }
-        Err("a varint in it is too long".to_owned())
+        Err("a varint in the message is too long".to_owned())
     }
 
     fn flag(&mut self, what: &str) -> Result<bool, String> {
         match self.byte()? {
             0 => Ok(false),
             1 => Ok(true),
-            other => Err(format!("its {what} is {other:02x}: must be 00 or 01")),
+            other => Err(format!(
+                "a value of type {what} begins with {other:02x}: must be 00 or 01"
+            )),
         }
     }
 }
@@ -56,7 +58,7 @@ impl Rest<'_> {
 pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Fields<'f>), Refusal> {
     let (&tag, body) = body
         .split_first()
-        .ok_or_else(|| Refusal::Malformed("there is no body".to_owned()))?;
+        .ok_or_else(|| Refusal::Malformed("the body of the message is empty".to_owned()))?;
     let layout = format.message(tag).ok_or(Refusal::UnknownTag(tag))?;
     let (fields, error) = walk(&layout.fields, body);
     match error {
@@ -120,7 +122,7 @@ fn one<'f>(kind: &'f Kind, rest: &mut Rest<'_>) -> Result<Value<'f>, String> {
         Kind::List(most, of) => {
             let count = rest.varint()?;
             if count > *most {
-                return Err(format!("its count is {count}: must be 0 to {most}"));
+                return Err(format!("a list has the count {count}: must be 0 to {most}"));
             }
             several(count, of, rest)?
         }

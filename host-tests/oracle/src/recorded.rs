@@ -198,7 +198,7 @@ pub fn optimum(
     found.map(|record| record.best.clone()).ok_or_else(|| {
         let scene = format!("{link:?}, {corridor:?}, {held:?}");
         Error::other(format!(
-            "no recorded optimum of this scene; SEED and COUNT can select recorded ones only: {scene}"
+            "no stored optimum of this scene; SEED and COUNT must select only scenes with a stored optimum: {scene}"
         ))
     })
 }

@@ -107,7 +107,7 @@ function tell() {
   const both = ways();
   list(values.length === chain.length + 1 ? rows(both, ["Tx", ...chain.map((relay) => relay.relay), "Rx"]) : []);
   byId("ways").hidden = both.back.length === 0;
-  byId("ways").textContent = `Bars for both directions. A hop back to Tx needs only ${both.reverse} times the SIR of a hop to Rx, so its bar shows its SIR divided by ${both.reverse}. A dashed hop is worse on the way back.`;
+  byId("ways").textContent = `Two bars for each hop: toward Rx, and back to Tx. The way back needs only ${both.reverse} times the SIR, so the bar of the way back shows its SIR divided by ${both.reverse}. A dashed hop is worse on the way back.`;
   mark(tick ? tick.told : Infinity);
   byId("player").hidden = player.ticks.length < 2;
   byId("play").textContent = player.playing ? "Pause" : "Play";

@@ -10,7 +10,7 @@ const limitedBy = (direction) => ({ forward: "limited by the direction to Rx", b
 
 function summary(report) {
   if (report.sir === undefined) return "The relays have not agreed on positions.";
-  const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the optimum with the interferer known.`;
+  const share = report.share_of_optimum === undefined ? "" : ` ${(100 * report.share_of_optimum).toFixed(1)} % of the best SIR possible if the interferer were known.`;
   const ways = report.reverse === undefined ? "" : `, ${limitedBy(report.worst_direction)},`;
   return `Worst hop: SIR ${report.sir.toPrecision(5)} (${decibels(report.sir)})${ways} with ${report.relays.length} relays; ${report.messages} messages, ${report.bytes} bytes, ${report.virtual_s.toFixed(3)} s of virtual time.${share}`;
 }

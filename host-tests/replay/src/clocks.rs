@@ -142,7 +142,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
         && let Some(steps) = without_steps(&mut first.frames)
     {
         warnings.push(format!(
-            "{}: its clock is that of the flight, but steps {steps}: left out; name a file with a steady clock first",
+            "{}: its clock, the reference for all files, jumps {steps}: corrected; name a file with a steady clock first",
             first.name
         ));
     }
@@ -196,7 +196,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     frames.retain(|frame| known.insert(frame.wire.clone()));
     // Another clock may step after its last common frame.
     if let Some(steps) = without_steps(&mut frames) {
-        warnings.push(format!("the time of the flight steps {steps}: left out"));
+        warnings.push(format!("the time of the flight jumps {steps}: corrected"));
     }
     Ok(Merged {
         frames,
@@ -228,7 +228,7 @@ fn without_steps(frames: &mut [Frame]) -> Option<String> {
     }
     let all = match steps.len() {
         1 => String::new(),
-        all => format!(" ({all} steps in all)"),
+        all => format!(" ({all} jumps in all)"),
     };
     let after = times.get(first - 1)? - times.first()?;
     Some(format!(

@@ -126,11 +126,14 @@ fn report(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String {
     row(
         "Availability",
         match flight.available {
-            None => "0 %: at no time all relays had agreed and reported".to_owned(),
+            None => {
+                "0 % of the time: there was no time at which all relays had agreed and reported"
+                    .to_owned()
+            }
             Some((at, shares)) => {
                 let [every, members] = shares.map(|share| (share * 1_000.0).floor() / 10.0);
                 format!(
-                    "{every:.1} % of the time since {}: all {} relays had agreed, and reported within 5 s; {members:.1} %: as many as the last agreed membership",
+                    "{every:.1} % of the time since {}: all {} relays had agreed, and had reported within 5 s; {members:.1} % of the time: as many relays as the last view has members",
                     time(at),
                     flight.relays
                 )

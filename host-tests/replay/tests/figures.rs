@@ -121,7 +121,7 @@ fn steps_of_the_first_clock_are_left_out_with_a_warning() {
         panic!("{:?}", merged.warnings)
     };
     let expected =
-        "steps by +1800000001.0 s, 59 s after its first frame (2 steps in all): left out";
+        "jumps by +1800000001.0 s, 59 s after its first frame (2 jumps in all): corrected";
     assert!(warning.contains(expected), "{warning}");
     let [first, last] = [0, 119].map(|index| merged.frames[index].at);
     assert!((last - first - 117.0).abs() < 1e-3, "{first} {last}");
@@ -137,7 +137,7 @@ fn steps_of_another_clock_without_common_frames_are_left_out_with_a_warning() {
     let merged = clocks::merge(vec![recording(1, seconds(1e9)), other]).unwrap();
     assert!(
         merged.warnings.iter().any(|it| it
-            .starts_with("the time of the flight steps by +999999941.0 s, 59 s after its first")),
+            .starts_with("the time of the flight jumps by +999999941.0 s, 59 s after its first")),
         "{:?}",
         merged.warnings
     );

@@ -334,7 +334,8 @@ pub(super) fn table_of(file: &str, text: &str) -> Result<Table, ScenarioError> {
         )
     })?;
     if table.is_empty() {
-        let allowed = "at least [geometry], [power] and [[interferer]] or [field]".to_owned();
+        let allowed =
+            "at least [geometry], [power], and one of [[interferer]] and [field]".to_owned();
         return Err(fail(None, None, Problem::Empty, allowed));
     }
     Ok(table)

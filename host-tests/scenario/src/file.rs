@@ -621,9 +621,8 @@ pub(super) fn line(
     match distance_m {
         #[expect(clippy::cast_possible_truncation, reason = "as a mission has it")]
         Some(given) if !line.axis.is_of(given as f32) => {
-            let allowed = format!(
-                "{along:.3} m, the distance between the two sites of [site], or no distance_m"
-            );
+            let allowed =
+                format!("{along:.3} m, the distance from Tx to Rx of [site], or no distance_m");
             Err(mistake(
                 file,
                 "geometry.distance_m",
@@ -851,7 +850,8 @@ fn source_areas(
             for (key, power) in powers {
                 if let Some(RawPowers::Range([low, high])) = power {
                     let value = format!("[{}, {}]", number(low), number(high));
-                    let allowed = "one number, or a range together with area".to_owned();
+                    let allowed =
+                        "one number; or a range, if the key area is also given".to_owned();
                     let key = format!("{table}{key}");
                     return Err(mistake(
                         file,
@@ -870,7 +870,7 @@ fn source_areas(
             if area.contains([x_m, 0.0]) {
                 let value = format!("with {site} (x = {} m, y = 0)", number(x_m));
                 let allowed = format!(
-                    "an area without Tx and Rx, because an interferer at {site} leaves no SIR there"
+                    "an area that contains neither Tx nor Rx, because an interferer at {site} would make the SIR 0 there"
                 );
                 return Err(mistake(
                     file,
@@ -968,7 +968,7 @@ fn near_line(
             None => "",
         };
         let allowed = format!(
-            "a position up to {} m from the line between the two sites of [site] and from its ends{swapped}",
+            "a position at most {} m beside the line from Tx to Rx of [site], and at most that far beyond its ends{swapped}",
             Axis::AROUND_M
         );
         mistake(file, key, value, Problem::OutOfRange, allowed)
@@ -1145,7 +1145,7 @@ fn on_earth(
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
     let Some(place) = point.and_then(|point| line.axis.place(point)) else {
         let allowed = format!(
-            "a position up to {} m from the line between the two sites of [site] and from its ends",
+            "a position at most {} m beside the line from Tx to Rx of [site], and at most that far beyond its ends",
             Axis::AROUND_M
         );
         return fail(Problem::OutOfRange, &allowed);
@@ -1161,12 +1161,12 @@ fn on_earth(
         let off_db = room.height_error_db(x_m, y_m, above_m);
         if off_db > MAX_HEIGHT_ERROR_DB {
             let value = format!(
-                "{}, {above_m:.1} m above the straight line between the sites,",
+                "{}, {above_m:.1} m above the straight line from Tx to Rx,",
                 number(amsl_m)
             );
             let allowed = format!(
                 "no amsl_m, or a height that changes the interference by at most {MAX_HEIGHT_ERROR_DB} dB everywhere; \
-                 this one changes it by {off_db:.1} dB, because interferers are computed as being on the ground"
+                 this one changes it by {off_db:.1} dB, because interferers are computed as if on the ground"
             );
             let key = format!("{table}amsl_m");
             return Err(mistake(

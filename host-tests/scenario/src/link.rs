@@ -252,7 +252,9 @@ impl Radio {
             }
             Access::Channels => format!("each of the {hops} hops has its own frequency"),
             Access::Fitted => {
-                format!("{hops} hops share one frequency in time slots as long as each hop needs")
+                format!(
+                    "{hops} hops share one frequency in time slots of different length, fitted to each hop"
+                )
             }
         }
     }

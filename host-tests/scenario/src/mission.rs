@@ -63,7 +63,7 @@ impl fmt::Display for Refusal {
                 f32::from(relays.saturating_sub(1)) * apart_m
             ),
             Self::Steps => f.write_str(
-                "link.access = \"fitted\" with link.steps: relays with the method joint fit slots to Shannon's formula only; use link.gap_db in place of link.steps, or another link.access"
+                "link.access = \"fitted\" with link.steps: the method joint computes slot lengths only by Shannon's formula; use link.gap_db in place of link.steps, or another link.access"
             ),
             Self::Mission(error) => error.fmt(f),
             Self::Channel(error) => error.fmt(f),

@@ -153,7 +153,8 @@ pub(crate) const WRONG_PASSWORD: Answer = Answer::Refused(401, "Wrong Password")
 /// Refusal of requests after too many wrong passwords.
 pub(crate) const TOO_MANY: Answer = Answer::Refused(429, "Too Many Wrong Passwords");
 
-const NO_TOKEN: Answer = Answer::Refused(403, "Forbidden: Without The Token Of This Start");
+const NO_TOKEN: Answer =
+    Answer::Refused(403, "Forbidden: Token Of An Earlier Start, Reload The Page");
 const BODY_TOO_LARGE: Answer = Answer::Refused(413, "Content Too Large");
 
 const MALFORMED: Answer = Answer::Refused(400, "Bad Request");

@@ -293,7 +293,7 @@ impl StationView {
         let Frames { received, rejected } = self.frames;
         if quiet >= SILENT_AFTER && !self.known.is_empty() {
             let note = format!(
-                " for {} s: {received} frames received before, {rejected} rejected",
+                " for {} s; {received} frames received until then, {rejected} rejected",
                 quiet.as_micros() / 1_000_000
             );
             add(Reason::ChainSilent, 0, Vec::new(), note);

@@ -33,7 +33,7 @@ function values() {
 }
 
 /** Returns the text about a task that has failed. */
-const failure = (error) => (error.name === "TimeoutError" ? `No answer for ${ANSWER / 1000} s: the state shows whether the station does it.` : `Refused: ${error.message}.`);
+const failure = (error) => (error.name === "TimeoutError" ? `No answer for ${ANSWER / 1000} s: the state after this text shows whether the station has started the task.` : `Refused: ${error.message}.`);
 
 async function preview() {
   edited();
@@ -95,7 +95,7 @@ const listed = (numbers) => (numbers.length ? numbers.join(", ") : "none");
 /** Returns the text about the newest preview or upload. */
 function stateText({ why, number, stage, fault, version, adopted, arrived, relays }) {
   if (why) return `No uploads: ${why}.`;
-  if (!stage) return "Empty fields stay as flown. Drag Rx on the map, or type values.";
+  if (!stage) return "The values of empty fields do not change. Drag Rx on the map, or type values.";
   const what = number ? `Preview ${number}` : `Version ${version}`;
   const words = {
     asking: "asks the chain for its mission",
@@ -105,9 +105,9 @@ function stateText({ why, number, stage, fault, version, adopted, arrived, relay
     uploading: `is being uploaded as version ${version}`,
     flown: `is flown as version ${version}`,
     failed: `has failed: ${fault}`,
-    "dry run": "was not uploaded",
+    "dry run": "was computed, but not uploaded (dry run)",
   };
-  const progress = stage === "uploading" || stage === "flown" ? `; adopted by ${adopted.length} of ${relays} (${listed(adopted)}), arrived: ${listed(arrived)}` : "";
+  const progress = stage === "uploading" || stage === "flown" ? `; adopted by ${adopted.length} of ${relays} relays (${listed(adopted)}); at their new positions: ${listed(arrived)}` : "";
   return `${what} ${words[stage]}${progress}`;
 }
 

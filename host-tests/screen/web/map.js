@@ -612,7 +612,7 @@ class ChainMap {
     const bad = condition === "lost" || condition === "fault";
     const [x, y] = this.pixels(agreed.x_m, agreed.y_m);
     const [colour, name] = [bad ? "poor" : "relay", bad ? `${number} ${condition}` : String(number)];
-    const texts = [`${name}, position unknown`, `${name}, unknown`];
+    const texts = [`${name}, position unknown`, `${name}, no position`];
     if (!texts.some((text) => [16, 31].some((up) => this.write(text, x, y - up, colour)))) this.write(name, x, y - 16, colour, true);
   }
 

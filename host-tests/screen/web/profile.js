@@ -54,7 +54,7 @@ class Profile {
   /** Returns the height of a relay above the ground of the line as text. */
   aboveText({ x, h }) {
     const ground = this.groundAt(x);
-    return ground === null ? "beyond the line" : `${(h - ground).toFixed(0)} m above ground`;
+    return ground === null ? "not between Tx and Rx" : `${(h - ground).toFixed(0)} m above ground`;
   }
 
   describe() {

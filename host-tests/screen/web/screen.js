@@ -40,7 +40,7 @@ function row(relay, hop, silence) {
   const place = relay.position || {};
   const lost = relay.lost_neighbours.map((it) => `does not receive relay ${it}`);
   const behind = behindFor(relay, silence);
-  const remarks = [behind === null ? "" : `position may be behind: ${behind.toFixed(0)} s old`, relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
+  const remarks = [behind === null ? "" : `position is ${behind.toFixed(0)} s old: the drone may be elsewhere`, relay.hold_reason ? `waits: ${relay.hold_reason}` : "", ...lost].filter(Boolean).join("; ");
   const db = hop ? hopDb(hop) : null;
   const age = typeof relay.age_s === "number" ? relay.age_s + silence : null;
   return {

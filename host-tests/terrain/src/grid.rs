@@ -266,7 +266,7 @@ impl Tile {
         let row = (corner[1] - self.corner[1]) / cell[1];
         if (column - column.round()).abs() > ALIGNED || (row - row.round()).abs() > ALIGNED {
             return Err(format!(
-                "its origin, {} {}, is not at a grid point of the other file; the grid",
+                "its origin, {} {}, is not at a grid point of the other file; this grid",
                 self.corner[0], self.corner[1]
             ));
         }
@@ -432,7 +432,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
     let (&[width, height, ..], &[column, row, _, x, y, _]) = (scale.as_slice(), tie.as_slice())
     else {
         return Err(
-            "has no pixel scale with one tie point: rotated grids are not supported".to_owned(),
+            "must be georeferenced by ModelPixelScale and one ModelTiepoint: rotated grids are not supported".to_owned(),
         );
     };
     let is_size = |side: f64| side > 0.0 && side.is_finite();
@@ -453,7 +453,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
     let heights = numbers(decoder.read_image().map_err(said)?)?;
     if heights.len() != columns * rows {
         return Err(format!(
-            "has {} values for {columns} x {rows} heights; allowed: one band",
+            "has {} values for {columns} x {rows} heights; allowed: one value for each height (one band)",
             heights.len()
         ));
     }

@@ -252,12 +252,12 @@ impl TerrainReport {
         let error = self.position_error_m;
         _ = writeln!(
             text,
-            "heights: relay  above sea (m)  above ground (m)  above ground within {error} m (m)"
+            "heights: relay  above sea (m)  above ground (m)  lowest above ground within {error} m (m)"
         );
         for relay in &self.heights {
             _ = writeln!(
                 text,
-                "{:>14}  {:>13.1}  {:>16.1}  {:>27.1}",
+                "{:>14}  {:>13.1}  {:>16.1}  {:>34.1}",
                 relay.index, relay.amsl_m, relay.above_ground_m, relay.above_obstacle_m
             );
         }
@@ -279,7 +279,7 @@ impl TerrainReport {
         }
         _ = writeln!(
             text,
-            "worst hop with terrain: {:.3} dB (diffraction by ITU-R P.526, but none of the interference)",
+            "worst hop with terrain: {:.3} dB (diffraction by ITU-R P.526 on the hops, not on the paths of the interference)",
             self.terrain_sir_db
         );
         text

@@ -89,8 +89,8 @@ fn an_operator_clears_a_lost_relay_by_a_command() {
         assert_eq!(vehicle.link.poll_cleared(), None);
         assert_eq!(vehicle.events, []);
         for line in [
-            "relay: denied: name every lost relay on that side",
-            "relay: lost relays cleared",
+            "relay: denied: name all lost relays of one side",
+            "relay: lost drones reported as gone",
         ] {
             let text = LinkMessage::Text(line.to_owned());
             let has_said = vehicle.received.iter().any(|(_, said)| *said == text);

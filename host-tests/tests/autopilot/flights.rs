@@ -310,7 +310,10 @@ impl Flight {
         }
         while link.poll_position().is_some() {}
         while link.poll_event().is_some() {}
-        assert!(link.poll_timeout(now) > now, "it would spin");
+        assert!(
+            link.poll_timeout(now) > now,
+            "the link asks for the next call without an advance of time (endless loop)"
+        );
         if became != before {
             self.log_event(&format!("link {became:?}, {:?}", self.real.mode));
         }

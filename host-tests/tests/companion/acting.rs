@@ -119,7 +119,7 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     let (status, number) = page.post("/preview", &json!({ "altitude": "50" }));
     assert_eq!((status, &number[..]), (200, "{\"preview\":1}"));
     let state = page.until("failed");
-    let why = "altitude 50 m: must be within 20 to 20 m, the relays' geofence by --altitude and --band of the mission loaded before flight; farthest outside is relay 1, at altitude 50.0 m";
+    let why = "altitude 50 m: must be within 20 to 20 m (the relays' geofence, set before flight by --altitude and --band); farthest outside is relay 1, at altitude 50.0 m";
     assert_eq!(state["fault"], why);
     let request = json!({ "preview": 1, "digest": state["digest"] });
     assert_eq!(
@@ -317,7 +317,7 @@ fn the_status_socket_takes_the_same_tasks() {
             said["text"].as_str().unwrap().to_owned(),
         )
     };
-    let usage = "must be `preview NAME=VALUE ...` or `upload NUMBER DIGEST`, which need a station with --stand, or empty to read the state";
+    let usage = "must be empty (reads the state) or, for a station with --stand, `preview NAME=VALUE ...` or `upload NUMBER DIGEST`";
     for line in ["land", "preview altitude", "upload 1", "upload x 0x1"] {
         assert_eq!(
             commanded(line),

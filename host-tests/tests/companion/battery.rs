@@ -96,7 +96,7 @@ impl Pair {
         // The others may have said at once that they do not need it.
         let is_outside = [
             "this relay is outside of the chain",
-            "this drone may fly away",
+            "this drone has permission to leave",
         ];
         assert!(is_outside.iter().any(|it| line.contains(it)), "{line}");
         std::thread::sleep(Duration::from_secs(12));
@@ -164,11 +164,11 @@ fn a_low_battery_leads_it_out_of_the_chain(kind: &str, more: &str, [full, low]: 
     let line = pair.line("departure: ");
     assert!(line.contains("this relay asks to leave"), "{line}");
     pair.drone
-        .receive(|heard| heard.is_text("battery: low, asks the chain to close up"));
+        .receive(|heard| heard.is_text("battery: low, asks others to fill its place"));
     pair.wait(|said| said["departure"] == "free");
     pair.line("may leave: ");
     pair.drone
-        .receive(|heard| heard.is_text("battery: low, may fly away now"));
+        .receive(|heard| heard.is_text("battery: low, has permission to leave"));
     for _ in 0..3 {
         let all = pair
             .drone
@@ -252,7 +252,7 @@ fn endurance_is_read_from_the_positions() {
     assert_eq!(status()["must_leave"], true);
     let (is_done, text) = commanded(&socket, "stay\n");
     assert!(
-        is_done && text.contains("only the way home and the reserve are left"),
+        is_done && text.contains("only the way home and the reserve left"),
         "{text}"
     );
     let line = relay.line("\"event\":\"departure\"");
@@ -342,7 +342,6 @@ fn a_battery_that_does_not_outlast_its_reserve_is_refused() {
     let options = peer::options("/dev/null");
     let own = format!("--index 1 --of 1 {options} --reserve 180 --flight-time");
     let line = Relay::start(&format!("{own} 360")).refused_at_once(2);
-    let why =
-        "--flight-time 360: must be above 360, which is --reserve 180 and 180 s of a replacement";
+    let why = "--flight-time 360: must be above 360 s, the sum of --reserve 180 s and 180 s for the replacement of this relay";
     assert!(line.contains(why), "{line}");
 }

@@ -305,7 +305,7 @@ fn a_check_does_not_disturb_a_chain_that_flies() {
     }
     let refuses = |relays: &mut [Relay; 2]| {
         let reds = bench.reds("", 8);
-        let part = "red    chain       the chain may fly: these relays were received, and did not report that their drones are on the ground: 1, 3";
+        let part = "red    chain       the chain is possibly in flight: these relays were received, and did not report that their drones are on the ground: 1, 3";
         assert!(reds.iter().any(|it| it.starts_with(part)), "{reds:#?}");
         for relay in relays {
             let lines = relay.lines_with("");
@@ -642,7 +642,7 @@ fn a_bundle_has_the_tolerance_of_the_companions() {
         assert!(!output.status.success() && said.contains(part), "{said}");
         assert!(!files.path("out").exists());
     };
-    let part = "--tolerance = 0.05: allowed with --bundle: 0.0001";
+    let part = "--tolerance = 0.05: must be 0.0001 with --bundle";
     refused(&scenario(), "--tolerance 0.05", part);
     let scenario = files.write("coarse.toml", scenario());
     let out = files.text("plan.toml");
@@ -651,7 +651,7 @@ fn a_bundle_has_the_tolerance_of_the_companions() {
     let made = planned.args([&scenario, "--out", &out]).output().unwrap();
     assert!(made.status.success(), "{made:?}");
     let planned = std::fs::read_to_string(out).unwrap();
-    let part = "scenario.toml: plan.tolerance = 0.05: allowed with --bundle: 0.0001";
+    let part = "scenario.toml: plan.tolerance = 0.05: must be 0.0001 with --bundle";
     refused(&planned, "", part);
 }
 

@@ -115,7 +115,7 @@ fn a_silent_udp_port_is_logged_once() {
     unanswered.check_report(&[
         "autopilot: no answer at ",
         &local,
-        "a PX4 sends only to the first port",
+        "A PX4 answers only the first port",
         "udp:HOST:PORT@LOCAL",
     ]);
     unanswered.check_no_repetition();

@@ -162,7 +162,7 @@ fn the_ground_reports_progress_until_all_relays_fly() {
         rx.tty(1)
     ));
     let line = station.line("adopted: ");
-    let first = "adopted: relay 3 flies version 5 of the mission, as the first of 3 relays; the station asks relay 3 how many relays fly it, until all do";
+    let first = "adopted: relay 3 is the first of 3 relays to report that it flies version 5 of the mission; the station asks relay 3 again until all relays fly this version";
     assert!(line.ends_with(first), "{line}");
     assert_eq!(*state.lock().unwrap(), Wire::Cut);
     // Several polls later the others still do not fly it.
@@ -294,7 +294,7 @@ fn an_altitude_outside_the_geofence_is_refused_with_its_range() {
         };
         let more = format!("{more} --new-band {altitude},{altitude}");
         let why = format!(
-            "altitude {altitude} m: must be within {range}, the relays' geofence by --altitude and --band of the mission loaded before flight"
+            "altitude {altitude} m: must be within {range} (the relays' geofence, set before flight by --altitude and --band)"
         );
         let far = format!("farthest outside is relay 1, at altitude {altitude}.0 m");
         let line = ground(&chain.files, "5", &more).refused(1);

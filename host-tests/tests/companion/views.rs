@@ -42,7 +42,7 @@ fn stored(chain: &Chain, index: usize) -> Option<ViewRecord> {
     Some(ViewRecord::from_bytes(&bytes[..ViewRecord::LENGTH]).unwrap())
 }
 
-const STANDS_BY: &str = "restored: this relay's votes on the chain's membership before this start were read from --view-file; remove that file before another flight";
+const STANDS_BY: &str = "restored: this relay's earlier votes on the chain's membership were read from --view-file; on the ground, remove that file before the next flight";
 
 /// Checks that relays killed in a view (membership) of two and restarted form a chain of three. No view number is
 /// used twice.

@@ -93,7 +93,7 @@ impl<'a> World<'a> {
         let events: Vec<_> = std::iter::from_fn(|| relay.poll_event()).collect();
         prop_assert!(
             relay.poll_timeout().is_none_or(|at| at > now),
-            "relay {} would spin",
+            "relay {} asks for the next call without an advance of time (endless loop)",
             at + 1
         );
         self.tally.most("frames of a drain", u64::from(sent));

@@ -136,7 +136,7 @@ fn an_interferer_on_a_tower_is_refused_if_its_height_matters() {
             let parts = [
                 "interferer[0].amsl_m = ",
                 &by,
-                "interferers are computed as being on the ground",
+                "interferers are computed as if on the ground",
             ];
             refused(&text, Problem::OutOfRange, &parts);
         } else {

@@ -790,13 +790,13 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
     let svg = std::fs::read_to_string(folder.path().join("error.svg")).unwrap();
     roxmltree::Document::parse(&svg).unwrap();
     assert!(
-        svg.contains("Error of the location by [listen] with the interferer at each position, "),
+        svg.contains("Error of the interferer's position, estimated by the relays ([listen]) with the interferer at each position, "),
         "{svg}"
     );
     let output = cargo_plan(folder.path(), &["--scenario", "listen.toml", "--uavs", "6"]);
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
-        table.contains("listening: from ")
+        table.contains("listening: if the interferer is in ")
             && table
                 .matches("simulated with the interferer at x = ")
                 .count()
@@ -820,7 +820,8 @@ fn the_command_says_from_where_relays_locate_the_interferer() {
         assert!(locating.get(key).is_none(), "{locating}");
     }
     let table = String::from_utf8(cargo_plan(folder.path(), &far).stdout).unwrap();
-    let part = "error (standard deviation) not limited in the median, not limited at x = ";
+    let part =
+        "median of the error (standard deviation) not limited, largest error not limited at x = ";
     assert!(table.contains(part), "{table}");
     std::fs::write(
         folder.path().join("deaf.toml"),
@@ -893,7 +894,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     let chain = [own - 70.0, own + 60.0].map(|x_m| Placement::on_line(x_m as f32, 60.0));
     let line = area::problem(&zones, &chain, false, false).unwrap();
     for part in [
-        "the way between relay 1 and relay 2 crosses no_fly[0] (0 to 10000 m) for 110.0 m",
+        "the line from relay 1 to relay 2 crosses no_fly[0] (0 to 10000 m) for 110.0 m",
         "--allow-crossing",
     ] {
         assert!(line.contains(part), "{line}");
@@ -960,7 +961,7 @@ fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let scenario = Scenario::load(&folder.join("flight.toml")).unwrap();
     let chain = [(x(0), 40.0), (x(1), 120.0)].map(|(x_m, h)| Placement::on_line(x_m as f32, h));
     let line = area::problem(&scenario, &chain, false, false).unwrap();
-    let part = "the way between relay 1 and relay 2 crosses no_fly[0] (0 to 60 m) for 20.0 m from the altitude 40.0 m";
+    let part = "the line from relay 1 to relay 2 crosses no_fly[0] (0 to 60 m) for 20.0 m from the altitude 40.0 m";
     assert!(line.contains(part), "{line}");
     // With free altitudes relay 1 keeps its own, and so does relay 2.
     assert!(

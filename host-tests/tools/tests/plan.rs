@@ -126,7 +126,10 @@ fn one_lateral_relay_agrees_with_the_3d_reference() {
     let side = example("side.toml");
     let report = json(&format!("--scenario {side} --uavs 1 --altitude free"));
     assert_eq!(report["theorem"].as_u64(), Some(4), "{report}");
-    assert_eq!(report["how"].as_str(), Some("one relay aside"));
+    assert_eq!(
+        report["how"].as_str(),
+        Some("the optimum of one relay with a lateral offset")
+    );
     assert_eq!(report["proven"].as_bool(), Some(true));
     assert!((1..=8).contains(&report["case"].as_u64().unwrap()));
     let link = Link {
@@ -199,9 +202,9 @@ fn rates_are_divided_by_the_slots() {
     let table = String::from_utf8(output.stdout).unwrap();
     for part in [
         "data rate: 1.57",
-        "e6 bit/s: 13 hops share one frequency in 13 equal time slots, and the worst hop carries ",
+        "e6 bit/s: 13 hops share one frequency in 13 equal time slots; worst hop while it transmits (without its pauses): ",
         "largest data rate: 1 relay carries 6.58",
-        "e6 bit/s, more than 12 relays do; no other number carries more\n",
+        "e6 bit/s, more than 12 relays do; no other number of relays carries a larger rate\n",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
@@ -218,7 +221,7 @@ fn the_fewest_relays_meet_a_rate_or_the_largest_is_named() {
     let (status, line) = refusal("--target-rate-bps 2e7 --bandwidth-hz 1e7");
     assert_eq!(status, 1, "{line}");
     for part in [
-        "--target-rate-bps 20000000.0: no number of relays carries it: all hops share one frequency in equal time slots",
+        "--target-rate-bps 20000000.0: no number of relays carries this rate: all hops share one frequency in equal time slots",
         "1 relay carries 6.58",
         "a larger bandwidth than 10000000.0 Hz",
     ] {
@@ -334,9 +337,7 @@ fn a_frequency_for_each_hop_carries_the_rate_of_the_worst_hop() {
     let output = plan(&format!("--scenario {path} --uavs 4"));
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(
-        table.contains(
-            "bit/s: each of the 5 hops has its own frequency, and the worst hop carries "
-        ),
+        table.contains("bit/s: each of the 5 hops has its own frequency; worst hop while it transmits (without its pauses): "),
         "{table}"
     );
 }
@@ -415,7 +416,7 @@ fn the_answer_names_what_the_model_leaves_out() {
         assert!(
             table.contains(
                 "; not modelled: terrain and obstacles; not optimised: the way back from Rx to Tx\n"
-            ) && table.contains("in this model no "),
+            ) && table.contains("proven for this model: "),
             "{table}"
         );
     }
@@ -475,8 +476,8 @@ fn the_table_names_method_and_proof_and_a_picture_is_drawn() {
     let output = plan("--target-sir 5");
     let table = String::from_utf8(output.stdout).unwrap();
     for part in [
-        "with 22 relays, by eq. (Opt)",
-        "no fewer relays meet the target",
+        "with 22 relays, by the paper's optimisation problem (Opt)",
+        "fewer relays do not meet the target",
         "up to 5.16",
     ] {
         assert!(table.contains(part), "{part}: {table}");
@@ -523,7 +524,8 @@ fn several_interferers_get_a_rated_hypothetical_one() {
     assert!((gained - number(&one["gain"])).abs() < 1e-9);
     let table = String::from_utf8(plan(&format!("--scenario {path} --uavs 8")).stdout).unwrap();
     assert!(
-        table.contains("its positions are not good enough") && table.contains("a gain of"),
+        table.contains("positions for the hypothetical interferer are not good enough")
+            && table.contains("a gain of"),
         "{table}"
     );
 }
@@ -716,7 +718,7 @@ fn a_theorems_case_is_explained_for_the_drone() {
         ("--altitude free", "(Theorem 3, case "),
         (
             &format!("--altitude free --scenario {}", example("side.toml")),
-            "(one relay aside, case ",
+            "(the optimum of one relay with a lateral offset, case ",
         ),
     ] {
         let table = output_of(&format!("--uavs 1 {arguments}"));

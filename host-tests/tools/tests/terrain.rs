@@ -246,7 +246,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
         losses.push(flight.loss_db.unwrap());
         warned += flight.warnings().count();
         for relay in &flight.relays {
-            let part = format!("relay {} has no room: ", relay.index);
+            let part = format!("relay {} has no room to drift: ", relay.index);
             let is_warned = flight.warnings().any(|line| line.starts_with(&part));
             assert_eq!(is_warned, relay.room_m.is_none(), "seed {seed}: {relay:?}");
             confined += u32::from(is_warned);
@@ -831,7 +831,7 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     );
     // The mission's band is no room over the terrain, and is not called one.
     assert!(
-        page.contains("altitude 20.0 to 160.0 m above the line between the sites; neither the ground nor no-fly areas are in them")
+        page.contains("altitude 20.0 to 160.0 m above the line from Tx to Rx; these limits consider neither the ground nor no-fly areas")
             && !page.contains("box:"),
         "{page}"
     );
@@ -988,7 +988,7 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
     for (arguments, part) in [
         (
             format!("--dem {hills}"),
-            "default scenario: site: is missing, which elevation files need",
+            "default scenario: site: is missing, but elevation files need it",
         ),
         (
             format!("{scenario} --dem {}", path("missing.tif")),
@@ -1040,9 +1040,9 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
     );
     let (status, _, line) = run(&narrow);
     for part in [
-        "no positions over the terrain for 3 relays: allowed are positions at least 30 m (terrain.above_ground_m)",
-        " and at most 30.1 m (terrain.above_ground_max_m), 5 m apart (geometry.min_separation_m); the lowest ground is at x = ",
-        "above the line between the sites, with terrain.error_m = 50",
+        "no positions of 3 relays over this terrain meet all limits: at least 30 m (terrain.above_ground_m)",
+        " and at most 30.1 m (terrain.above_ground_max_m), relays at least 5 m apart (geometry.min_separation_m). The lowest ground is at x = ",
+        "above the line from Tx to Rx; this includes terrain.error_m = 50",
     ] {
         assert!(status == Some(1) && line.contains(part), "{line}");
     }
@@ -1056,7 +1056,7 @@ fn wrong_elevation_files_and_options_are_named_in_one_line() {
         of("banded.toml")
     );
     let (status, _, line) = run(&banded);
-    let part = "above the highest ground, and at an altitude of 20 to 21 m (geometry.altitude_min_m and altitude_max_m), 5 m apart";
+    let part = "above the highest ground, and at an altitude of 20 to 21 m (geometry.altitude_min_m and altitude_max_m), relays at least 5 m apart";
     assert!(status == Some(1) && line.contains(part), "{line}");
     let (status, _, line) = run(&format!("--target-sir 3 {scenario} --altitude terrain"));
     assert!(

@@ -223,10 +223,10 @@ impl Autopilot {
             .command(received.from, parameters, is_repeated);
         let line = match event {
             Some(AutopilotEvent::LostCleared { .. }) => {
-                Line::info(Topic::Clearance, "relay: lost relays cleared")
+                Line::info(Topic::Clearance, "relay: lost drones reported as gone")
             }
             Some(_) => {
-                let text = ["relay: denied: name every lost relay on that side", ""];
+                let text = ["relay: denied: name all lost relays of one side", ""];
                 Line::warning(Topic::Clearance, text)
             }
             None => return,
@@ -441,7 +441,7 @@ impl Autopilot {
         };
         self.stop = None;
         let line = match (before, self.state) {
-            (State::Blind, State::Engaged) => "relay: position restored",
+            (State::Blind, State::Engaged) => "relay: position known again",
             (_, State::Engaged) => {
                 self.streams.renew();
                 "relay: engaged, flies to position"

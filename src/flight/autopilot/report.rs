@@ -110,7 +110,7 @@ impl Line {
             Some(HoldReason::Lost) => "relay: waits, lost relay near",
             Some(HoldReason::NotFlown) => "relay: waits, not engaged:",
             Some(HoldReason::Pending) => "relay: waits, space used by",
-            Some(HoldReason::Halted) => "relay: stops, wrong order past",
+            Some(HoldReason::Halted) => "relay: stops, bad order beyond",
             None => "relay: no longer waits for",
         };
         Self::warning(topic, [what, whom])

@@ -221,7 +221,7 @@ impl WaitReason {
             Self::Failsafe => "relay: waits, autopilot in failsafe",
             Self::Link => "relay: waits, autopilot link delayed",
             Self::Found => "relay: waits, choose another mode first",
-            Self::Unseen => "relay: waits, end failsafe, or choose a mode",
+            Self::Unseen => "relay: waits for pilot: end failsafe or set mode",
             Self::Position => "relay: waits, position unknown or off the line",
             Self::NotReady => "relay: waits, wrong side of a neighbour",
         }

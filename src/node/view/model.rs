@@ -813,11 +813,11 @@ impl Model for Check {
         vec![
             Property::always(ONE_CHAIN, |_, chain| Self::is_one_chain(chain)),
             Property::always(
-                "no view is decided or agreed on with two different sizes",
+                "no view is decided, or agreed on, with two different numbers of relays",
                 |_, chain| Self::has_one_size(chain),
             ),
             Property::always(
-                "every relay knows only agreed views, and no view has more members than its size",
+                "every relay knows only agreed views, and no view has more members than its agreed number of relays",
                 |check: &Self, chain| check.is_known_and_counted(chain),
             ),
             Property::always(
@@ -853,8 +853,8 @@ impl Check {
             ..
         } = self;
         println!(
-            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots, {moves} departures or joins (outside at first: {outside:b}) and {losses} losses of the votes, \
-             links are restored: {heals}; searched {} states to depth {} in {:.1} s",
+            "view model: {} relays, quorum rule {rule:?}, at most {cuts} partitions, {proposals} proposals, {reboots} reboots, {moves} departures or joins (relays outside of the chain at first: {outside:b}), {losses} losses of stored votes, \
+             links restored at the end: {heals}; searched {} states to depth {} in {:.1} s",
             self.members.len(),
             checker.unique_state_count(),
             checker.max_depth(),

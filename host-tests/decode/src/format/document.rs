@@ -84,17 +84,17 @@ fn fields(rows: &[Row], tables: &[Table<'_>]) -> Result<Vec<Field>, String> {
             "count" => {
                 let list = rest
                     .next()
-                    .ok_or("a count without a row for its elements")?;
-                let most = last_number(&row.range).ok_or("a count without a range")?;
+                    .ok_or("a row `count` without a following row for its elements")?;
+                let most = last_number(&row.range).ok_or("a row `count` without a range")?;
                 (list, Kind::List(most as u64, Box::new(item(list, tables)?)))
             }
             "Option" => {
-                let bytes = last_number(&row.size).ok_or("an Option without a size")?;
+                let bytes = last_number(&row.size).ok_or("a row of type Option without a size")?;
                 let (mut inner, mut taken) = (Vec::new(), 1);
                 while taken < bytes {
                     let row = rest
                         .next()
-                        .ok_or("an Option that is longer than its rows")?;
+                        .ok_or("a row of type Option whose size is larger than the sum of the rows after it")?;
                     taken += last_number(&row.size).ok_or("a row without a size")?;
                     inner.push(row.clone());
                 }
@@ -121,7 +121,7 @@ fn item(row: &Row, all: &[Table<'_>]) -> Result<Kind, String> {
         other => return plain(other),
     };
     let table = all.iter().find(|table| table.head.first() == Some(&head));
-    let rows = rows(table.ok_or("a list without a table")?)?;
+    let rows = rows(table.ok_or("a list without a table of its elements")?)?;
     Ok(Kind::Group(fields(&rows, &[])?))
 }
 
@@ -133,7 +133,9 @@ fn kind(row: &Row, tables: &[Table<'_>]) -> Result<Kind, String> {
         let table = tables
             .iter()
             .find(|table| table.head.first() == Some(&"bit"));
-        let rows = &table.ok_or("flags without a table")?.rows;
+        let rows = &table
+            .ok_or("a row `flags` without a table of its bits")?
+            .rows;
         let names = rows.iter().filter_map(|row| row.get(1));
         return Ok(Kind::Flags(names.map(|name| (*name).to_owned()).collect()));
     }

@@ -209,7 +209,7 @@ impl Hostile {
             .chain(self.flight.begins());
         match all.find(|(_, at)| *at >= end) {
             Some((option, _)) => Err(Failure::input(format!(
-                "{option}: has no effect, because --soak {} ends the run before that time",
+                "{option}: has no effect, because --soak {} ends the run earlier",
                 seconds(end)
             ))),
             None => Ok(()),
@@ -271,7 +271,7 @@ fn partition(text: &str) -> Result<Partition, String> {
 
 /// Command-line options for links, the shared radio channel, and losses of frames.
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Links and the air")]
+#[command(next_help_heading = "Links and the radio channel")]
 pub struct Air {
     /// Access method of the shared channel, which reaches four relays far; default csma
     #[arg(long = "air", value_name = "A", value_enum, conflicts_with = "wires")]
@@ -363,7 +363,7 @@ impl Air {
         let least = Bursts::shortest(loss);
         if self.burst > 1.0 && self.burst < least {
             let line = format!(
-                "--burst {}: must be 1 (independent losses), or within {least:.4} to 1e6: with --loss {loss} even independent losses come in bursts of {least:.4} frames on average",
+                "--burst {}: mean length of a burst, frames: must be 1 (independent losses) or {least:.4} to 1e6; with --loss {loss} independent losses already have a mean length of {least:.4}",
                 self.burst
             );
             return Err(Failure::input(line));

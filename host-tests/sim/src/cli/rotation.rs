@@ -37,12 +37,12 @@ impl Rotation {
         let flying = self.flying.unwrap_or(all);
         if flying > all || 2 * flying <= all {
             return Err(Failure::input(format!(
-                "--flying {flying}: must be within {} to {all}, more than half of the fleet: the first view needs them",
+                "--flying {flying}: must be within {} to {all}: the first view needs the votes of more than half of the fleet",
                 all / 2 + 1
             )));
         }
         if !setup.profiles.is_empty() {
-            let line = "--fleet: the scenario's [[relay]] tables give relays their own altitudes or powers; the fleet has to be of like drones";
+            let line = "--fleet: the scenario's [[relay]] tables give relays their own altitudes or powers; all drones of a fleet must be identical";
             return Err(Failure::input(line.to_owned()));
         }
         let mut guard = GuardConfig::of(&setup.mission, config.common);

@@ -128,7 +128,7 @@ impl AttackReport {
         if self.misled > 0 {
             _ = writeln!(
                 text,
-                "during the attack relays accepted {} positions for target SIRs that do not occur without it",
+                "during the attack relays accepted {} positions for target SIRs that do not occur in a run without the attack",
                 self.misled
             );
         }

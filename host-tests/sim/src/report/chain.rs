@@ -275,7 +275,7 @@ impl ChainReport {
         if let Some(back) = self.back {
             _ = writeln!(
                 text,
-                "way back: worst hop SIR {:.6} ({:.3} dB); it needs {:?} of the SIR from Tx to Rx (link.reverse); worst direction: {}",
+                "way back: worst hop SIR {:.6} ({:.3} dB); required: {:?} times the SIR toward Rx (link.reverse); worst direction: {}",
                 back.worst_back, back.worst_back_db, back.reverse, back.worst_direction
             );
         }
@@ -591,7 +591,7 @@ impl AvailabilityReport {
         if let Some(most) = self.most_flying {
             _ = writeln!(
                 text,
-                "largest number of groups of relays with separate agreements at the same time: {most}"
+                "most parts of the chain with separate agreements at the same time: {most}"
             );
         }
         if let Some(least) = self.least_separation_m {
@@ -734,8 +734,8 @@ impl AllInterferersReport {
         let part = 100.0 * all_loss.abs();
         let side = if *all_loss < 0.0 { "above" } else { "below" };
         format!(
-            "against all interferers: SIR {all_sir:.6} ({all_sir_db:.3} dB), {part:.1} % {side} the relays' estimate; `cargo plan` has the \
-             best positions against all\n"
+            "against all interferers: SIR {all_sir:.6} ({all_sir_db:.3} dB), {part:.1} % {side} the SIR that the relays expect; `cargo plan` finds \
+             the best positions against all\n"
         )
     }
 }

@@ -130,33 +130,37 @@ impl RotationReport {
         row(&format!("time below {GOOD} of the optimum, %"), &|it| {
             format!("{:.4}", 100.0 * it.below)
         });
-        row("worst moment, share of the optimum", &|it| {
+        row("lowest SIR of the worst hop, share of the optimum", &|it| {
             some(it.worst, 4)
         });
-        row("worst moment at, s", &|it| some(it.worst_at_s, 1));
+        row("time of the lowest SIR, s", &|it| some(it.worst_at_s, 1));
         row("replacements", &|it| it.replaced.to_string());
-        row("replacements without permission", &|it| {
+        row("drones that left without permission of the chain", &|it| {
             it.forced.to_string()
         });
         row("replacements per hour", &|it| format!("{:.2}", it.per_hour));
-        row("replacements per hour by arithmetic", &|it| {
+        row("replacements per hour, computed from batteries", &|it| {
             format!("{:.2}", it.arithmetic_per_hour)
         });
-        row("request to permission, mean, s", &|it| {
+        row("from request to leave to permission, mean, s", &|it| {
             format!("{:.1}", it.mean_wait_s)
         });
-        row("request to permission, longest, s", &|it| {
+        row("from request to leave to permission, longest, s", &|it| {
             format!("{:.1}", it.longest_wait_s)
         });
         row(
-            &format!("least endurance beyond the way home ({RESERVE_S} asked), s"),
+            &format!("least endurance left at home (required: {RESERVE_S}), s"),
             &|it| some(it.least_left_s, 1),
         );
-        row("nearest distance of two drones, m", &|it| {
+        row("smallest distance of two drones, m", &|it| {
             some(it.nearest_m, 2)
         });
-        row("nearest distance at, s", &|it| some(it.nearest_at_s, 1));
-        row("most chains at the same time", &|it| it.chains.to_string());
+        row("time of the smallest distance, s", &|it| {
+            some(it.nearest_at_s, 1)
+        });
+        row("most parts of the chain with separate agreements", &|it| {
+            it.chains.to_string()
+        });
         if self.unannounced.is_some() {
             text += "unannounced: a tired drone flies home with its relay off, and a spare in the air is switched on at that moment\n";
         }
@@ -165,7 +169,7 @@ impl RotationReport {
                 let [[x, y, h], [to_x, to_y, to_h]] = [drone.at_m, drone.goal_m];
                 _ = writeln!(
                     text,
-                    "nearest: relay {} at ({x:.1}, {y:.1}, {h:.1}) m toward ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
+                    "smallest distance: relay {} at ({x:.1}, {y:.1}, {h:.1}) m, flies to ({to_x:.1}, {to_y:.1}, {to_h:.1}) m: {}",
                     drone.relay, drone.state
                 );
             }

@@ -240,10 +240,10 @@ impl Group {
                 || "relays spread evenly".to_owned(),
                 |sir| format!("SIR {sir:.3}"),
             ),
-            "may leave" => format!("{who} may leave"),
-            "told to leave" => format!("relay {other} may leave"),
+            "may leave" => format!("{who} has permission to leave"),
+            "told to leave" => format!("relay {other} has permission to leave"),
             "partition" => format!("partition after relay {relay}"),
-            "partition ended" => format!("partition after relay {relay} ended"),
+            "partition ended" => format!("end of the partition after relay {relay}"),
             "does not receive" => format!("relay {relay} does not receive {other}"),
             "receives again" => format!("relay {relay} receives {other} again"),
             "not received by" => format!("relay {other} does not receive {}", list(&self.relays)),
@@ -297,9 +297,11 @@ impl Group {
             "blind" => format!("{who}: the autopilot reports no position"),
             "restarted" => format!("{who}: autopilot restarted"),
             "may leave" => {
-                format!("{who}: the chain works without this relay now, its drone may fly away")
+                format!(
+                    "{who}: the chain works without this relay now, its drone has permission to leave"
+                )
             }
-            "told to leave" => format!("{who}: relay {other} may fly away"),
+            "told to leave" => format!("{who}: relay {other} has permission to leave"),
             "no quorum" => {
                 format!("{who}: too few relays receive each other (no quorum), position held")
             }
@@ -331,8 +333,10 @@ impl Group {
             ),
             "does not receive" => format!("{who} does not receive relay {other}"),
             "receives again" => format!("{who} receives relay {other} again"),
-            "offered" if relay == 0 => format!("the transmitter uploads mission version {version}"),
-            "offered" => format!("the receiver uploads mission version {version}"),
+            "offered" if relay == 0 => {
+                format!("the ground station at Tx uploads mission version {version}")
+            }
+            "offered" => format!("the ground station at Rx uploads mission version {version}"),
             "stored" => format!("{who} stored mission version {version}"),
             "adopted" => format!(
                 "mission version {version} adopted: {}",
@@ -664,11 +668,11 @@ mod tests {
         };
         assert_eq!(
             of(3, TimelineEvent::MayLeave, None),
-            "relay 3: the chain works without this relay now, its drone may fly away"
+            "relay 3: the chain works without this relay now, its drone has permission to leave"
         );
         assert_eq!(
             of(4, TimelineEvent::MayLeaveTold, Some(3)),
-            "relay 4: relay 3 may fly away"
+            "relay 4: relay 3 has permission to leave"
         );
     }
 }

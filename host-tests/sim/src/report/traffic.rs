@@ -204,7 +204,7 @@ impl TrafficReport {
             };
             _ = writeln!(
                 text,
-                "{way}: {} Mbit/s promised, {} offered, {} delivered",
+                "{way}: {} Mbit/s predicted, {} offered, {} delivered",
                 mega(*promised),
                 mega(*offered),
                 mega(*delivered)
@@ -257,7 +257,7 @@ impl FlowReport {
 
     fn text(&self) -> String {
         let mut text = format!(
-            "    packets until {:.3} s: {} offered, {} delivered, {} dropped by full queues, {} lost with silent relays, {} in queues at the end\n",
+            "    packets until {:.3} s: {} offered, {} delivered, {} dropped by full queues, {} lost in relays that went silent, {} in queues at the end\n",
             self.until_s,
             self.offered_packets,
             self.delivered_packets,
@@ -344,7 +344,7 @@ impl PeriodReport {
         let relays = self.relays;
         let of = if relays == 1 { "relay" } else { "relays" };
         let state = match (self.state, self.promised_bps.as_slice()) {
-            ("agreed", promised) => format!("{} Mbit/s promised", list(promised)),
+            ("agreed", promised) => format!("{} Mbit/s predicted", list(promised)),
             ("pending", _) => "no agreement yet, or drones on their way".to_owned(),
             _ => "broken".to_owned(),
         };

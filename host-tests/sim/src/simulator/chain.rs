@@ -305,7 +305,11 @@ impl Chain {
             && member.wake.is_none_or(|wake| at < wake)
         {
             // A drained relay must not request an immediate call.
-            assert!(at > now, "relay {} would spin", index + 1);
+            assert!(
+                at > now,
+                "relay {} asks for the next call without an advance of time (endless loop)",
+                index + 1
+            );
             member.wake = Some(at);
             self.queue.put(at, index, QueuedEvent::Wake);
         }
@@ -436,11 +440,11 @@ fn switched_on(
     }
     if let Some(upload) = stored {
         let resumed = relay.resume(upload);
-        debug_assert_eq!(resumed, Ok(()), "it was uploaded for this mission");
+        debug_assert_eq!(resumed, Ok(()), "the upload was made for this mission");
     }
     if let Some(record) = record {
         let resumed = relay.resume_view(now, record);
-        debug_assert_eq!(resumed, Ok(()), "it has left it itself");
+        debug_assert_eq!(resumed, Ok(()), "the record was made by this relay");
     }
     Ok(relay)
 }

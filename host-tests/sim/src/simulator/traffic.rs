@@ -63,11 +63,11 @@ impl fmt::Display for TrafficError {
         match self {
             Self::TooMany(sent) => write!(
                 f,
-                "--traffic: {sent:.3e} transmissions of packets; allowed: up to {MOST_SENT:e}, with larger --packet-bytes or a shorter run"
+                "--traffic: the run would have {sent:.3e} transmissions of packets; allowed: up to {MOST_SENT:e}; give larger --packet-bytes or a shorter run"
             ),
             Self::TooLong(end_s) => write!(
                 f,
-                "--traffic: the packets take until {end_s:.3e} s of virtual time; allowed: up to {LATEST_S:e} s, with smaller --packet-bytes or a \
+                "--traffic: sending the packets would end at {end_s:.3e} s of virtual time; allowed: up to {LATEST_S:e} s; give smaller --packet-bytes or a \
                  larger bandwidth"
             ),
         }

@@ -100,7 +100,7 @@ fn a_capture_of_the_channel_has_the_attackers_frames_too() {
     let sent = usize::try_from(report["air"]["sent"].as_u64().unwrap()).unwrap();
     // Transmissions that are unfinished at the end are not captured.
     assert!((sent - 4..=sent).contains(&(frames.len() - 30)), "{sent}");
-    let missed = |frame: &Frame| frame.comment.contains("did not receive it");
+    let missed = |frame: &Frame| frame.comment.contains("did not receive the frame");
     assert!(frames.iter().any(missed));
 }
 

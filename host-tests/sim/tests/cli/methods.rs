@@ -306,7 +306,7 @@ fn several_interferers_are_flown_as_one_with_a_note() {
     let table = String::from_utf8(chain(&format!("--uavs 3 --scenario {several}")).stdout).unwrap();
     assert!(
         table.contains("against all interferers: SIR ")
-            && table.contains("% below the relays' estimate"),
+            && table.contains("% below the SIR that the relays expect"),
         "{table}"
     );
 }

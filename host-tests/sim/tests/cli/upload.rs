@@ -100,7 +100,7 @@ fn an_upload_is_in_the_timeline_and_the_picture() {
         "the chain uses the uploaded mission, version 1",
         "one radio channel",
         "positions agreed: 8 relays, SIR 2.466",
-        "20.000 s  the transmitter uploads mission version 1",
+        "20.000 s  the ground station at Tx uploads mission version 1",
         " s  relays 1 to 8 stored mission version 1",
         " s  mission version 1 adopted: 8 relays",
         "positions agreed: 8 relays, SIR 1.582",

@@ -262,7 +262,7 @@ fn above_terrain(
         elevation.ok_or_else(|| wrong("needs elevation files: --dem FILE, or terrain.files"))?;
     let Number::Of(relays) = ask.number else {
         return Err(wrong(
-            "needs --uavs N: it has no search for the number of relays",
+            "needs --uavs N, because it cannot be used in a search for the number of relays",
         ));
     };
     if radio.is_some() {
@@ -416,12 +416,12 @@ fn too_fast(rates: &RateReport) -> String {
     let shared = if rates.access == Access::Slots.name() {
         "all hops share one frequency in equal time slots"
     } else if rates.access == Access::Fitted.name() {
-        "all hops share one frequency in time slots as long as each hop needs"
+        "all hops share one frequency in time slots of different length, fitted to each hop"
     } else {
         "every hop has a frequency of its own"
     };
     format!(
-        "--target-rate-bps {target_bps:?}: {among} carries it: {shared}; {}. Give a lower rate, or a larger bandwidth than {:?} Hz",
+        "--target-rate-bps {target_bps:?}: {among} carries this rate: {shared}; {}. Give a lower rate, or a larger bandwidth than {:?} Hz",
         rates.largest(),
         rates.bandwidth_hz
     )
@@ -754,7 +754,7 @@ fn check_target(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
     let is_known = matches!(scenario.interference, Interference::Sources(_));
     if options.altitude == Altitude::Free && scenario.has_fitted_slots() && is_known {
         return Err(Failure::input(format!(
-            "{asked}: cannot be used with --altitude free and link.access = \"fitted\", because such relays choose the positions of the largest data rate; allowed: --target-rate-bps or --uavs, or link.access = \"slots\" or \"channels\", or --altitude given"
+            "{asked}: cannot be used with --altitude free and link.access = \"fitted\", because such relays choose the positions of the largest data rate; use --target-rate-bps or --uavs instead, or set link.access to \"slots\" or \"channels\", or use `--altitude given`"
         )));
     }
     Ok(())
@@ -834,7 +834,7 @@ impl InFlight {
         let flight = flight.transpose()?;
         let blocked = flight.as_ref().and_then(|flight| flight.problem.clone());
         let blocked = blocked.map(|line| match own {
-            Some(_) => format!("{line}; relays choose x without the terrain: give another --uavs, or a larger terrain.above_ground_max_m"),
+            Some(_) => format!("{line}; on board the relays compute x without the terrain: give another --uavs, or a larger terrain.above_ground_max_m"),
             None => line,
         });
         let problem = joined([blocked, no_fly(options, scenario, &flown.plan)]);
@@ -1039,7 +1039,7 @@ fn next(file: &str, sections: &Deployment) -> String {
             )
         }
         (Err(why), _) => format!(
-            "next, on the Linux computer of every drone (cargo provision refuses the file for the firmware: {why}):\n{companions}"
+            "the firmware cannot use this file ({why}); next, on the Linux computer of every drone:\n{companions}"
         ),
     }
 }
@@ -1064,7 +1064,7 @@ fn check_map(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::input(format!(
-        "{}: site: is missing, which {option} needs; allowed: [site] with tx and rx, each {{ lat_deg, lon_deg, amsl_m }}",
+        "{}: site: is missing, but {option} needs it; allowed: [site] with tx and rx, each {{ lat_deg, lon_deg, amsl_m }}",
         options.file()
     )))
 }

@@ -260,7 +260,7 @@ impl<'a> Asked<'a> {
         let Ok(flown) = flown(&self.scenario, self.uavs, method, self.tolerance) else {
             return match self.scenario.plan {
                 Some(_) => Err(format!(
-                    "{}: [plan] was computed for another scenario, because the relays of this one reach no agreement: run `cargo plan` again",
+                    "{}: [plan] does not fit this scenario: the relays would reach no agreement; run `cargo plan` again",
                     self.name
                 )),
                 None => Ok(None),
@@ -280,7 +280,9 @@ impl<'a> Asked<'a> {
         if flown.is_poor() {
             let line = format!("{}: {}", self.name, flown.describe());
             if flown.stand_in && !self.options.stand_in {
-                return Err(format!("{line}; --stand-in writes the files nevertheless"));
+                return Err(format!(
+                    "{line}; with --stand-in the files are written, for relays that use the hypothetical interferer"
+                ));
             }
             command::print_line(&line);
         }
@@ -399,7 +401,7 @@ impl<'a> Asked<'a> {
                 None => ("--tolerance".to_owned(), "leave it out"),
             };
             return Err(format!(
-                "{from} = {:?}: allowed with --bundle: {COMPANION_TOLERANCE:?}, with which companions compute their positions; {remedy}",
+                "{from} = {:?}: must be {COMPANION_TOLERANCE:?} with --bundle, because companions compute their positions with this tolerance; {remedy}",
                 self.tolerance
             ));
         }
@@ -530,7 +532,7 @@ fn carried(options: &Options, uavs: u16, probe_after: Duration) -> Result<(), St
     let in_range = options.in_range.unwrap_or(uavs).min(uavs);
     command::carries(options.baud, ChannelLoad::of_radios(in_range), probe_after).map_err(|error| {
         format!(
-            "{error}; if fewer relays receive each other, give --in-range, or --wires for separate links"
+            "{error}; this assumes that all relays receive each other: if not, give --in-range, or --wires for separate links"
         )
     })
 }

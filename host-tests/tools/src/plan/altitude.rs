@@ -31,7 +31,7 @@ pub(super) fn best(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<P
     match joint(&briefed) {
         Some(places) => {
             let how = if briefed.mission.fitted_gap() > 0.0 {
-                "the joint method for fitted slots"
+                "the joint method for time slots fitted to the hops"
             } else if scenario.reverse > 0.0 {
                 "the joint method for both directions"
             } else {

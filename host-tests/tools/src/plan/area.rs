@@ -98,9 +98,9 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest, criterion: Criterion) -> Res
     }
     match (ask.number, criterion.quantile) {
         (Number::Of(relays), _) => best(scenario, ask, relays, criterion),
-        (Number::Meeting(_), Some(_)) => {
-            wrong("--quantile: needs --uavs N: it has no search for the number of relays")
-        }
+        (Number::Meeting(_), Some(_)) => wrong(
+            "--quantile: needs --uavs N, because --quantile cannot be used in a search for the number of relays",
+        ),
         (Number::Meeting(target), None) => {
             let plan = |relays| best(scenario, ask, relays, criterion);
             let plan = fewest_of(target, plan, Plan::sir)?;
@@ -193,7 +193,7 @@ fn best(
             let starts: Vec<_> = starts.into_iter().chain([places]).collect();
             (
                 search.by_quantile(scenario, quantile, &starts),
-                "the quantile over the positions of the interferer",
+                "the quantile of the worst hop's SIR over the positions of the interferer",
             )
         }
         None if scenario.areas.is_empty() => (places, "a search around the no-fly areas"),
@@ -290,7 +290,7 @@ pub fn problem(
                 let level = keeps.contains(&true) && (from[2] - to[2]).abs() > ROUNDING_M;
                 let level = level.then(|| format!(" from the altitude {altitude_m:.1} m"));
                 lines.push(format!(
-                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m{}, and relays that close a gap fly there; `cargo plan --allow-crossing` accepts it",
+                    "the line from relay {index} to relay {} crosses {range} for {crossing_m:.1} m{}; a relay that closes a gap would fly through it; `cargo plan --allow-crossing` accepts this",
                     index + 1,
                     level.unwrap_or_default()
                 ));

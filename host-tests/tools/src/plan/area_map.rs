@@ -67,7 +67,7 @@ pub fn svg(scenario: &Scenario, plan: &Plan, cells: &[Cell], shown: Shown) -> St
     let colour = |number: f64| colour((number - least) / (most - least));
     let what = match shown {
         Shown::Sir => "SIR of the worst hop",
-        Shown::Error => "Error of the location by [listen]",
+        Shown::Error => "Error of the interferer's position, estimated by the relays ([listen])",
     };
     let range = format!("{} to {}", shown.say(least), shown.say(most));
     let relays = plan

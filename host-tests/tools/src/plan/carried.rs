@@ -133,9 +133,9 @@ impl<'a> Carried<'a> {
             .collect();
         let fits = self.radio.link.access == Access::Fitted;
         let how = if fits {
-            "a shortest path for fitted slots"
+            "a shortest-path search for time slots fitted to the hops"
         } else {
-            "Algorithm 1 for the rates of both directions"
+            "Algorithm 1 for the data rates of both directions"
         };
         let plan = briefed.plan(&places, how, false);
         let sirs = scene.hop_sirs(&places);

@@ -278,7 +278,7 @@ pub fn is_current(planned: &Planned, flown: &Flown) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "[plan] was computed for another scenario: the relays of this one settle up to {off_m:.1} m from plan.places, at {sir_db:.3} dB instead of \
+        "[plan] does not fit this scenario: its relays settle up to {off_m:.1} m from plan.places, and the worst hop has {sir_db:.3} dB instead of \
          plan.sir_db = {:.3}; run `cargo plan --out` again",
         planned.sir_db
     ))

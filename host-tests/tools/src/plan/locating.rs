@@ -138,7 +138,7 @@ fn finite(error_m: f64) -> Option<f64> {
 
 fn failed(relays: u16, [x_m, y_m]: [f64; 2], error: &FigureError) -> String {
     format!(
-        "interferer[0].area: the search of {relays} relays with the interferer at x = {x_m:.1} m, y = {y_m:.1} m cannot be simulated: {error}"
+        "interferer[0].area: the run in which {relays} relays locate the interferer at x = {x_m:.1} m, y = {y_m:.1} m cannot be simulated: {error}"
     )
 }
 
@@ -279,7 +279,7 @@ impl fmt::Display for Locating {
         };
         writeln!(
             f,
-            "listening: from {:.1} % of the area the relays locate the interferer within a tenth of its distance from the line; error (standard deviation) {} in the median, {} at x = {x:.1} m, y = {y:.1} m",
+            "listening: if the interferer is in {:.1} % of the area, the relays locate it with an error below a tenth of its distance from the line; median of the error (standard deviation) {}, largest error {} at x = {x:.1} m, y = {y:.1} m",
             100.0 * self.located,
             metres(self.error_m),
             metres(self.worst_error_m)
@@ -289,12 +289,12 @@ impl fmt::Display for Locating {
         };
         for one in &self.searches {
             let [x, y] = one.at;
-            let off = one
-                .off_m
-                .map_or(String::new(), |off| format!(", {off:.1} m off"));
+            let off = one.off_m.map_or(String::new(), |off| {
+                format!(", estimate {off:.1} m from the true position")
+            });
             writeln!(
                 f,
-                "simulated with the interferer at x = {x:.1} m, y = {y:.1} m: first estimate {}, positions within 1 dB of the best {}{off}",
+                "simulated with the interferer at x = {x:.1} m, y = {y:.1} m: first estimate {}; relays within 1 dB of the best SIR {}{off}",
                 seconds(one.estimate_s),
                 seconds(one.placed_s)
             )?;
@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn a_search_that_cannot_be_simulated_is_named_with_its_place() {
         let line = failed(3, [10.0, -20.0], &FigureError::Unsettled("the chain"));
-        let part = "of 3 relays with the interferer at x = 10.0 m, y = -20.0 m cannot be simulated: the chain has not settled";
+        let part = "in which 3 relays locate the interferer at x = 10.0 m, y = -20.0 m cannot be simulated: the chain has not settled";
         assert!(
             line.starts_with("interferer[0].area: ") && line.contains(part),
             "{line}"

@@ -287,7 +287,11 @@ impl Candidates {
                     planner.ask.tolerance,
                 )?;
                 let proven = if target.is_some() { is_fewest } else { is_best };
-                briefed.plan(&best.places, "the true sum of the interferers", proven)
+                briefed.plan(
+                    &best.places,
+                    "the sum of the powers of all interferers",
+                    proven,
+                )
             }
             _ => return Err(source::nothing()),
         };

@@ -115,19 +115,22 @@ pub fn best(scene: &Scene, reverse: f64) -> Option<Best> {
         .collect();
     let limit = limits.first().copied().unwrap_or_default();
     let (case, words) = if x_m <= 0.0 {
-        let words = format!("the drone stays right above Tx: {limit} is the weakest even there");
+        let words =
+            format!("the drone stays directly above Tx: even there {limit} is the weakest hop");
         (1, words)
     } else if x_m >= d {
-        let words = format!("the drone goes right above Rx: {limit} is the weakest even there");
+        let words =
+            format!("the drone goes directly above Rx: even there {limit} is the weakest hop");
         (2, words)
     } else if limits.len() > 1 {
         let words = format!(
-            "the drone goes where {} are equally good: to either side one of them would be worse",
+            "the drone goes to where {} are equally good: to either side one of them would be worse",
             limits.join(" and ")
         );
         (3, words)
     } else {
-        let words = format!("the drone goes where {limit} is best: that is the weakest even there");
+        let words =
+            format!("the drone goes to where {limit} is best: even there it is the weakest hop");
         (4, words)
     };
     Some(Best { x_m, case, words })

@@ -192,7 +192,7 @@ impl<'a> Search<'a> {
         let lowest = heights.min_by(|a, b| a[1].total_cmp(&b[1]));
         let [x_m, height_m] = lowest.unwrap_or_default();
         format!(
-            "no positions over the terrain for {relays} relays: allowed are positions at least {least_m} m (terrain.above_ground_m) above the highest ground{most}, {} m apart (geometry.min_separation_m); the lowest ground is at x = {x_m:.0} m, {height_m:.1} m above the line between the sites, with terrain.error_m = {}",
+            "no positions of {relays} relays over this terrain meet all limits: at least {least_m} m (terrain.above_ground_m) above the highest ground{most}, relays at least {} m apart (geometry.min_separation_m). The lowest ground is at x = {x_m:.0} m, {height_m:.1} m above the line from Tx to Rx; this includes terrain.error_m = {}",
             scenario.min_separation_m,
             scenario.terrain.as_ref().map_or(0.0, |spec| spec.error_m)
         )

@@ -132,7 +132,7 @@ impl RateReport {
         if let (Some(rate_bps), Some(hop_bps)) = (self.rate_bps, self.hop_rate_bps) {
             _ = writeln!(
                 text,
-                "data rate: {}: {}, and the worst hop carries {} while it sends",
+                "data rate: {}: {}; worst hop while it transmits (without its pauses): {}",
                 bps(rate_bps),
                 self.sharing,
                 bps(hop_bps)
@@ -187,13 +187,13 @@ impl RateReport {
             String::new()
         };
         let among = if best_is_proven {
-            "; no other number carries more".to_owned()
+            "; no other number of relays carries a larger rate".to_owned()
         } else {
             format!(", of 1 to {tried_uavs} relays")
         };
         let counted = if self.reverse > 0.0 {
             format!(
-                " to Rx and at least {:?} of it back (link.reverse)",
+                " to Rx, and at least {:?} times this rate back (link.reverse)",
                 self.reverse
             )
         } else {
@@ -266,7 +266,7 @@ impl WayBack {
         };
         let needed = self.reverse.map_or_else(String::new, |reverse| {
             format!(
-                "; it needs {reverse:?} of the SIR from Tx to Rx (link.reverse); worst direction: {}",
+                "; required: {reverse:?} times the SIR toward Rx (link.reverse); worst direction: {}",
                 self.worst_direction.unwrap_or("unknown")
             )
         });
@@ -597,10 +597,10 @@ impl PlanReport {
 
     fn certainty(&self) -> &'static str {
         match (self.proven, self.target_sir) {
-            (Some(true), Some(_)) => "in this model no fewer relays meet the target",
-            (Some(true), None) => "in this model no positions are better",
-            (_, Some(_)) => "in this model fewer relays might meet the target: not proven",
-            (_, None) => "in this model other positions might be better: not proven",
+            (Some(true), Some(_)) => "proven for this model: fewer relays do not meet the target",
+            (Some(true), None) => "proven for this model: no positions are better",
+            (_, Some(_)) => "not proven: in this model fewer relays might meet the target, too",
+            (_, None) => "not proven: in this model other positions might be better",
         }
     }
 }
@@ -609,7 +609,7 @@ impl HypotheticalReport {
     fn describe(&self, text: &mut String, unit: Unit) {
         _ = writeln!(
             text,
-            "hypothetical interferer: {:.6} W at x = {:.3} m, y = {:.3} m; its interference differs from the true one by {:.3} %, {:.3e} W on average",
+            "hypothetical interferer: {:.6} W at x = {:.3} m, y = {:.3} m; its interference differs from that of all interferers by {:.3} % or {:.3e} W on average",
             self.power_w,
             self.x_m,
             self.y_m,
@@ -628,16 +628,16 @@ impl HypotheticalReport {
         _ = match (self.kept, self.sir) {
             (true, _) => writeln!(
                 text,
-                "its positions are good enough against all interferers, and are kept"
+                "the positions for the hypothetical interferer are good enough against all interferers, and are kept"
             ),
             (false, Some(sir)) => writeln!(
                 text,
-                "its positions are not good enough, {} against all interferers; shown are the best found against all{gain}. Relays would fly the positions for the hypothetical one, so `cargo provision` refuses this scenario{listen}",
+                "the positions for the hypothetical interferer are not good enough: {} against all interferers. Shown are the best positions found against all{gain}. Relays would fly those for the hypothetical interferer, so `cargo provision` refuses this scenario{listen}",
                 unit.both(sir)
             ),
             (false, None) => writeln!(
                 text,
-                "no positions are good against it; shown are the best found against all interferers"
+                "no positions are good against the hypothetical interferer; shown are the best positions found against all interferers"
             ),
         };
     }
@@ -695,7 +695,7 @@ impl fmt::Display for NoiseReport {
         if effective_w.total_cmp(&power_w).is_ne() {
             write!(
                 f,
-                "; divided by the lower antenna gain of the receivers it is {effective_w:.6e} W"
+                "; divided by the antenna gain of the receivers (the lowest, if they differ) it is {effective_w:.6e} W"
             )?;
         }
         Ok(())

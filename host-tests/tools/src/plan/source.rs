@@ -18,9 +18,9 @@ use super::{
 /// Returns the plan with the fewest relays that meet the SIR `target`; relays keep their own altitudes.
 pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<Plan, NoPlan> {
     let how = if scenario.reverse > 0.0 {
-        "eq. (Opt) for both directions"
+        "the paper's optimisation problem (Opt), for both directions"
     } else {
-        "eq. (Opt)"
+        "the paper's optimisation problem (Opt)"
     };
     let plan = fewest(scenario, target, tolerance, how)?;
     let relays = plan.mission.relays();
@@ -45,7 +45,11 @@ fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> 
     let scene = Scene::new(scenario, 1).ok_or_else(nothing)?;
     let best = one_both_ways::best(&scene, scenario.reverse).ok_or_else(nothing)?;
     let place = Placement::on_line(narrow(best.x_m), altitude_m);
-    let plan = briefed.plan(&[place], "one relay both ways", true);
+    let plan = briefed.plan(
+        &[place],
+        "the optimum of one relay for both directions",
+        true,
+    );
     Ok(Plan {
         theorem: Some(Theorem {
             number: 5,
@@ -99,10 +103,15 @@ pub(super) fn alone(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPl
     if !(found.sir > 0.0) {
         return Err(nothing());
     }
-    let how = ["Theorem 1", "Theorem 2", "Theorem 3", "one relay aside"]
-        .get(usize::from(theorem.number) - 1)
-        .copied()
-        .unwrap_or("a theorem");
+    let how = [
+        "Theorem 1",
+        "Theorem 2",
+        "Theorem 3",
+        "the optimum of one relay with a lateral offset",
+    ]
+    .get(usize::from(theorem.number) - 1)
+    .copied()
+    .unwrap_or("a theorem");
     let plan = briefed.plan(&[found.place], how, true);
     Ok(Plan {
         theorem: Some(theorem),
@@ -344,7 +353,11 @@ fn best_in_field(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Pla
         let most = best_of_equals(&free.mission, profile)?;
         Some(f64::from(most) <= f64::from(target) * (1.0 + tolerance))
     });
-    Ok(briefed.plan(&places, "ranges that can be continued to Rx", proven))
+    Ok(briefed.plan(
+        &places,
+        "a search over the ranges of x from which the next relays reach Rx",
+        proven,
+    ))
 }
 
 /// Explanation, for the user, of a single relay's position if the interferer is at Rx.
@@ -352,39 +365,39 @@ const DROWNED: &str =
     "the interferer is at Rx, so the SIR of the second hop is 0 wherever the drone is";
 
 /// Explanation, for the user, of a single relay's position if the interferer is at Tx.
-const LEVEL: &str = "the drone goes right above Rx: the interferer is at Tx, so the first hop has the same SIR everywhere, and the second is best there";
+const LEVEL: &str = "the drone goes directly above Rx: the interferer is at Tx, so the first hop has the same SIR everywhere, and the second is best there";
 
 /// Explains to the user why a relay with a fixed altitude goes to its x (a case of Theorem 1).
 pub(super) fn along_x(case: theorems::PlaceCase) -> &'static str {
     use theorems::PlaceCase;
     match case {
         PlaceCase::AboveTx => {
-            "the drone stays right above Tx: its first hop is the weaker one even there, and it is weaker still anywhere else"
+            "the drone stays directly above Tx: even there its first hop is weaker than the second, and anywhere else the first hop is even weaker"
         }
         PlaceCase::Crossing => {
-            "the drone goes where both hops are equally good: nearer to Tx the second would be worse, nearer to Rx the first"
+            "the drone goes to where both hops are equally good: nearer to Tx the second would be worse, nearer to Rx the first"
         }
         PlaceCase::AboveRx => {
-            "the drone goes right above Rx: its first hop is the better one even there, and only the second has to improve"
+            "the drone goes directly above Rx: even there its first hop is better than the second, so only the second has to improve"
         }
         PlaceCase::BeforeValley => {
-            "the drone goes to where both hops are equally good, before the point of the strongest interference, or beyond that point to right above Rx, whichever is better"
+            "the drone goes to the better of two places: where both hops are equally good, before the point of the strongest interference; or directly above Rx"
         }
         PlaceCase::OverValley => {
-            "the drone goes right above Rx: its first hop is the better one even where the interference is worst"
+            "the drone goes directly above Rx: its first hop is better than the second even where the interference is worst"
         }
         PlaceCase::Hilltop => {
-            "the drone goes to where its first hop is best, because the first hop is the weaker one even there"
+            "the drone goes to where its first hop is best, because even there the first hop is weaker than the second"
         }
         PlaceCase::BeyondHill => {
-            "the drone goes beyond the best place of its first hop, to where both hops are equally good"
+            "the drone goes past the position that is best for its first hop, to where both hops are equally good"
         }
         PlaceCase::HillAboveRx => {
-            "the drone goes right above Rx: the interferer is behind Tx, and the first hop the better one all the way"
+            "the drone goes directly above Rx: the interferer is behind Tx, and the first hop is better than the second at every position"
         }
         PlaceCase::Level => LEVEL,
         PlaceCase::SecondHill => {
-            "the drone goes past the point of the strongest interference, to where its first hop is best again, or where both hops are equally good"
+            "the drone goes past the point of the strongest interference, to where its first hop is best on that side, or to where both hops are equally good"
         }
         PlaceCase::Drowned => DROWNED,
     }
@@ -395,13 +408,13 @@ pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
     use theorems::AltitudeCase;
     match case {
         AltitudeCase::BothFall => {
-            "the drone flies as low as it may: both hops get worse with the altitude"
+            "the drone flies at the lowest permitted altitude: both hops get worse with the altitude"
         }
         AltitudeCase::Crossing => {
             "the drone climbs until both hops are equally good: at a lower altitude the interference weakens the first hop, at a higher one the distance to Rx weakens the second"
         }
         AltitudeCase::End => {
-            "the drone flies as low or as high as it may, whichever is better: nowhere between are both hops equally good"
+            "the drone flies at the lowest or highest permitted altitude, whichever is better: at no altitude between them are both hops equally good"
         }
         AltitudeCase::Drowned => DROWNED,
     }
@@ -410,12 +423,12 @@ pub(super) fn upward(case: theorems::AltitudeCase) -> &'static str {
 /// Explains to the user why a relay goes to its x and altitude, with the number of Theorem 3's case.
 pub(super) fn anywhere_above(case: theorems::FreeCase) -> (u8, String) {
     match case {
-        theorems::FreeCase::Lowest(case) => (1, format!("as low as may be, {}", along_x(case))),
-        theorems::FreeCase::Highest(case) => (2, format!("as high as may be, {}", along_x(case))),
-        theorems::FreeCase::AboveRx(case) => (3, format!("right above Rx, {}", upward(case))),
+        theorems::FreeCase::Lowest(case) => (1, format!("at the lowest permitted altitude, {}", along_x(case))),
+        theorems::FreeCase::Highest(case) => (2, format!("at the highest permitted altitude, {}", along_x(case))),
+        theorems::FreeCase::AboveRx(case) => (3, format!("directly above Rx, {}", upward(case))),
         theorems::FreeCase::Touching => (
             4,
-            "the drone goes between the lowest and the highest altitude, to where any step that helps one hop harms the other"
+            "the drone goes to an altitude between the lowest and the highest, to the point where no step improves one hop without making the other worse"
                 .to_owned(),
         ),
     }
@@ -426,29 +439,29 @@ pub(super) fn sideways(case: aside::AsideCase) -> &'static str {
     use aside::{AsideCase, EdgeCoordinate};
     match case {
         AsideCase::Touching => {
-            "the drone flies low and goes aside, away from the interferer, to where any step that helps one hop harms the other"
+            "the drone flies low and moves sideways, away from the interferer, to the point where no step improves one hop without making the other worse"
         }
         AsideCase::Hilltop => {
-            "the drone flies low and goes to where its first hop is best, because the first hop is the weaker one even there"
+            "the drone flies low and goes to where its first hop is best, because even there the first hop is weaker than the second"
         }
         AsideCase::AboveRx => {
-            "the drone goes right above Rx, as low as it may: its first hop is the better one even there"
+            "the drone goes directly above Rx, at the lowest permitted altitude: even there its first hop is better than the second"
         }
         AsideCase::Edge(EdgeCoordinate::Along) => {
-            "the drone goes as far aside, and as high or low, as it may, and along the line to where both hops are best together"
+            "the drone goes to a limit of the lateral range and of the altitudes, and along the line to where the worse of the two hops is best"
         }
         AsideCase::Edge(EdgeCoordinate::Across) => {
-            "the drone stays at Tx or Rx, as high or low as it may, and goes aside to where both hops are best together"
+            "the drone stays at the x of Tx or Rx, at the highest or lowest permitted altitude, and moves sideways to where the worse of the two hops is best"
         }
         AsideCase::Edge(EdgeCoordinate::Upward) => {
-            "the drone stays at Tx or Rx, as far aside as it may, and climbs to where both hops are best together"
+            "the drone stays at the x of Tx or Rx, at a limit of the lateral range, and climbs to where the worse of the two hops is best"
         }
         AsideCase::Level => LEVEL,
         AsideCase::Inside => {
             "the drone goes to the best position within its permitted space that a search finds, at the lowest or the highest altitude"
         }
         AsideCase::Wall => {
-            "the drone goes to a side of its permitted space, to where any step along that side that helps one hop harms the other"
+            "the drone goes to a face of its permitted space, to the point where no step along this face improves one hop without making the other worse"
         }
         AsideCase::Drowned => DROWNED,
     }

@@ -45,7 +45,7 @@ impl Elevation {
         }
         let Some(spec) = spec else { return Ok(None) };
         if scenario.line.is_none() {
-            return Err("site: is missing, which elevation files need; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }".to_owned());
+            return Err("site: is missing, but elevation files need it; allowed: [site] with tx and rx, each { lat_deg, lon_deg, amsl_m }".to_owned());
         }
         let terrain = Terrain::load(&spec.files)?;
         Ok(Some(Self {

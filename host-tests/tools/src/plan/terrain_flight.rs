@@ -40,7 +40,7 @@ const SLACK: f64 = 0.0023;
 const GAIN: f64 = 1e-4;
 
 /// Text for the user: the meaning of a relay's room, the interval of x in which it may move.
-pub const ROOM: &str = "room: while every relay is in its room, no hop becomes blocked, and no clear hop becomes grazing; none: a hop gets worse within the position error";
+pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, and no clear hop becomes grazing (ground in the first Fresnel zone); none: a drift by the position error is too much";
 
 /// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
 struct Trial {
@@ -291,7 +291,7 @@ impl Flight {
         let confined = self.relays.iter().filter(|relay| relay.room_m.is_none());
         let confined = confined.map(move |relay| {
             format!(
-                "relay {} has no room: one of its hops gets worse, blocked or grazing, within the position error of {error_m} m (companion.position_error_m)",
+                "relay {} has no room to drift: a displacement by the position error of {error_m} m (companion.position_error_m) makes one of its hops blocked, or a clear hop grazing",
                 relay.index
             )
         });
@@ -324,7 +324,7 @@ impl fmt::Display for Flight {
             let than = if loss_db < 0.0 { "more" } else { "less" };
             write!(
                 f,
-                ", {:.3} dB {than} than the plan; relays up to {off_m:.1} m from the plan's positions, because they choose x without the terrain",
+                ", {:.3} dB {than} than the plan; the relays are up to {off_m:.1} m from the planned positions, because on board they compute x without the terrain",
                 loss_db.abs()
             )?;
         }
@@ -345,7 +345,7 @@ impl fmt::Display for Flight {
         if let Some((lost, sir_db)) = worst.min_by(|one, other| one.1.total_cmp(&other.1)) {
             write!(
                 f,
-                "\nafter the loss of any other relay no hop is blocked; worst hop {sir_db:.3} dB, without relay {lost}"
+                "\nafter the loss of one relay (cases without a warning) no hop is blocked; the worst of these cases: {sir_db:.3} dB, without relay {lost}"
             )?;
         }
         Ok(())
@@ -451,7 +451,7 @@ pub fn no_fly_warnings(
     }
     if relays > MOST_RELAYS {
         return Ok(vec![format!(
-            "no-fly areas not checked after the loss of a relay: more than {MOST_RELAYS} relays are not simulated"
+            "no-fly areas not checked after the loss of a relay: this is simulated only for chains of at most {MOST_RELAYS} relays"
         )]);
     }
     let (places, losses) = losses(scenario, relays, how)?;

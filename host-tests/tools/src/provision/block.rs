@@ -47,10 +47,10 @@ impl fmt::Display for BlockError {
             }
             Self::Config(ConfigError::Method) => f.write_str("the method must be align in a scenario with a [field]"),
             Self::Config(ConfigError::Adjust) => {
-                f.write_str("the number of rounds must be within 1 to 65535, explore within 0 to 1e5 m")
+                f.write_str("the number of rounds must be within 1 to 65535, explore (change of altitude per move) within 0 to 1e5 m")
             }
             Self::Config(ConfigError::Measure) => {
-                f.write_str("the number of samples must be within 100 to 1000000, i_max_w within 1e-30 to 1e6 W")
+                f.write_str("the number of samples must be within 100 to 1000000, i_max_w (greatest interference power) within 1e-30 to 1e6 W")
             }
             Self::Config(ConfigError::Listen) => f.write_str(
                 "[listen] needs a scenario with [[interferer]] or without interference, not one with a [field]",
@@ -74,7 +74,7 @@ impl fmt::Display for BlockError {
             Self::Course(CourseError::Distance(along)) => {
                 write!(
                     f,
-                    "the sites are {along:.3} m apart: the mission's distance must be the same"
+                    "Tx and Rx are {along:.3} m apart: the mission's distance must be the same"
                 )
             }
             Self::Course(error) => error.fmt(f),
@@ -317,7 +317,9 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
             BAUD,
             "the firmware's ports have only this data rate",
         );
-        return Err(format!("{line}; a radio's own data rate is --baud"));
+        return Err(format!(
+            "{line}; give the data rate of the radio channel with --baud"
+        ));
     }
     let probe_after_ms = given_ms.or(section.probe_after_ms).unwrap_or(0);
     if probe_after_ms > MAX_PROBE_AFTER_MS {
@@ -329,7 +331,7 @@ pub fn probe_after_ms(section: &Network, given_ms: Option<u32>, name: &str) -> R
     let dead = ms(dead_after);
     let own = section.dead_after_ms.filter(|_| given_ms.is_none());
     if let Some(after) = own.filter(|after| *after != dead) {
-        let why = "the firmware uses three times probe_after_ms";
+        let why = "the firmware always uses three times probe_after_ms as dead_after_ms";
         return Err(refuse("dead_after_ms", after, dead, why));
     }
     // The explicit default and 0 give the same block.

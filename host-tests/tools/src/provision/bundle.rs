@@ -318,7 +318,7 @@ impl Bundle<'_> {
         let ceiling_m = return_m(self.uavs) + 20.0;
         if ceiling_m > FENCE_ALT_M {
             return Err(format!(
-                "FENCE_ALT_MAX would be {ceiling_m} m: {} drones that return above each other and above the chain need a fence above {FENCE_ALT_M} m, which ArduCopter does not have",
+                "FENCE_ALT_MAX would be {ceiling_m} m, but ArduCopter allows at most {FENCE_ALT_M} m: {} drones return one above the other, above the chain; use fewer drones or a lower chain",
                 self.uavs
             ));
         }
@@ -391,7 +391,7 @@ impl Bundle<'_> {
                 } = at;
                 _ = writeln!(
                     page,
-                    "place: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m above the line between the sites"
+                    "place: x {x_m:.1} m, y {y_m:.1} m, altitude {altitude_m:.1} m above the line from Tx to Rx"
                 );
                 if let Some(point) = self.line.axis.point(at) {
                     let [lat, lon] = [point.lat_e7, point.lon_e7].map(|part| f64::from(part) / 1e7);
@@ -405,7 +405,7 @@ impl Bundle<'_> {
         }
         _ = writeln!(
             page,
-            "limits of the mission: x {:.0} to {:.0} m, y {:.0} to {:.0} m, altitude {:.1} to {:.1} m above the line between the sites; neither the ground nor no-fly areas are in them",
+            "limits of the mission: x {:.0} to {:.0} m, y {:.0} to {:.0} m, altitude {:.1} to {:.1} m above the line from Tx to Rx; these limits consider neither the ground nor no-fly areas",
             fence.least_x_m,
             fence.most_x_m,
             fence.least_y_m,
@@ -489,7 +489,7 @@ fn written_files(section: &mut dyn TableLike, name: &str, keys: &[&str]) -> Resu
         let may_write = |path: &Path| WRITABLE.iter().any(|folder| path.starts_with(folder));
         if !path.is_some_and(may_write) {
             return Err(format!(
-                "{name}.{key} = {given:?}: the unit may write only in {}",
+                "{name}.{key} = {given:?}: the systemd unit may write only in {}",
                 WRITABLE.join(" and ")
             ));
         }
@@ -506,7 +506,7 @@ fn absolute(section: &dyn TableLike, name: &str, keys: &[&str]) -> Result<(), St
         let given = section.get(key).and_then(Item::as_str);
         if let Some(given) = given.filter(|path| !Path::new(path).is_absolute()) {
             return Err(format!(
-                "{name}.{key} = {given:?}: this file is not in the bundle: give its path on the other computer, from the root folder"
+                "{name}.{key} = {given:?}: this file is not in the bundle: give its absolute path (from /) on the computer where the bundle is installed"
             ));
         }
     }

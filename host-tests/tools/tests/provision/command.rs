@@ -130,7 +130,7 @@ fn a_channel_that_cannot_carry_the_chain_is_refused() {
     ] {
         let baud = arguments.split_once("--baud ").map_or("115200", |it| it.1);
         let line = format!(
-            "--baud {baud}: too slow for {in_range} relays in range of each other: use at least {least} bit/s, or --probe-after-ms {ms}, or at most {most} relays in range of each other; if fewer relays receive each other, give --in-range, or --wires for separate links\n"
+            "--baud {baud}: too slow for {in_range} relays in range of each other: use at least {least} bit/s, or --probe-after-ms {ms}, or at most {most} relays in range of each other; this assumes that all relays receive each other: if not, give --in-range, or --wires for separate links\n"
         );
         assert_eq!(refusal(&format!("{plain} {arguments}")), line);
     }

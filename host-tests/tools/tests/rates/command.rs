@@ -69,7 +69,7 @@ fn relays_are_planned_for_both_directions_on_request() {
         // The bound of intervals proves it.
         assert_eq!(report["proven"], true, "{report}");
         let how = if uavs == 1 {
-            "one relay both ways"
+            "the optimum of one relay for both directions"
         } else {
             "Algorithm 1 for both directions"
         };
@@ -93,8 +93,8 @@ fn both_directions_are_in_the_table_and_in_the_picture() {
     let report = json(&file, "--uavs 3");
     for part in [
         "SIR [dB]     SIR back back [dB]\n",
-        "it needs 0.5 of the SIR from Tx to Rx (link.reverse); worst direction: both\n",
-        "in this model no positions are better; not modelled: terrain and obstacles\n",
+        "required: 0.5 times the SIR toward Rx (link.reverse); worst direction: both\n",
+        "proven for this model: no positions are better; not modelled: terrain and obstacles\n",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
@@ -166,7 +166,7 @@ fn data_rates_count_both_directions() {
         let line = String::from_utf8(refused.stderr).unwrap();
         assert_eq!(refused.status.code(), Some(1), "{line}");
         assert!(
-            line.contains("to Rx and at least 0.5 of it back (link.reverse)"),
+            line.contains("to Rx, and at least 0.5 times this rate back (link.reverse)"),
             "{line}"
         );
     }
@@ -175,9 +175,9 @@ fn data_rates_count_both_directions() {
         "--uavs 3 --rates",
     );
     for part in [
-        " back: 4 hops share one frequency in 4 equal time slots, each way half of the time, and the worst hop carries ",
+        " back: 4 hops share one frequency in 4 equal time slots, each way half of the time; worst hop while it transmits (without its pauses): ",
         "\n    2 relays carry ",
-        " of it back (link.reverse), more than 3 relays do; no other number carries more\n",
+        " times this rate back (link.reverse), more than 3 relays do; no other number of relays carries a larger rate\n",
     ] {
         assert!(table.contains(part), "{part}: {table}");
     }
@@ -369,7 +369,10 @@ fn fitted_slots_with_free_altitudes_are_planned_as_on_board() {
             let bandwidth = format!("--uavs {uavs} --bandwidth-hz 1e6 --rates");
             let line = json(&file, &bandwidth);
             let free = json(&file, &format!("{bandwidth} --altitude free"));
-            assert_eq!(free["how"], "the joint method for fitted slots");
+            assert_eq!(
+                free["how"],
+                "the joint method for time slots fitted to the hops"
+            );
             assert!(least(&free) >= least(&line) * (1.0 - 1e-5), "{line} {free}");
             assert_eq!(free["best_is_proven"], false, "{free}");
         }

@@ -480,7 +480,7 @@ mod tests {
             fewer += u32::from(portions < more);
         }
         std::println!(
-            "{kept} portions of work with the stored best chain, {again} if it is computed again; fewer in {fewer} of {count} missions"
+            "portions of work: {kept} if the best chain is stored, {again} if it is computed again; storing takes fewer portions in {fewer} of {count} missions"
         );
         assert!(fewer * 2 > count);
     }

@@ -155,7 +155,7 @@ fn a_relay_that_is_off_does_not_count_in_the_share_of_the_optimum() {
     assert!(share > 0.9 && share < 1.01, "{native}");
     let words = said(&mut browser, "summary");
     let end = format!(
-        " {:.1} % of the optimum with the interferer known.",
+        " {:.1} % of the best SIR possible if the interferer were known.",
         100.0 * share
     );
     assert!(words.ends_with(&end), "{end}: {words}");

@@ -287,7 +287,7 @@ fn a_position_older_than_ten_seconds_is_marked_in_the_table_and_faded_on_the_map
         [0, 1, 2].map(|at| remarks(&mut browser, at)),
         [
             "",
-            "position may be behind: 12 s old; waits: relay 1 has not made room yet",
+            "position is 12 s old: the drone may be elsewhere; waits: relay 1 has not made room yet",
             ""
         ]
     );
@@ -310,7 +310,7 @@ fn a_position_older_than_ten_seconds_is_marked_in_the_table_and_faded_on_the_map
     // An age grows while no snapshot arrives.
     drop(shown);
     browser.until("byId('connection').className === 'broken'");
-    assert!(remarks(&mut browser, 0).starts_with("position may be behind: 1"));
+    assert!(remarks(&mut browser, 0).starts_with("position is 1"));
     assert!(opacity(&mut browser, 1) < 0.5);
     // Among a hundred relays without room for numbers, the age is beside the symbol, too.
     let many = Shown::begin(|| {
@@ -769,7 +769,7 @@ fn the_ground_below_the_chain_is_drawn_with_relays_at_their_heights() {
             "10 m above ground"
         );
         assert_eq!(above(&mut browser, 2_000.0, 50.0), "50 m above ground");
-        assert_eq!(above(&mut browser, 2_001.0, 50.0), "beyond the line");
+        assert_eq!(above(&mut browser, 2_001.0, 50.0), "not between Tx and Rx");
         // The ground is drawn from the bottom up to its height, and the hill is higher than the plain.
         let tops = browser.value(
             "(() => { profile.draw(); const { width, height } = profile.canvas; \

@@ -69,7 +69,7 @@ fn both_directions_of_every_hop_are_shown_and_the_worst_one_is_marked() {
     choose(&mut browser, "reverse", "1.5");
     assert_eq!(
         said(&mut browser, "wrong"),
-        "SIR needed back to Tx, as a share of the SIR to Rx = 1.5: must be within 0 to 1"
+        "SIR required toward Tx, divided by the SIR toward Rx = 1.5: must be within 0 to 1"
     );
     choose(&mut browser, "reverse", "0");
     assert_eq!(browser.value(listed), 9);

@@ -188,7 +188,7 @@ impl Chain {
         });
         let mut note = self.send(sent.from, &sent.frame, Port::Shared, arrives, receivers);
         if sent.missed > 0 {
-            let missed = format!("{} in range did not receive it", sent.missed);
+            let missed = format!("{} in range did not receive the frame", sent.missed);
             note = if note.is_empty() {
                 missed
             } else {

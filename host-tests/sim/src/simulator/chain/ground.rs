@@ -144,7 +144,10 @@ impl Chain {
             && let Some(again) = station.ground.poll_timeout()
             && station.wake.is_none_or(|wake| again < wake)
         {
-            assert!(again > now, "the ground would spin");
+            assert!(
+                again > now,
+                "the ground node asks for the next call without an advance of time (endless loop)"
+            );
             station.wake = Some(again);
             self.queue.put(again, at, QueuedEvent::StationTimeout);
         }

@@ -311,11 +311,11 @@ impl Chain {
             let holds = [Side::Upstream, Side::Downstream].map(|side| {
                 relay
                     .hold_reason(side)
-                    .map_or("nothing".to_owned(), |it| format!("{it:?}"))
+                    .map_or("none".to_owned(), |it| format!("{it:?}"))
             });
             let [up, down] = holds;
             format!(
-                "{:?}, held by {up} toward Tx and {down} toward Rx",
+                "{:?}; reason to wait: {up} toward Tx, {down} toward Rx",
                 relay.departure(self.now)
             )
         });

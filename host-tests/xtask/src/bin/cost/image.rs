@@ -264,9 +264,7 @@ pub(crate) fn no_panic() -> Result<(), String> {
         &[],
         &["--cfg", "prove_no_panic", "--cfg", "panic_on_purpose"],
     ) {
-        Ok(_) => {
-            Err("a panic put there on purpose was linked, so the check cannot detect panics".into())
-        }
+        Ok(_) => Err("the deliberate panic was linked, so the check cannot detect panics".into()),
         Err(error) if error.contains("a_panic_is_reachable") => Ok(()),
         Err(error) => Err(format!(
             "the image with a deliberate panic failed to link for another reason: {error}"

@@ -42,9 +42,7 @@ fn main() -> ExitCode {
 
 fn report(rows: &[Row], write: bool) -> Result<(), String> {
     print!("{}", table(rows));
-    println!(
-        "No panic is reachable in any of these images, and one put there on purpose does not link."
-    );
+    println!("No panic is reachable in any of these images, and a deliberate panic does not link.");
     let over: Vec<&str> = rows
         .iter()
         .filter(|row| row.budget.is_some_and(|budget| row.value > budget))
