@@ -166,31 +166,29 @@ impl Terrain {
     /// # Errors
     /// A line that names the point and the file: no file covers the point, or the file has a hole there.
     pub fn height_m(&self, lat_deg: f64, lon_deg: f64) -> Result<f64, String> {
+        let at = self.cells(lat_deg, lon_deg);
+        interpolated(at, |node| self.node_m(node, lat_deg, lon_deg))
+    }
+
+    /// Returns the column and the row of a point in the grid, with fractions. The grid has heights at whole numbers.
+    pub fn cells(&self, lat_deg: f64, lon_deg: f64) -> [f64; 2] {
         let [east, north] = self.system.coordinates(lat_deg, lon_deg);
-        let column = (east - self.corner[0]) / self.cell[0];
-        let row = (self.corner[1] - north) / self.cell[1];
-        // A point within rounding of a node needs no other nodes.
-        let split = |at: f64| {
-            let whole = (at + 1e-6).floor();
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "the cast saturates, and no tile is there"
-            )]
-            let first = whole as i64;
-            let share = (at - whole).max(0.0);
-            (first, if share < 1e-6 { 0.0 } else { share })
+        [
+            (east - self.corner[0]) / self.cell[0],
+            (self.corner[1] - north) / self.cell[1],
+        ]
+    }
+
+    /// Returns the height at a column and a row of [`cells`](Self::cells), m; `None` outside and in a hole.
+    pub fn height_at(&self, cells: [f64; 2]) -> Option<f64> {
+        let known = |node| {
+            let mut nodes = self.tiles.iter().map(|tile| tile.node(node));
+            nodes.find_map(|node| match node {
+                Node::Height(height) => Some(height),
+                Node::Hole(..) | Node::Outside => None,
+            })
         };
-        let ((column, right), (row, down)) = (split(column), split(row));
-        let mut sum = 0.0;
-        for (row, weight_down) in [(row, 1.0 - down), (row + 1, down)] {
-            for (column, weight) in [(column, 1.0 - right), (column + 1, right)] {
-                let weight = weight * weight_down;
-                if weight > 0.0 {
-                    sum += weight * self.node_m([column, row], lat_deg, lon_deg)?;
-                }
-            }
-        }
-        Ok(sum)
+        interpolated(cells, |node| known(node).ok_or(())).ok()
     }
 
     fn node_m(&self, at: [i64; 2], lat_deg: f64, lon_deg: f64) -> Result<f64, String> {
@@ -232,6 +230,35 @@ impl Terrain {
             extents.join(", ")
         )
     }
+}
+
+/// Returns the bilinear interpolation at a column and a row of the heights that `height` returns.
+fn interpolated<E>(
+    [column, row]: [f64; 2],
+    height: impl Fn([i64; 2]) -> Result<f64, E>,
+) -> Result<f64, E> {
+    // A point within rounding of a node needs no other nodes.
+    let split = |at: f64| {
+        let whole = (at + 1e-6).floor();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the cast saturates, and no tile is there"
+        )]
+        let first = whole as i64;
+        let share = (at - whole).max(0.0);
+        (first, if share < 1e-6 { 0.0 } else { share })
+    };
+    let ((column, right), (row, down)) = (split(column), split(row));
+    let mut sum = 0.0;
+    for (row, weight_down) in [(row, 1.0 - down), (row + 1, down)] {
+        for (column, weight) in [(column, 1.0 - right), (column + 1, right)] {
+            let weight = weight * weight_down;
+            if weight > 0.0 {
+                sum += weight * height([column, row])?;
+            }
+        }
+    }
+    Ok(sum)
 }
 
 impl Tile {

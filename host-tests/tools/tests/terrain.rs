@@ -385,7 +385,7 @@ fn a_blocked_plan_is_refused_with_the_hop_the_place_and_the_metres() {
             && table.contains("buildings and trees"),
         "{table}"
     );
-    assert!(line.contains("hop 2 (relay 1 to relay 2) is blocked: the ground at x = 1475 m, y = 0 m (latitude 47.200"), "{line}");
+    assert!(line.contains("hop 2 (relay 1 to relay 2) is blocked: the ground at x = 1473 m, y = 0 m (latitude 47.200"), "{line}");
     assert!(
         line.contains(" is 34.7 m above the line of sight")
             && line.contains("relay 1 is -13.0 m, ")
@@ -778,7 +778,7 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     // Its last hop would be blocked.
     let blocked = without[0]["problem"].as_str().unwrap();
     assert!(
-        blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 44"),
+        blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 4399 m"),
         "{blocked}"
     );
     let blocks = path("blocks");

@@ -62,7 +62,7 @@ fn heights_are_interpolated_within_and_between_files() {
 }
 
 /// UTM coordinates by Krüger's series to the third order: independent of the crate's conversion.
-fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
+pub(crate) fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
     let n: f64 = 1.0 / (2.0 * 298.257_223_563 - 1.0);
     let alpha = [
         n / 2.0 - 2.0 / 3.0 * n.powi(2) + 5.0 / 16.0 * n.powi(3),
