@@ -210,8 +210,9 @@ pub fn rooms(
     // The position itself may be anywhere in the interval without its error.
     Ok(rooms
         .map(|(node, is_in)| {
-            let [from, to] = node.x_m;
-            is_in.then_some([from + error, to - error])
+            let [from, to] = [node.x_m[0] + error, node.x_m[1] - error];
+            // Beside Tx or Rx the position error may lead beyond it.
+            (is_in && from <= to).then_some([from, to])
         })
         .collect())
 }
