@@ -866,10 +866,11 @@ fn source_areas(
         let key = format!("{table}area");
         let area = given.area(file, &key, room.line)?;
         for (site, x_m) in [("Tx", 0.0), ("Rx", room.distance_m)] {
-            if area.contains([x_m, 0.0]) {
+            let apart_m = area.distance_m([x_m, 0.0]);
+            if apart_m < LEAST_APART_M {
                 let value = format!("with {site} (x = {} m, y = 0)", number(x_m));
                 let allowed = format!(
-                    "an area without Tx and Rx, because an interferer at {site} leaves no SIR there"
+                    "an area at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} leaves no SIR there; this one is {apart_m:.4} m from {site}"
                 );
                 return Err(mistake(
                     file,
@@ -1051,7 +1052,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
     let text = super::check::text_of(&path).map_err(|error| fail(error.problem.to_string()))?;
     let value: serde_json::Value =
         serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
-    let mut rings = Vec::new();
+    let mut polygons = Vec::new();
     let mut open = vec![&value];
     while let Some(value) = open.pop() {
         let Some(kind) = value.get("type").and_then(|kind| kind.as_str()) else {
@@ -1068,10 +1069,11 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
             "FeatureCollection" => open.extend(list("features")?.iter().rev()),
             "GeometryCollection" => open.extend(list("geometries")?.iter().rev()),
             "Feature" => open.push(value.get("geometry").ok_or_else(|| lacks("geometry"))?),
-            "Polygon" => rings.extend(list("coordinates")?.first()),
+            "Polygon" => polygons.push(list("coordinates")?),
             "MultiPolygon" => {
                 for polygon in list("coordinates")? {
-                    rings.push(polygon.get(0).ok_or_else(|| lacks("a boundary"))?);
+                    let polygon = polygon.as_array().filter(|rings| !rings.is_empty());
+                    polygons.push(polygon.ok_or_else(|| lacks("a boundary"))?);
                 }
             }
             _ => return Err(fail(format!("has a {kind}"))),
@@ -1085,14 +1087,41 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
         let all = ring.as_array()?;
         // The last corner repeats the first one.
         let is_allowed = (3..=MOST_CORNERS + 1).contains(&all.len());
-        is_allowed.then(|| all.iter().map(point).collect::<Option<Vec<_>>>())?
+        let corners = is_allowed.then(|| all.iter().map(point).collect::<Option<Vec<_>>>())?;
+        let mut corners = corners?;
+        corners.dedup();
+        if corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        Some(corners)
     };
-    if rings.is_empty() {
+    if polygons.is_empty() {
         return Err(fail("has no polygon".to_owned()));
     }
-    let rings: Option<Vec<_>> = rings.into_iter().map(ring).collect();
-    rings.ok_or_else(|| fail("has a polygon with wrong corners".to_owned()))
+    let mut boundaries = Vec::new();
+    for (number, rings) in polygons.into_iter().enumerate() {
+        let rings: Option<Vec<_>> = rings.iter().map(ring).collect();
+        let rings = rings.ok_or_else(|| fail("has a polygon with wrong corners".to_owned()))?;
+        let mut rings = rings.into_iter();
+        let boundary = Area::Polygon(rings.next().unwrap_or_default());
+        for (hole, corners) in (2..).zip(rings) {
+            // A centimetre, because a hole may touch the boundary.
+            if corners.iter().any(|at| boundary.distance_m(*at) > 1e-7) {
+                return Err(fail(format!(
+                    "polygon {number}: ring {hole} is not inside ring 1, and the first ring has to be the outer boundary"
+                )));
+            }
+        }
+        boundaries.push(boundary.corners());
+    }
+    Ok(boundaries)
 }
+
+/// Least distance of an interferer from Tx and Rx, m.
+const LEAST_APART_M: f64 = 1.0;
+
+/// Distance of an interferer from the line, m, above which its latitude and longitude are probably swapped.
+const SWAPPED_M: f64 = 1e6;
 
 /// Converts the `[[interferer]]` tables of a file to EIRPs and positions. Their keys must have been checked.
 pub(super) fn sources(
@@ -1110,6 +1139,20 @@ pub(super) fn sources(
             (Some(lat), Some(lon), _) => on_earth(file, &table, raw, [lat, lon], room)?,
             _ => (raw.x_m.unwrap_or_default(), raw.y_m.unwrap_or_default()),
         };
+        for (site, site_m) in [("Tx", 0.0), ("Rx", room.distance_m)] {
+            let apart_m = (x_m - site_m).hypot(y_m);
+            if apart_m < LEAST_APART_M && raw.area.is_none() {
+                let (key, value) = match (raw.lat_deg, raw.lon_deg) {
+                    (Some(lat), Some(lon)) => ("lat_deg", format!("{lat}, lon_deg = {lon}")),
+                    _ => ("x_m", format!("{}, y_m = {}", number(x_m), number(y_m))),
+                };
+                let allowed = format!(
+                    "a position at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} leaves no SIR there; this one is {apart_m:.4} m from {site}"
+                );
+                let key = format!("{table}{key}");
+                return Err(mistake(file, &key, Some(value), Problem::OutOfRange, allowed));
+            }
+        }
         Ok(Source { power_w, x_m, y_m })
     })
     .collect()
@@ -1143,10 +1186,20 @@ fn on_earth(
     };
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
     let Some(place) = point.and_then(|point| line.axis.place(point)) else {
-        let allowed = format!(
+        let mut allowed = format!(
             "a position up to {} m from the line between the two sites of [site] and from its ends",
             Axis::AROUND_M
         );
+        let swapped = Geodetic::from_degrees(lon_deg, lat_deg, 0.0);
+        let away_m = point.and_then(|point| line.axis.away_m(point));
+        if swapped.is_some_and(|point| line.axis.place(point).is_some()) {
+            allowed.push_str("; latitude and longitude are swapped");
+        } else if let Some(away_m) = away_m {
+            allowed = format!("{allowed}; this one is {:.0} km away", away_m / 1e3);
+            if away_m > SWAPPED_M {
+                allowed.push_str(": are latitude and longitude swapped?");
+            }
+        }
         return fail(Problem::OutOfRange, &allowed);
     };
     let Placement {
