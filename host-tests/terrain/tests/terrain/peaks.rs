@@ -458,3 +458,43 @@ fn no_hop_between_two_rooms_is_blocked_by_a_peak() {
         "{with_room}"
     );
 }
+
+#[test]
+fn a_relay_that_may_be_beyond_a_site_has_no_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let Scene {
+        terrain,
+        sites,
+        axis,
+        ..
+    } = scene(folder.path(), 1);
+    let ground = Ground::new(&terrain, axis, sites, 60.0).unwrap();
+    let d = axis.distance_m();
+    let free = FreeSpace {
+        sirs: &[1.0; 3],
+        sirs_back: &[],
+        reverse: 0.0,
+    };
+    let limits = Limits {
+        position_error_m: 1.0,
+        above_ground_m: [1.0, f64::INFINITY],
+        apart_m: 5.0,
+        wavelength_m: WAVE_M,
+    };
+    let rooms_at = |x: [f64; 2]| {
+        let places = x.map(|x_m| Placement {
+            x_m: x_m as f32,
+            y_m: 0.0,
+            altitude_m: 60.0,
+        });
+        let report = TerrainReport::new(&ground, &places, free, 2.4e9, 1.0).unwrap();
+        rooms(&ground, &places, &report, limits).unwrap()
+    };
+    // Reversed intervals were returned here.
+    let near = rooms_at([0.4, d - 0.4]);
+    assert_eq!(near, [None, None]);
+    for room in rooms_at([30.0, d - 30.0]) {
+        let [low, high] = room.unwrap();
+        assert!(low < high);
+    }
+}

@@ -18,7 +18,7 @@ use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M};
 use uav_relay_tools::plan::terrain_flight::{Flight as Simulated, no_fly_warnings};
 use uav_relay_tools::plan::{NoPlan, Unit};
 use uav_relay_tools::provision::block::Flight;
-use uav_relay_tools::provision::bundle::{Bundle, FILL_IN};
+use uav_relay_tools::provision::bundle::{ASIDE_M, Bundle, FILL_IN};
 use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secret};
 use uav_relay_tools::provision::folder::{Heading, summary};
 use uav_relay_tools::provision::{block, folder};
@@ -298,8 +298,7 @@ impl<'a> Asked<'a> {
             NoPlan::Unmet(why, _) => named(why.say(Unit::Decibels)),
         };
         let warn = |line: String| command::print_line(&named(format!("warning: {line}")));
-        let error_m = self.deployment.companion.position_error_m;
-        let error_m = error_m.map_or(POSITION_ERROR_M, f64::from);
+        let error_m = self.position_error_m();
         if self.scenario.terrain.is_none() && self.options.allow_blocked {
             return Err("--allow-blocked: is only for a scenario with a [terrain]".to_owned());
         }
@@ -332,6 +331,11 @@ impl<'a> Asked<'a> {
         }
         flight.warnings().for_each(warn);
         Ok(Some(flight))
+    }
+
+    fn position_error_m(&self) -> f64 {
+        let error_m = self.deployment.companion.position_error_m;
+        error_m.map_or(POSITION_ERROR_M, f64::from)
     }
 
     /// Prints that terrain and no-fly areas of the scenario are not checked, and why.
@@ -442,7 +446,22 @@ impl<'a> Asked<'a> {
             Some(index) => vec![index],
             None => (1..=self.uavs).collect(),
         };
+        let (scenario, error_m) = (&self.scenario, self.position_error_m());
+        let elevation = Elevation::load(scenario, &[], error_m);
+        let ground_m = elevation
+            .and_then(|elevation| {
+                let sides = [scenario.lateral_min_m, scenario.lateral_max_m];
+                let aside_m = sides.into_iter().fold(0.0, |most: f64, side| most.max(side.abs()));
+                elevation
+                    .map(|elevation| {
+                        let [low, high] = elevation.corridor_m(scenario, aside_m + ASIDE_M)?;
+                        Ok::<_, String>([low, high + elevation.spec.above_ground_m])
+                    })
+                    .transpose()
+            })
+            .map_err(|line| format!("{name}: {line}; the ground is needed up to {ASIDE_M} m beside the chain, for the altitude of the return to launch"))?;
         let bundle = Bundle {
+            ground_m,
             text,
             deployment: &self.deployment,
             uavs: self.uavs,

@@ -115,6 +115,25 @@ impl Elevation {
         Ok(each.collect())
     }
 
+    /// Returns the lowest and the highest ground from Tx to Rx, up to `aside_m` beside the line, m above the sea.
+    ///
+    /// The highest ground is raised by the error of the heights.
+    ///
+    /// # Errors
+    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    pub fn corridor_m(&self, scenario: &Scenario, aside_m: f64) -> Result<[f64; 2], String> {
+        let ground = self.ground(scenario)?;
+        let [from, to] = [[0.0, -aside_m], [scenario.distance_m, aside_m]];
+        let corners = vec![from, [to[0], from[1]], to, [from[0], to[1]]];
+        let heights = heights(&ground, &Area::Polygon(corners))?;
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        Ok(heights
+            .into_iter()
+            .fold(none, |[low, high], [x, _, height]| {
+                [low.min(height), high.max(height + ground.raise_m(x))]
+            }))
+    }
+
     /// Returns the report of the terrain below `plan`.
     ///
     /// # Errors

@@ -10,6 +10,7 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::{Duration, Method, Placement};
+use uav_relay_scenario::area::NoFly;
 use uav_relay_scenario::{PlannedMethod, Scenario, mission};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
@@ -18,7 +19,7 @@ use uav_relay_terrain::diffraction::LIGHT_M_S;
 use uav_relay_terrain::profile::Ground;
 use uav_relay_terrain::room::{Limits, rooms};
 
-use super::area::entered;
+use super::area::{entered, range};
 use super::flown::{alone, shortest};
 use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
@@ -40,7 +41,7 @@ const SLACK: f64 = 0.0023;
 const GAIN: f64 = 1e-4;
 
 /// Explanation of the rooms for the user.
-pub const ROOM: &str = "room: while every relay is in its room, no hop becomes blocked, and no clear hop becomes grazing; none: a hop gets worse within the position error";
+pub const ROOM: &str = "room: while every relay is in its room, no hop becomes blocked, no clear hop becomes grazing, and no relay is in a no-fly area; none: that does not hold within the position error";
 
 /// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
 struct Trial {
@@ -171,7 +172,7 @@ pub struct FlownRelay {
     pub altitude_m: f32,
     /// Interval of x, m, in which no hop gets worse while its neighbours are in their intervals.
     ///
-    /// Absent if there is none.
+    /// It contains no no-fly area. Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub room_m: Option<[f64; 2]>,
 }
@@ -202,9 +203,12 @@ pub struct Flight {
     pub off_m: Option<f64>,
     /// Positions of the relays.
     pub relays: Vec<FlownRelay>,
-    /// Position error of a relay, m.
+    /// Blocked hops that `--allow-blocked` accepts; absent if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blocked: Option<String>,
+    /// Reasons why relays have no room, one for each.
     #[serde(skip)]
-    position_error_m: f64,
+    confined: Vec<String>,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
     /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high.
@@ -241,7 +245,22 @@ impl Flight {
             apart_m: scenario.min_separation_m,
             wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
         };
-        let rooms = rooms(&ground, &places, &report, limits).map_err(NoPlan::Wrong)?;
+        let mut rooms = rooms(&ground, &places, &report, limits).map_err(NoPlan::Wrong)?;
+        let error_m = limits.position_error_m;
+        let mut confined = Vec::new();
+        for ((index, place), room) in (1..).zip(&places).zip(&mut rooms) {
+            let entered = if room.is_some() {
+                cut(room, place, &scenario.no_fly, error_m)
+            } else {
+                Some(
+                    "one of its hops gets worse, blocked or grazing, or it passes Tx or Rx,"
+                        .to_owned(),
+                )
+            };
+            confined.extend(entered.map(|why| {
+                format!("relay {index} has no room: {why} within the position error of {error_m} m (companion.position_error_m)")
+            }));
+        }
         let closed =
             |loss: &Loss| without(scenario, elevation, &ground, tolerance, (loss, &places));
         let without: Vec<Result<Without, NoPlan>> = losses.par_iter().map(closed).collect();
@@ -249,7 +268,8 @@ impl Flight {
             terrain_sir_db: report.terrain_sir_db,
             loss_db: None,
             off_m: None,
-            position_error_m: elevation.position_error_m(),
+            blocked: report.blocked().filter(|_| allow_blocked),
+            confined,
             relays: (1..)
                 .zip(&places)
                 .zip(rooms)
@@ -285,16 +305,11 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns the lines about relays without a room, and about the loss of one relay that name a problem.
+    /// Returns the lines about accepted blocked hops, relays without a room, and losses of one relay with a problem.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        let error_m = self.position_error_m;
-        let confined = self.relays.iter().filter(|relay| relay.room_m.is_none());
-        let confined = confined.map(move |relay| {
-            format!(
-                "relay {} has no room: one of its hops gets worse, blocked or grazing, within the position error of {error_m} m (companion.position_error_m)",
-                relay.index
-            )
-        });
+        let blocked = self.blocked.iter();
+        let blocked = blocked.map(|line| format!("{line}; accepted by --allow-blocked"));
+        let confined = blocked.chain(self.confined.iter().cloned());
         confined.chain(self.without.iter().filter_map(|without| {
             let problem = without.problem.as_ref()?;
             Some(format!("without relay {}: {problem}", without.lost))
@@ -350,6 +365,34 @@ impl fmt::Display for Flight {
         }
         Ok(())
     }
+}
+
+/// Leaves the part of `room` around `place` that no area of `no_fly` reaches within the position error, m.
+///
+/// Returns the reason why there is no room any more.
+fn cut(
+    room: &mut Option<[f64; 2]>,
+    place: &Placement,
+    no_fly: &[NoFly],
+    error_m: f64,
+) -> Option<String> {
+    let [x, y, h] = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+    for area in no_fly {
+        for [from, to] in area.intervals_m(y, h, error_m) {
+            let Some([low, high]) = room else {
+                return None;
+            };
+            if to <= x {
+                *low = low.max(to);
+            } else if from >= x {
+                *high = high.min(from);
+            } else {
+                *room = None;
+                return Some(format!("it is in {}", range(area)));
+            }
+        }
+    }
+    None
 }
 
 /// Returns the setup of a simulated flight on a shared channel without losses.
