@@ -952,7 +952,7 @@ fn a_plan_in_another_folder_finds_its_files() {
     let polygon = format!(r#"{{ "type": "Polygon", "coordinates": [{ring}] }}"#);
     std::fs::write(folder.join("own/zones.geojson"), polygon).unwrap();
     let key = folder.join("own/net.key");
-    std::fs::write(&key, "00".repeat(32)).unwrap();
+    std::fs::write(&key, "01".repeat(32)).unwrap();
     std::fs::set_permissions(&key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
     let text = AREA
         .replace(

@@ -261,9 +261,7 @@ impl Flight {
                 format!("relay {index} has no room: {why} within the position error of {error_m} m (companion.position_error_m)")
             }));
         }
-        let closed =
-            |loss: &Loss| without(scenario, elevation, &ground, tolerance, (loss, &places));
-        let without: Vec<Result<Without, NoPlan>> = losses.par_iter().map(closed).collect();
+        let without = losses_over(scenario, elevation, &ground, tolerance, (&losses, &places))?;
         Ok(Self {
             terrain_sir_db: report.terrain_sir_db,
             loss_db: None,
@@ -280,7 +278,7 @@ impl Flight {
                     room_m,
                 })
                 .collect(),
-            without: without.into_iter().collect::<Result<_, _>>()?,
+            without,
             problem: elevation.problem(&report, allow_blocked),
         })
     }
@@ -498,15 +496,20 @@ pub fn no_fly_warnings(
         )]);
     }
     let (places, losses) = losses(scenario, relays, how)?;
+    Ok(lines_of(&scenario.no_fly, &losses, &places))
+}
+
+/// Returns a line for each of `losses`, in a chain at `places`, that leads another relay into a no-fly area.
+fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<String> {
     let lines = losses.iter().filter_map(|loss| {
         let problems = match &loss.places {
-            Some(to) => entered(&scenario.no_fly, &loss.left, [&loss.before(&places), to]),
+            Some(to) => entered(no_fly, &loss.left, [&loss.before(places), to]),
             None => vec![NOWHERE.to_owned()],
         };
         let problem = problems.join("; ");
         (!problems.is_empty()).then(|| format!("without relay {}: {problem}", loss.lost))
     });
-    Ok(lines.collect())
+    lines.collect()
 }
 
 impl Loss {
@@ -515,6 +518,19 @@ impl Loss {
         let left = (1..).zip(places).filter(|(index, _)| *index != self.lost);
         left.map(|(_, place)| *place).collect()
     }
+}
+
+/// Returns terrain and no-fly areas below the others, after each of the losses in a chain at `places`.
+fn losses_over(
+    scenario: &Scenario,
+    elevation: &Elevation,
+    ground: &Ground<'_>,
+    tolerance: f64,
+    (losses, places): (&[Loss], &[Placement]),
+) -> Result<Vec<Without>, NoPlan> {
+    let closed = |loss: &Loss| without(scenario, elevation, ground, tolerance, (loss, places));
+    let without: Vec<Result<Without, NoPlan>> = losses.par_iter().map(closed).collect();
+    without.into_iter().collect()
 }
 
 /// Returns terrain and no-fly areas below the others, after a loss in a chain at `places`.
@@ -589,4 +605,73 @@ fn lowest(ground: &Ground<'_>, from: Placement, to: Placement) -> Result<Option<
         ]
     });
     Ok(heights.min_by(|one, other| one[1].total_cmp(&other[1])))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by it")]
+
+    use std::path::Path;
+
+    use uav_relay::Placement;
+    use uav_relay_scenario::Scenario;
+
+    use super::{Flight, Loss, NOWHERE, losses_over};
+    use crate::plan::terrain::Elevation;
+
+    /// Checks what a user reads if the others find no positions after a loss.
+    ///
+    /// The simulated relays of a scenario file always find some, so the outcome is given here.
+    #[test]
+    fn a_loss_after_which_the_others_find_no_positions_is_named() {
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/hills.toml");
+        let scenario = Scenario::load(&example).unwrap();
+        let elevation = Elevation::load(&scenario, &[], 1.0).unwrap().unwrap();
+        let ground = elevation.ground(&scenario).unwrap();
+        let places = [1000.0, 2500.0, 4000.0].map(|x_m| Placement::on_line(x_m, 150.0));
+        let nowhere = |lost: u16| Loss {
+            lost,
+            left: (1..=3).filter(|index| *index != lost).collect(),
+            places: None,
+        };
+        let found = Loss {
+            places: Some(vec![places[0], places[2]]),
+            ..nowhere(2)
+        };
+        let losses = [nowhere(1), found, nowhere(3)];
+        let without =
+            losses_over(&scenario, &elevation, &ground, 1e-4, (&losses, &places)).unwrap();
+        for (at, loss) in without.iter().enumerate() {
+            let is_known = at == 1;
+            assert_eq!(loss.terrain_sir_db.is_some(), is_known);
+            assert_eq!(loss.problem.as_deref() == Some(NOWHERE), !is_known);
+        }
+        let flight = Flight {
+            terrain_sir_db: 1.0,
+            loss_db: None,
+            off_m: None,
+            relays: Vec::new(),
+            blocked: None,
+            confined: Vec::new(),
+            without,
+            problem: None,
+        };
+        let text = flight.to_string();
+        for lost in [1, 3] {
+            let line = format!("warning: without relay {lost}: the other relays find no positions");
+            assert_eq!(text.matches(&line).count(), 1, "{text}");
+        }
+        assert!(
+            !text.contains("worst hop 1.000 dB, without relay"),
+            "{text}"
+        );
+        // The same without terrain.
+        let lines = super::lines_of(&scenario.no_fly, &losses, &places);
+        assert_eq!(
+            lines,
+            [1, 3].map(|lost| format!("without relay {lost}: the other relays find no positions"))
+        );
+        let json = serde_json::to_value(&flight).unwrap();
+        assert!(json["without"][0].get("terrain_sir_db").is_none(), "{json}");
+    }
 }
