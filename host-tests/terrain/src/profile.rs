@@ -453,7 +453,7 @@ impl<'a> Ground<'a> {
                     .zip(above.get(at))
                     .map_or(0.0, |(height, rise)| height + rise)
             });
-            let mut peaks = [vertex(heights), vertex(least)].map(|part| part.unwrap_or_default());
+            let mut peaks = [vertex(heights), vertex(least)].map(Option::unwrap_or_default);
             peaks.sort_by(f64::total_cmp);
             for part in peaks.into_iter().filter(|part| *part > 0.0) {
                 push(mixed(start.0, end.0, part), parabola(heights, part));

@@ -333,6 +333,28 @@ impl<'a> Asked<'a> {
         Ok(Some(flight))
     }
 
+    /// Returns the lowest ground, and the least altitude of a drone above the highest ground, m above the sea.
+    ///
+    /// They are those from Tx to Rx, and beside the line as far as drones take off. `None` without terrain.
+    fn ground_m(&self) -> Result<Option<[f64; 2]>, String> {
+        let scenario = &self.scenario;
+        let why = |line: String| {
+            format!(
+                "{}: {line}; the ground up to {ASIDE_M} m beside the chain is needed for the altitude of the return to launch",
+                self.name
+            )
+        };
+        let elevation = Elevation::load(scenario, &[], self.position_error_m()).map_err(why)?;
+        let Some(elevation) = elevation else {
+            return Ok(None);
+        };
+        let aside_m = scenario.lateral_max_m.max(-scenario.lateral_min_m).max(0.0);
+        let [low, high] = elevation
+            .corridor_m(scenario, aside_m + ASIDE_M)
+            .map_err(why)?;
+        Ok(Some([low, high + elevation.spec.above_ground_m]))
+    }
+
     fn position_error_m(&self) -> f64 {
         let error_m = self.deployment.companion.position_error_m;
         error_m.map_or(POSITION_ERROR_M, f64::from)
@@ -446,22 +468,8 @@ impl<'a> Asked<'a> {
             Some(index) => vec![index],
             None => (1..=self.uavs).collect(),
         };
-        let (scenario, error_m) = (&self.scenario, self.position_error_m());
-        let elevation = Elevation::load(scenario, &[], error_m);
-        let ground_m = elevation
-            .and_then(|elevation| {
-                let sides = [scenario.lateral_min_m, scenario.lateral_max_m];
-                let aside_m = sides.into_iter().fold(0.0, |most: f64, side| most.max(side.abs()));
-                elevation
-                    .map(|elevation| {
-                        let [low, high] = elevation.corridor_m(scenario, aside_m + ASIDE_M)?;
-                        Ok::<_, String>([low, high + elevation.spec.above_ground_m])
-                    })
-                    .transpose()
-            })
-            .map_err(|line| format!("{name}: {line}; the ground is needed up to {ASIDE_M} m beside the chain, for the altitude of the return to launch"))?;
         let bundle = Bundle {
-            ground_m,
+            ground_m: self.ground_m()?,
             text,
             deployment: &self.deployment,
             uavs: self.uavs,
