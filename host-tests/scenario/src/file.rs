@@ -963,16 +963,29 @@ fn near_line(
         Some([f64::from(at.x_m), f64::from(at.y_m)])
     };
     place(point).ok_or_else(|| {
-        let swapped = match place([lon, lat]) {
-            Some(_) => "; latitude and longitude are swapped",
-            None => "",
-        };
-        let allowed = format!(
-            "a position up to {} m from the line between the two sites of [site] and from its ends{swapped}",
-            Axis::AROUND_M
-        );
+        let allowed = far_from(line, point);
         mistake(file, key, value, Problem::OutOfRange, allowed)
     })
+}
+
+/// Returns the allowed positions for a position, latitude and longitude, that is too far from the line.
+fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
+    let at = |lat, lon| Geodetic::from_degrees(lat, lon, 0.0);
+    let away_m = at(lat, lon).and_then(|point| line.axis.away_m(point));
+    let is_near = at(lon, lat).is_some_and(|point| line.axis.place(point).is_some());
+    let hint = match away_m {
+        _ if is_near => "; latitude and longitude are swapped".to_owned(),
+        Some(away_m) if away_m > SWAPPED_M => format!(
+            "; this one is {:.0} km away: are latitude and longitude swapped?",
+            away_m / 1e3
+        ),
+        Some(away_m) => format!("; this one is {:.0} km away", away_m / 1e3),
+        None => String::new(),
+    };
+    format!(
+        "a position up to {} m from the line between the two sites of [site] and from its ends{hint}",
+        Axis::AROUND_M
+    )
 }
 
 /// Converts the `[[no_fly]]` tables of a file.
@@ -1186,20 +1199,7 @@ fn on_earth(
     };
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
     let Some(place) = point.and_then(|point| line.axis.place(point)) else {
-        let mut allowed = format!(
-            "a position up to {} m from the line between the two sites of [site] and from its ends",
-            Axis::AROUND_M
-        );
-        let swapped = Geodetic::from_degrees(lon_deg, lat_deg, 0.0);
-        let away_m = point.and_then(|point| line.axis.away_m(point));
-        if swapped.is_some_and(|point| line.axis.place(point).is_some()) {
-            allowed.push_str("; latitude and longitude are swapped");
-        } else if let Some(away_m) = away_m {
-            allowed = format!("{allowed}; this one is {:.0} km away", away_m / 1e3);
-            if away_m > SWAPPED_M {
-                allowed.push_str(": are latitude and longitude swapped?");
-            }
-        }
+        let allowed = far_from(line, [lat_deg, lon_deg]);
         return fail(Problem::OutOfRange, &allowed);
     };
     let Placement {

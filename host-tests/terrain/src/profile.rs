@@ -363,16 +363,26 @@ impl<'a> Ground<'a> {
     /// Returns the change of column and row for 1 m of x and y, near a position.
     fn turn(&self, [x, y]: [f64; 2]) -> Result<[[f64; 2]; 2], String> {
         let far_m = 0.5 * SQUARE_M;
-        let none = [[0.0; 2]; 2];
-        let between = |from: [f64; 2], to: [f64; 2]| {
-            let (from, to) = (self.cells(from, none)?, self.cells(to, none)?);
-            Ok::<_, String>([0, 1].map(|axis: usize| {
-                let at = |cells: [f64; 2]| cells.get(axis).copied().unwrap_or_default();
-                (at(to) - at(from)) / (2.0 * far_m)
-            }))
+        let around_m = f64::from(Axis::AROUND_M);
+        let (least, most) = (
+            [-around_m; 2],
+            [self.axis.distance_m() + around_m, around_m],
+        );
+        let between = |off: [f64; 2]| {
+            // Points exist only near the line.
+            let ends = [-far_m, far_m].map(|far_m| {
+                [
+                    (x + far_m * off[0]).clamp(least[0], most[0]),
+                    (y + far_m * off[1]).clamp(least[1], most[1]),
+                ]
+            });
+            let apart_m = (ends[1][0] - ends[0][0]) + (ends[1][1] - ends[0][1]);
+            let [from, to] = ends.map(|end| self.cells(end, [[0.0; 2]; 2]));
+            let (from, to) = (from?, to?);
+            Ok::<_, String>([(to[0] - from[0]) / apart_m, (to[1] - from[1]) / apart_m])
         };
-        let [a, c] = between([x - far_m, y], [x + far_m, y])?;
-        let [b, d] = between([x, y - far_m], [x, y + far_m])?;
+        let [a, c] = between([1.0, 0.0])?;
+        let [b, d] = between([0.0, 1.0])?;
         Ok([[a, b], [c, d]])
     }
 

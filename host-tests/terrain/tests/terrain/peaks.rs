@@ -491,6 +491,17 @@ fn a_relay_that_may_be_beyond_a_site_has_no_room() {
         let report = TerrainReport::new(&ground, &places, free, 2.4e9, 1.0).unwrap();
         rooms(&ground, &places, &report, limits).unwrap()
     };
+    // The ground is known up to the limit of the coordinates.
+    let far = Node {
+        x_m: 100.0,
+        y_m: -4999.5,
+        amsl_m: 600.0,
+    };
+    let line = ground.highest_m(far, 0.4).unwrap_err();
+    assert!(
+        line.contains("is not covered by the elevation files"),
+        "{line}"
+    );
     // Reversed intervals were returned here.
     let near = rooms_at([0.4, d - 0.4]);
     assert_eq!(near, [None, None]);
