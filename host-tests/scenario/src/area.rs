@@ -195,9 +195,9 @@ impl NoFly {
         Some(beside.chain(heights).fold(f64::INFINITY, f64::min))
     }
 
-    /// Returns the intervals of x, m, in which a relay at `y_m` and `altitude_m` is within `around_m` of the area.
+    /// Returns the intervals of x, m, in which a relay is in the area or near it.
     ///
-    /// The relay may be off by `around_m` in x, y and altitude.
+    /// The relay is at `y_m` and `altitude_m`, and may be off by `around_m` in x, y and altitude.
     pub fn intervals_m(&self, y_m: f64, altitude_m: f64, around_m: f64) -> Vec<[f64; 2]> {
         let around_m = around_m.max(1e-6);
         let [lowest, highest] = [self.altitudes_m.start(), self.altitudes_m.end()];

@@ -1133,7 +1133,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
 /// Least distance of an interferer from Tx and Rx, m.
 const LEAST_APART_M: f64 = 1.0;
 
-/// Distance of an interferer from the line, m, above which its latitude and longitude are probably swapped.
+/// Distance from the line, m, above which latitude and longitude are probably swapped.
 const SWAPPED_M: f64 = 1e6;
 
 /// Converts the `[[interferer]]` tables of a file to EIRPs and positions. Their keys must have been checked.

@@ -34,7 +34,7 @@ const APART_M: f64 = 1e-3;
 /// Least height, m, by which the vertex of a parabola differs from its ends to be a point of a profile.
 const VERTEX_M: f64 = 1e-3;
 
-/// Length of the sides of the squares in which the coordinates of nodes are a linear function of x and y, m.
+/// Side of the squares in which columns and rows are linear functions of x and y, m.
 const SQUARE_M: f64 = 200.0;
 
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
@@ -249,9 +249,9 @@ impl<'a> Ground<'a> {
         Ok(highest + raise_m)
     }
 
-    /// Returns distances from the first of two positions [x, y] along a straight line, and heights of the ground, m.
+    /// Returns the ground along the straight line between two positions [x, y].
     ///
-    /// Its highest and lowest heights are those of the ground along the whole line. They are not raised.
+    /// The points have the distance from the first position and the height, m. Their highest and lowest heights are those of the ground along the whole line. They are not raised.
     ///
     /// # Errors
     /// Those of [`height_m`](Self::height_m).
@@ -397,7 +397,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Returns distances from the first of two antennas, and heights of the ground raised by the error of the heights.
+    /// Returns the points of a profile, raised by the error of the heights.
     fn along(&self, [from, to]: [Node; 2], least_steps: f64) -> Result<Vec<Point>, String> {
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);
         let length = dx.hypot(dy);

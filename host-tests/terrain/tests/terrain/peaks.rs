@@ -22,7 +22,9 @@ const PLAIN_M: f64 = 500.0;
 
 const WAVE_M: f64 = 0.125;
 
-/// Plain with single heights that stand out, and its bilinear surface, computed independently of the planner.
+/// Plain with single heights that stand out.
+///
+/// It computes its bilinear surface independently of the planner.
 struct Peaks {
     corner: [f64; 2],
     cell: [f64; 2],

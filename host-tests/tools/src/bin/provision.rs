@@ -333,9 +333,9 @@ impl<'a> Asked<'a> {
         Ok(Some(flight))
     }
 
-    /// Returns the lowest ground, and the least altitude of a drone above the highest ground, m above the sea.
+    /// Returns the lowest and the highest ground, m above the sea.
     ///
-    /// They are those from Tx to Rx, and beside the line as far as drones take off. `None` without terrain.
+    /// The highest one includes the least height above the ground. Both are those from Tx to Rx, and beside the line as far as drones take off. `None` without terrain.
     fn ground_m(&self) -> Result<Option<[f64; 2]>, String> {
         let scenario = &self.scenario;
         let why = |line: String| {

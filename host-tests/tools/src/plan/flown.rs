@@ -284,9 +284,9 @@ const PATHS: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// Returns the scenario file `text` for another folder than `folder`: its relative paths, from the root folder.
+/// Returns the scenario file `text` of `folder` for another folder.
 ///
-/// Elevation files are left to [`with_files`].
+/// Its relative paths become paths from the root folder. Elevation files are left to [`with_files`].
 ///
 /// # Errors
 /// The reason if `text` is not valid TOML, or the current folder is unknown.

@@ -115,8 +115,9 @@ impl Elevation {
         Ok(each.collect())
     }
 
-    /// Returns the lowest and the highest ground from Tx to Rx, up to `aside_m` beside the line, m above the sea.
+    /// Returns the lowest and the highest ground from Tx to Rx, m above the sea.
     ///
+    /// The ground counts up to `aside_m` beside the line.
     /// The highest ground is raised by the error of the heights.
     ///
     /// # Errors

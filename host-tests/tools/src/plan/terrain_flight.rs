@@ -303,7 +303,7 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns the lines about accepted blocked hops, relays without a room, and losses of one relay with a problem.
+    /// Returns the lines about accepted blocked hops, relays without a room, and bad losses.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let blocked = self.blocked.iter();
         let blocked = blocked.map(|line| format!("{line}; accepted by --allow-blocked"));
@@ -365,7 +365,7 @@ impl fmt::Display for Flight {
     }
 }
 
-/// Leaves the part of `room` around `place` that no area of `no_fly` reaches within the position error, m.
+/// Cuts `room` to its part around `place` that is outside of `no_fly`, within the position error.
 ///
 /// Returns the reason why there is no room any more.
 fn cut(
@@ -499,7 +499,9 @@ pub fn no_fly_warnings(
     Ok(lines_of(&scenario.no_fly, &losses, &places))
 }
 
-/// Returns a line for each of `losses`, in a chain at `places`, that leads another relay into a no-fly area.
+/// Returns a line for each loss that leads another relay into a no-fly area.
+///
+/// The chain is at `places` before.
 fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<String> {
     let lines = losses.iter().filter_map(|loss| {
         let problems = match &loss.places {

@@ -61,9 +61,9 @@ pub struct Bundle<'a> {
     pub places: &'a [(Placement, Profile)],
     /// Simulated flight over the terrain, if there is any.
     pub simulated: Option<&'a Flight>,
-    /// Lowest and highest ground at most [`ASIDE_M`] beside the flight, m above the sea, if there is a terrain.
+    /// Lowest and highest ground, m above the sea, if there is a terrain.
     ///
-    /// The highest ground includes the least height above the ground.
+    /// It counts up to [`ASIDE_M`] beside the flight. The highest ground includes the least height above the ground.
     pub ground_m: Option<[f64; 2]>,
     /// Line from Tx to Rx.
     pub line: &'a Line,
