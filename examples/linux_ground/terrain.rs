@@ -10,10 +10,7 @@ use uav_relay_terrain::profile::Ground;
 /// Number of parts into which a terrain profile is divided. Each part has the height of its highest ground.
 const PARTS: u16 = 240;
 
-/// Maximum number of points of the elevation model for one part of the profile.
-const MOST_POINTS: u16 = 32;
-
-/// Elevation model of the configuration file, and the terrain profile below the present line Tx to Rx.
+/// Elevation model of the configuration file, and the profile of the line that is flown.
 pub(crate) struct Elevation {
     terrain: Terrain,
     mast_m: f64,
@@ -55,26 +52,20 @@ fn profile(terrain: &Terrain, mast_m: f64, line: Sites) -> Result<GroundProfile,
     let ground = Ground::new(terrain, axis, [line.tx, line.rx], mast_m)?;
     let length_m = axis.distance_m();
     let part_m = length_m / f64::from(PARTS);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "1 to 32"
-    )]
-    let points = (part_m / ground.step_m())
-        .ceil()
-        .clamp(1.0, f64::from(MOST_POINTS)) as u16;
-    let height_m = |x_m: f64| {
-        // Altitudes of the chain count from the straight line between the sites.
-        let datum_m = ground.relay(Placement::on_line(narrow(x_m), 0.0))?.amsl_m;
-        Ok(ground.height_m(x_m, 0.0)? - datum_m)
-    };
+    let points = ground.line([[0.0, 0.0], [length_m, 0.0]])?;
     let highest_m = |part: u16| {
-        let around = (0..=points).map(|point| {
-            let share = f64::from(point) / f64::from(points) - 0.5;
-            height_m((part_m * (f64::from(part) + share)).clamp(0.0, length_m))
-        });
-        let heights = around.collect::<Result<Vec<f64>, String>>()?;
-        let highest_m: f64 = heights.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let ends = [-0.5, 0.5].map(|off| (part_m * (f64::from(part) + off)).clamp(0.0, length_m));
+        let inner = points
+            .iter()
+            .filter(|[x_m, _]| (ends[0]..=ends[1]).contains(x_m));
+        let ends = ends.map(|x_m| Ok([x_m, ground.height_m(x_m, 0.0)?]));
+        let mut highest_m = f64::NEG_INFINITY;
+        for point in inner.copied().map(Ok::<_, String>).chain(ends) {
+            let [x_m, height_m] = point?;
+            // Altitudes of the chain count from the straight line between the sites.
+            let datum_m = ground.relay(Placement::on_line(narrow(x_m), 0.0))?.amsl_m;
+            highest_m = highest_m.max(height_m - datum_m);
+        }
         Ok((10.0 * highest_m).round() / 10.0)
     };
     Ok(GroundProfile {

@@ -197,8 +197,40 @@ impl NoFly {
         Some(beside.chain(heights).fold(f64::INFINITY, f64::min))
     }
 
-    /// Returns the horizontal length, m, of the part of a straight way that is inside the area. Each end of the way is
-    /// [x, y, altitude].
+    /// Returns the intervals of x, m, in which a relay is in the area or near it.
+    ///
+    /// The relay is at `y_m` and `altitude_m`, and may be off by `around_m` in x, y and altitude.
+    pub fn intervals_m(&self, y_m: f64, altitude_m: f64, around_m: f64) -> Vec<[f64; 2]> {
+        let around_m = around_m.max(1e-6);
+        let [lowest, highest] = [self.altitudes_m.start(), self.altitudes_m.end()];
+        if altitude_m + around_m < *lowest || altitude_m - around_m > *highest {
+            return Vec::new();
+        }
+        let altitude_m = altitude_m.clamp(*lowest, *highest);
+        let sides = [y_m - around_m, y_m + around_m];
+        // Places at which the strip enters or leaves the area.
+        let mut turns = Vec::new();
+        for [a, b] in edges(&self.corners) {
+            turns.push(a[0]);
+            for side in sides {
+                let share = (side - a[1]) / (b[1] - a[1]);
+                if (0.0..=1.0).contains(&share) {
+                    turns.push(a[0] + share * (b[0] - a[0]));
+                }
+            }
+        }
+        turns.sort_by(f64::total_cmp);
+        let parts = turns.iter().zip(turns.iter().skip(1));
+        let inside = parts.filter(|(from, to)| {
+            let x_m = from.midpoint(**to);
+            self.crossing_m(sides.map(|y_m| [x_m, y_m, altitude_m])) > 0.0
+        });
+        inside
+            .map(|(from, to)| [from - around_m, to + around_m])
+            .collect()
+    }
+
+    /// Returns the length of the straight way inside the area, seen from above, m. Each end is [x, y, altitude].
     pub fn crossing_m(&self, [from, to]: [[f64; 3]; 2]) -> f64 {
         let climb = to[2] - from[2];
         let mut turns = vec![0.0, 1.0];

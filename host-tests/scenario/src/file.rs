@@ -867,10 +867,11 @@ fn source_areas(
         let key = format!("{table}area");
         let area = given.area(file, &key, room.line)?;
         for (site, x_m) in [("Tx", 0.0), ("Rx", room.distance_m)] {
-            if area.contains([x_m, 0.0]) {
+            let apart_m = area.distance_m([x_m, 0.0]);
+            if apart_m < LEAST_APART_M {
                 let value = format!("with {site} (x = {} m, y = 0)", number(x_m));
                 let allowed = format!(
-                    "an area that contains neither Tx nor Rx, because an interferer at {site} would make the SIR 0 there"
+                    "an area at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} leaves no SIR there; this one is {apart_m:.4} m from {site}"
                 );
                 return Err(mistake(
                     file,
@@ -963,16 +964,29 @@ fn near_line(
         Some([f64::from(at.x_m), f64::from(at.y_m)])
     };
     place(point).ok_or_else(|| {
-        let swapped = match place([lon, lat]) {
-            Some(_) => "; latitude and longitude are swapped",
-            None => "",
-        };
-        let allowed = format!(
-            "a position at most {} m beside the line from Tx to Rx of [site], and at most that far beyond its ends{swapped}",
-            Axis::AROUND_M
-        );
+        let allowed = far_from(line, point);
         mistake(file, key, value, Problem::OutOfRange, allowed)
     })
+}
+
+/// Returns the allowed positions for a position, latitude and longitude, that is too far from the line.
+fn far_from(line: &Line, [lat, lon]: [f64; 2]) -> String {
+    let at = |lat, lon| Geodetic::from_degrees(lat, lon, 0.0);
+    let away_m = at(lat, lon).and_then(|point| line.axis.away_m(point));
+    let is_near = at(lon, lat).is_some_and(|point| line.axis.place(point).is_some());
+    let hint = match away_m {
+        _ if is_near => "; latitude and longitude are swapped".to_owned(),
+        Some(away_m) if away_m > SWAPPED_M => format!(
+            "; this one is {:.0} km away: are latitude and longitude swapped?",
+            away_m / 1e3
+        ),
+        Some(away_m) => format!("; this one is {:.0} km away", away_m / 1e3),
+        None => String::new(),
+    };
+    format!(
+        "a position up to {} m from the line between the two sites of [site] and from its ends{hint}",
+        Axis::AROUND_M
+    )
 }
 
 /// Converts the `[[no_fly]]` tables of a file.
@@ -1052,7 +1066,7 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
     let text = super::check::text_of(&path).map_err(|error| fail(error.problem.to_string()))?;
     let value: serde_json::Value =
         serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
-    let mut rings = Vec::new();
+    let mut polygons = Vec::new();
     let mut open = vec![&value];
     while let Some(value) = open.pop() {
         let Some(kind) = value.get("type").and_then(|kind| kind.as_str()) else {
@@ -1069,10 +1083,11 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
             "FeatureCollection" => open.extend(list("features")?.iter().rev()),
             "GeometryCollection" => open.extend(list("geometries")?.iter().rev()),
             "Feature" => open.push(value.get("geometry").ok_or_else(|| lacks("geometry"))?),
-            "Polygon" => rings.extend(list("coordinates")?.first()),
+            "Polygon" => polygons.push(list("coordinates")?),
             "MultiPolygon" => {
                 for polygon in list("coordinates")? {
-                    rings.push(polygon.get(0).ok_or_else(|| lacks("a boundary"))?);
+                    let polygon = polygon.as_array().filter(|rings| !rings.is_empty());
+                    polygons.push(polygon.ok_or_else(|| lacks("a boundary"))?);
                 }
             }
             _ => return Err(fail(format!("has a {kind}"))),
@@ -1086,14 +1101,41 @@ fn geojson(file: &str, key: &str, name: &str) -> Result<Vec<Vec<[f64; 2]>>, Scen
         let all = ring.as_array()?;
         // The last corner repeats the first one.
         let is_allowed = (3..=MOST_CORNERS + 1).contains(&all.len());
-        is_allowed.then(|| all.iter().map(point).collect::<Option<Vec<_>>>())?
+        let corners = is_allowed.then(|| all.iter().map(point).collect::<Option<Vec<_>>>())?;
+        let mut corners = corners?;
+        corners.dedup();
+        if corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        Some(corners)
     };
-    if rings.is_empty() {
+    if polygons.is_empty() {
         return Err(fail("has no polygon".to_owned()));
     }
-    let rings: Option<Vec<_>> = rings.into_iter().map(ring).collect();
-    rings.ok_or_else(|| fail("has a polygon with wrong corners".to_owned()))
+    let mut boundaries = Vec::new();
+    for (number, rings) in polygons.into_iter().enumerate() {
+        let rings: Option<Vec<_>> = rings.iter().map(ring).collect();
+        let rings = rings.ok_or_else(|| fail("has a polygon with wrong corners".to_owned()))?;
+        let mut rings = rings.into_iter();
+        let boundary = Area::Polygon(rings.next().unwrap_or_default());
+        for (hole, corners) in (2..).zip(rings) {
+            // A centimetre, because a hole may touch the boundary.
+            if corners.iter().any(|at| boundary.distance_m(*at) > 1e-7) {
+                return Err(fail(format!(
+                    "polygon {number}: ring {hole} is not inside ring 1, and the first ring has to be the outer boundary"
+                )));
+            }
+        }
+        boundaries.push(boundary.corners());
+    }
+    Ok(boundaries)
 }
+
+/// Least distance of an interferer from Tx and Rx, m.
+const LEAST_APART_M: f64 = 1.0;
+
+/// Distance from the line, m, above which latitude and longitude are probably swapped.
+const SWAPPED_M: f64 = 1e6;
 
 /// Converts the `[[interferer]]` tables of a file to EIRPs and positions. Their keys must have been checked.
 pub(super) fn sources(
@@ -1111,6 +1153,20 @@ pub(super) fn sources(
             (Some(lat), Some(lon), _) => on_earth(file, &table, raw, [lat, lon], room)?,
             _ => (raw.x_m.unwrap_or_default(), raw.y_m.unwrap_or_default()),
         };
+        for (site, site_m) in [("Tx", 0.0), ("Rx", room.distance_m)] {
+            let apart_m = (x_m - site_m).hypot(y_m);
+            if apart_m < LEAST_APART_M && raw.area.is_none() {
+                let (key, value) = match (raw.lat_deg, raw.lon_deg) {
+                    (Some(lat), Some(lon)) => ("lat_deg", format!("{lat}, lon_deg = {lon}")),
+                    _ => ("x_m", format!("{}, y_m = {}", number(x_m), number(y_m))),
+                };
+                let allowed = format!(
+                    "a position at least {LEAST_APART_M} m from Tx and Rx, because an interferer at {site} leaves no SIR there; this one is {apart_m:.4} m from {site}"
+                );
+                let key = format!("{table}{key}");
+                return Err(mistake(file, &key, Some(value), Problem::OutOfRange, allowed));
+            }
+        }
         Ok(Source { power_w, x_m, y_m })
     })
     .collect()
@@ -1144,10 +1200,7 @@ fn on_earth(
     };
     let point = Geodetic::from_degrees(lat_deg, lon_deg, raw.amsl_m.unwrap_or_default());
     let Some(place) = point.and_then(|point| line.axis.place(point)) else {
-        let allowed = format!(
-            "a position at most {} m beside the line from Tx to Rx of [site], and at most that far beyond its ends",
-            Axis::AROUND_M
-        );
+        let allowed = far_from(line, [lat_deg, lon_deg]);
         return fail(Problem::OutOfRange, &allowed);
     };
     let Placement {

@@ -6,8 +6,8 @@
 //! | GeoTIFF | one band; latitude and longitude (EPSG 4326 or 4258) or UTM (EPSG 326zz, 327zz or 258zz), north up; heights in metres |
 //!
 //! All files are parts of one grid: they have the same coordinate system and cells, and their cells are aligned. A height between four
-//! heights of the grid is interpolated bilinearly. The four may be in different files. If files overlap, the first one that
-//! has a height counts.
+//! heights of the grid is interpolated bilinearly. The four may be in different files. Files may overlap if their heights differ by at
+//! most 1 m where both have one; then the first of them counts.
 //!
 //! The vertical datum is not converted: heights are taken as heights above the mean sea level.
 
@@ -26,6 +26,14 @@ const SAME_CELL: f64 = 1e-6;
 
 /// Largest distance of a file's grid points from those of the common grid, as a fraction of a cell.
 const ALIGNED: f64 = 0.02;
+
+/// Largest difference of the heights of two files that overlap, m.
+const SAME_M: f64 = 1.0;
+
+/// EPSG codes of vertical coordinate systems in feet.
+const IN_FEET: [u16; 13] = [
+    5614, 5702, 5754, 6130, 6131, 6132, 6358, 6360, 8050, 8051, 8052, 8053, 8228,
+];
 
 /// Metres per degree of latitude, for the size of cells and the text of errors.
 const PER_DEGREE_M: f64 = 111_320.0;
@@ -142,6 +150,11 @@ impl Terrain {
                 )
             })?;
         }
+        for (at, tile) in tiles.iter().enumerate() {
+            for other in tiles.iter().skip(at + 1) {
+                tile.agrees_with(other)?;
+            }
+        }
         Ok(Self {
             tiles,
             system,
@@ -166,31 +179,29 @@ impl Terrain {
     /// # Errors
     /// A line that names the point and the file: no file covers the point, or the file has a hole there.
     pub fn height_m(&self, lat_deg: f64, lon_deg: f64) -> Result<f64, String> {
+        let at = self.cells(lat_deg, lon_deg);
+        interpolated(at, |node| self.node_m(node, lat_deg, lon_deg))
+    }
+
+    /// Returns the column and the row of a point in the grid, with fractions. The grid has heights at whole numbers.
+    pub fn cells(&self, lat_deg: f64, lon_deg: f64) -> [f64; 2] {
         let [east, north] = self.system.coordinates(lat_deg, lon_deg);
-        let column = (east - self.corner[0]) / self.cell[0];
-        let row = (self.corner[1] - north) / self.cell[1];
-        // A point within rounding of a node needs no other nodes.
-        let split = |at: f64| {
-            let whole = (at + 1e-6).floor();
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "the cast saturates, and no tile is there"
-            )]
-            let first = whole as i64;
-            let share = (at - whole).max(0.0);
-            (first, if share < 1e-6 { 0.0 } else { share })
+        [
+            (east - self.corner[0]) / self.cell[0],
+            (self.corner[1] - north) / self.cell[1],
+        ]
+    }
+
+    /// Returns the height at a column and a row of [`cells`](Self::cells), m; `None` outside and in a hole.
+    pub fn height_at(&self, cells: [f64; 2]) -> Option<f64> {
+        let known = |node| {
+            let mut nodes = self.tiles.iter().map(|tile| tile.node(node));
+            nodes.find_map(|node| match node {
+                Node::Height(height) => Some(height),
+                Node::Hole(..) | Node::Outside => None,
+            })
         };
-        let ((column, right), (row, down)) = (split(column), split(row));
-        let mut sum = 0.0;
-        for (row, weight_down) in [(row, 1.0 - down), (row + 1, down)] {
-            for (column, weight) in [(column, 1.0 - right), (column + 1, right)] {
-                let weight = weight * weight_down;
-                if weight > 0.0 {
-                    sum += weight * self.node_m([column, row], lat_deg, lon_deg)?;
-                }
-            }
-        }
-        Ok(sum)
+        interpolated(cells, |node| known(node).ok_or(())).ok()
     }
 
     fn node_m(&self, at: [i64; 2], lat_deg: f64, lon_deg: f64) -> Result<f64, String> {
@@ -234,6 +245,35 @@ impl Terrain {
     }
 }
 
+/// Returns the bilinear interpolation at a column and a row of the heights that `height` returns.
+fn interpolated<E>(
+    [column, row]: [f64; 2],
+    height: impl Fn([i64; 2]) -> Result<f64, E>,
+) -> Result<f64, E> {
+    // A point within rounding of a node needs no other nodes.
+    let split = |at: f64| {
+        let whole = (at + 1e-6).floor();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the cast saturates, and no tile is there"
+        )]
+        let first = whole as i64;
+        let share = (at - whole).max(0.0);
+        (first, if share < 1e-6 { 0.0 } else { share })
+    };
+    let ((column, right), (row, down)) = (split(column), split(row));
+    let mut sum = 0.0;
+    for (row, weight_down) in [(row, 1.0 - down), (row + 1, down)] {
+        for (column, weight) in [(column, 1.0 - right), (column + 1, right)] {
+            let weight = weight * weight_down;
+            if weight > 0.0 {
+                sum += weight * height([column, row])?;
+            }
+        }
+    }
+    Ok(sum)
+}
+
 impl Tile {
     fn load(path: &Path) -> Result<Self, String> {
         let name = path.display().to_string();
@@ -273,6 +313,46 @@ impl Tile {
         #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
         let at = [column.round() as i64, row.round() as i64];
         Ok(at)
+    }
+
+    /// Checks that two files have about the same heights where both have one.
+    ///
+    /// # Errors
+    /// A line with the greatest difference: both files, the place and both heights.
+    fn agrees_with(&self, other: &Self) -> Result<(), String> {
+        let range = |axis: usize, counts: [usize; 2]| {
+            let from = [self, other].map(|tile| tile.at.get(axis).copied().unwrap_or_default());
+            let end = from.into_iter().zip(counts);
+            let end = end.map(|(from, count)| from.saturating_add_unsigned(count as u64));
+            from[0].max(from[1])..end.min().unwrap_or_default()
+        };
+        let columns = range(0, [self.columns, other.columns]);
+        let mut worst = None;
+        let mut most_m = SAME_M;
+        for row in range(1, [self.rows, other.rows]) {
+            for column in columns.clone() {
+                let at = [column, row];
+                if let (Node::Height(own), Node::Height(others)) = (self.node(at), other.node(at))
+                    && (own - others).abs() > most_m
+                {
+                    most_m = (own - others).abs();
+                    worst = Some((at, own, others));
+                }
+            }
+        }
+        let Some(([column, row], own_m, others_m)) = worst else {
+            return Ok(());
+        };
+        let x = self.corner[0] + self.cell[0] * (column - self.at[0]) as f64;
+        let y = self.corner[1] - self.cell[1] * (row - self.at[1]) as f64;
+        let place = match self.system {
+            System::Geographic => format!("latitude {y:.6}, longitude {x:.6}"),
+            utm @ System::Utm { .. } => format!("easting {x:.0}, northing {y:.0} in {utm}"),
+        };
+        Err(format!(
+            "{} and {} contradict each other: at {place} their heights are {own_m:.1} m and {others_m:.1} m; allowed: a difference of at most {SAME_M} m where files overlap: leave one of them out, or cut it",
+            self.file, other.file
+        ))
     }
 
     fn node(&self, [column, row]: [i64; 2]) -> Node<'_> {
@@ -407,6 +487,20 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
         return Err(format!(
             "has heights in the unit {unit} (key 4099); allowed: 9001, metres"
         ));
+    }
+    match key(4096) {
+        Some(code) if IN_FEET.contains(&code) => {
+            return Err(format!(
+                "has heights in feet: its vertical coordinate system is EPSG {code} (key 4096); allowed: heights in metres above the mean sea level"
+            ));
+        }
+        // Codes of the first version of GeoTIFF.
+        Some(code @ (4979 | 5001..=5033)) => {
+            return Err(format!(
+                "has heights above the ellipsoid: its vertical coordinate system has the code {code} (key 4096); allowed: heights in metres above the mean sea level"
+            ));
+        }
+        _ => {}
     }
     let metadata = decoder.get_tag_ascii_string(Tag::Unknown(GDAL_METADATA));
     for role in ["scale", "offset", "unittype"] {

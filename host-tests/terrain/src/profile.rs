@@ -1,8 +1,10 @@
 //! Profiles: the ground below each hop of a chain, and the clearance of the line of sight.
 //!
-//! A hop runs straight, seen from above. Its profile has a height at every quarter of a cell of the elevation model. Along
-//! the hop the earth rises
-//! by d1 d2 / 2a between its ends, with the distances d1 and d2 from the ends and the effective radius a.
+//! A hop runs straight, seen from above. Its profile has a height at every quarter of a cell of the elevation model, and where the hop
+//! crosses a column or a row of the model. Between these crossings the ground, interpolated bilinearly, is a parabola. The profile also
+//! has the highest point of each parabola, and the point of the least clearance. The highest ground of a profile is therefore exact.
+//!
+//! Along the hop the earth rises by d1 d2 / 2a between its ends, with the distances d1 and d2 from the ends and the effective radius a.
 //!
 //! | state of a hop | condition |
 //! | --- | --- |
@@ -20,8 +22,20 @@ use crate::grid::Terrain;
 /// Fraction of the radius of the first Fresnel zone that a clear hop keeps free of the ground.
 pub const FREE: f64 = 0.6;
 
-/// Largest number of points of a profile, apart from its first point.
-const MOST_POINTS: f64 = 20_000.0;
+/// Largest number of equal steps of a profile.
+const MOST_STEPS: f64 = 20_000.0;
+
+/// Least number of equal steps of a profile.
+const LEAST_STEPS: f64 = 16.0;
+
+/// Least distance of two points of a profile, m.
+const APART_M: f64 = 1e-3;
+
+/// Least height, m, by which the vertex of a parabola differs from its ends to be a point of a profile.
+const VERTEX_M: f64 = 1e-3;
+
+/// Side of the squares in which columns and rows are linear functions of x and y, m.
+const SQUARE_M: f64 = 200.0;
 
 /// Largest accepted difference of a site's heights in scenario and elevation model, m.
 pub const SITE_ERROR_M: f64 = 15.0;
@@ -202,28 +216,174 @@ impl<'a> Ground<'a> {
 
     /// Returns the highest ground within `radius_m` of a position, m above the mean sea level.
     ///
+    /// In a cell the ground has no highest point: that of a circle is at a node of the elevation model, or at the edge.
+    ///
     /// # Errors
     /// A line that names a position: the elevation files do not cover it, or have no height there.
     pub fn highest_m(&self, node: Node, radius_m: f64) -> Result<f64, String> {
-        let rings = (radius_m / self.step_m).ceil().min(64.0);
-        let mut highest = self.height_m(node.x_m, node.y_m)?;
         let raise_m = self.raise_m(node.x_m);
-        let mut ring = 1.0;
-        while ring <= rings {
-            let radius = radius_m * ring / rings;
-            let points = (std::f64::consts::TAU * radius / self.step_m)
+        let mut highest = self.height_m(node.x_m, node.y_m)?;
+        if radius_m > 0.0 {
+            // A polygon around the circle, by at most a centimetre.
+            let corners = (std::f64::consts::PI * (50.0 * radius_m).sqrt())
                 .ceil()
-                .clamp(16.0, 400.0);
-            let mut point = 0.0;
-            while point < points {
-                let (sin, cos) = (std::f64::consts::TAU * point / points).sin_cos();
-                highest =
-                    highest.max(self.height_m(node.x_m + radius * cos, node.y_m + radius * sin)?);
-                point += 1.0;
+                .max(16.0);
+            let outer = radius_m / (std::f64::consts::PI / corners).cos();
+            let corner = |at: f64| {
+                let (sin, cos) = (std::f64::consts::TAU * at / corners).sin_cos();
+                [node.x_m + outer * cos, node.y_m + outer * sin]
+            };
+            let mut at = 0.0;
+            while at < corners {
+                for [_, height] in self.line([corner(at), corner(at + 1.0)])? {
+                    highest = highest.max(height);
+                }
+                at += 1.0;
             }
-            ring += 1.0;
+            let [low, high] = [-outer, outer].map(|off| [node.x_m + off, node.y_m + off]);
+            let is_in = |[x, y]: [f64; 2]| (x - node.x_m).hypot(y - node.y_m) <= outer;
+            for [_, _, height] in self.nodes([low, high], is_in)? {
+                highest = highest.max(height);
+            }
         }
         Ok(highest + raise_m)
+    }
+
+    /// Returns the ground along the straight line between two positions [x, y].
+    ///
+    /// The points have the distance from the first position and the height, m. Their highest and lowest heights are those of the ground along the whole line. They are not raised.
+    ///
+    /// # Errors
+    /// Those of [`height_m`](Self::height_m).
+    pub fn line(&self, ends: [[f64; 2]; 2]) -> Result<Vec<Point>, String> {
+        let ends = ends.map(|[x_m, y_m]| Node {
+            x_m,
+            y_m,
+            amsl_m: 0.0,
+        });
+        let flat = Ground {
+            error_m: 0.0,
+            ..*self
+        };
+        flat.along(ends, 1.0)
+    }
+
+    /// Returns the nodes of the elevation model in a rectangle, as [x, y, height], m. The heights are not raised.
+    ///
+    /// `low` and `high` are its corners with the least and greatest x and y. Nodes for which `is_in` is false are left
+    /// out.
+    ///
+    /// # Errors
+    /// A line that names such a node without a height.
+    pub fn nodes(
+        &self,
+        [low, high]: [[f64; 2]; 2],
+        is_in: impl Fn([f64; 2]) -> bool,
+    ) -> Result<Vec<[f64; 3]>, String> {
+        let mut nodes = Vec::new();
+        let sides = [0, 1].map(|axis: usize| {
+            let [from, to] = [low, high].map(|end| end.get(axis).copied().unwrap_or_default());
+            let (side_m, count) = steps_of(to - from, SQUARE_M);
+            (0..count.max(1))
+                .map(move |at| from + side_m * f64::from(at))
+                .zip(std::iter::repeat(side_m))
+        });
+        let [columns, rows] = sides;
+        for (y, height_m) in rows {
+            for (x, width_m) in columns.clone() {
+                self.nodes_of([x, y], [width_m, height_m], &is_in, &mut nodes)?;
+            }
+        }
+        Ok(nodes)
+    }
+
+    /// Adds the nodes of a small rectangle to `nodes`.
+    fn nodes_of(
+        &self,
+        [x, y]: [f64; 2],
+        [wide, high]: [f64; 2],
+        is_in: &impl Fn([f64; 2]) -> bool,
+        nodes: &mut Vec<[f64; 3]>,
+    ) -> Result<(), String> {
+        let turn = self.turn([x + 0.5 * wide, y + 0.5 * high])?;
+        let origin = self.cells([x, y], turn)?;
+        let [[a, b], [c, d]] = turn;
+        let surface = a * d - b * c;
+        let corners = [[0.0, 0.0], [wide, 0.0], [0.0, high], [wide, high]]
+            .map(|[u, v]| [origin[0] + a * u + b * v, origin[1] + c * u + d * v]);
+        let range = |axis: usize| {
+            let each = corners.iter().filter_map(|corner| corner.get(axis));
+            let (low, high) = each.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+                (low.min(*at), high.max(*at))
+            });
+            (low.ceil(), high.floor())
+        };
+        let ((mut row, last_row), (first, last)) = (range(1), range(0));
+        while row <= last_row {
+            let mut column = first;
+            while column <= last {
+                let [right, down] = [column - origin[0], row - origin[1]];
+                let u = (right * d - down * b) / surface;
+                let v = (down * a - right * c) / surface;
+                // A little more than the rectangle: a node at its edge is in it.
+                let is_within = |at: f64, side: f64| at >= -0.01 && at <= side + 0.01;
+                let place = [x + u, y + v];
+                if is_within(u, wide) && is_within(v, high) && is_in(place) {
+                    let height = self.height_of([column, row], place)?;
+                    nodes.push([place[0], place[1], height]);
+                }
+                column += 1.0;
+            }
+            row += 1.0;
+        }
+        Ok(())
+    }
+
+    /// Returns the height at a column and a row, which are at `place` [x, y].
+    fn height_of(&self, cells: [f64; 2], [x_m, y_m]: [f64; 2]) -> Result<f64, String> {
+        let known = self.terrain.height_at(cells);
+        known.map_or_else(|| self.height_m(x_m, y_m), Ok)
+    }
+
+    /// Returns the column and the row of the point `place` [x, y].
+    ///
+    /// Coordinates of points are rounded to 1e-7 degrees, 1 cm. `turn` is the [`turn`](Self::turn) near the point, to
+    /// correct that.
+    fn cells(&self, [x, y]: [f64; 2], [[a, b], [c, d]]: [[f64; 2]; 2]) -> Result<[f64; 2], String> {
+        let point = self.point(x, y)?;
+        let (lat, lon) = (f64::from(point.lat_e7) / 1e7, f64::from(point.lon_e7) / 1e7);
+        let [column, row] = self.terrain.cells(lat, lon);
+        let rounded = self.axis.place(point);
+        let [u, v] = rounded.map_or([0.0; 2], |at| {
+            [x - f64::from(at.x_m), y - f64::from(at.y_m)]
+        });
+        Ok([column + a * u + b * v, row + c * u + d * v])
+    }
+
+    /// Returns the change of column and row for 1 m of x and y, near a position.
+    fn turn(&self, [x, y]: [f64; 2]) -> Result<[[f64; 2]; 2], String> {
+        let far_m = 0.5 * SQUARE_M;
+        let around_m = f64::from(Axis::AROUND_M);
+        let (least, most) = (
+            [-around_m; 2],
+            [self.axis.distance_m() + around_m, around_m],
+        );
+        let between = |off: [f64; 2]| {
+            // Points exist only near the line.
+            let ends = [-far_m, far_m].map(|far_m| {
+                [
+                    (x + far_m * off[0]).clamp(least[0], most[0]),
+                    (y + far_m * off[1]).clamp(least[1], most[1]),
+                ]
+            });
+            let apart_m = (ends[1][0] - ends[0][0]) + (ends[1][1] - ends[0][1]);
+            let [from, to] = ends.map(|end| self.cells(end, [[0.0; 2]; 2]));
+            let (from, to) = (from?, to?);
+            Ok::<_, String>([(to[0] - from[0]) / apart_m, (to[1] - from[1]) / apart_m])
+        };
+        let [a, c] = between([1.0, 0.0])?;
+        let [b, d] = between([0.0, 1.0])?;
+        Ok([[a, b], [c, d]])
     }
 
     /// Returns the profile of the hop between two antennas.
@@ -231,26 +391,122 @@ impl<'a> Ground<'a> {
     /// # Errors
     /// A line that names a position: the elevation files do not cover it, or have no height there.
     pub fn profile(&self, nodes: [Node; 2]) -> Result<Profile, String> {
-        let [from, to] = nodes;
+        Ok(Profile {
+            nodes,
+            points: self.along(nodes, LEAST_STEPS)?,
+        })
+    }
+
+    /// Returns the points of a profile, raised by the error of the heights.
+    fn along(&self, [from, to]: [Node; 2], least_steps: f64) -> Result<Vec<Point>, String> {
         let (dx, dy) = (to.x_m - from.x_m, to.y_m - from.y_m);
         let length = dx.hypot(dy);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "16 to 20 000"
+            reason = "1 to 20 000"
         )]
-        let steps = (length / self.step_m).ceil().clamp(16.0, MOST_POINTS) as u32;
-        let points = (0..=steps).map(|step| {
-            let share = f64::from(step) / f64::from(steps);
-            let x_m = from.x_m + share * dx;
-            let height = self.height_m(x_m, from.y_m + share * dy)?;
-            Ok([share * length, height + self.raise_m(x_m)])
-        });
-        Ok(Profile {
-            nodes,
-            points: points.collect::<Result<_, String>>()?,
-        })
+        let steps = (length / self.step_m).ceil().clamp(least_steps, MOST_STEPS) as u32;
+        let place = |share: f64| [from.x_m + share * dx, from.y_m + share * dy];
+        let turn = self.turn(place(0.5))?;
+        let share = |step: u32| f64::from(step) / f64::from(steps);
+        let each = (0..=steps).map(|step| Ok((share(step), self.cells(place(share(step)), turn)?)));
+        let each = each.collect::<Result<Vec<_>, String>>()?;
+        // Shares and cells of the steps and of the crossings of columns and rows between them.
+        let mut at = Vec::with_capacity(2 * each.len());
+        let mut inner = Vec::new();
+        for ((start, a), (end, b)) in each.iter().zip(each.iter().skip(1)) {
+            at.push((*start, *a));
+            inner.clear();
+            for (a, b) in a.iter().zip(b) {
+                let mut line = a.min(*b).floor() + 1.0;
+                while line < a.max(*b) {
+                    inner.push((line - a) / (b - a));
+                    line += 1.0;
+                }
+            }
+            inner.sort_by(f64::total_cmp);
+            at.extend(inner.iter().map(|part| {
+                let cells = [mixed(a[0], b[0], *part), mixed(a[1], b[1], *part)];
+                (mixed(*start, *end, *part), cells)
+            }));
+        }
+        at.extend(each.last());
+        let height = |(share, cells): (f64, [f64; 2])| {
+            let place = place(share);
+            Ok::<_, String>(self.height_of(cells, place)? + self.raise_m(place[0]))
+        };
+        let rise = |share: f64| {
+            let along = share * length;
+            bulge_m(along, length) - mixed(from.amsl_m, to.amsl_m, share)
+        };
+        let mut points: Vec<Point> = Vec::with_capacity(at.len());
+        let mut push = |share: f64, height: f64| {
+            let along = share * length;
+            let is_apart = |[last, _]: &Point| along - last >= APART_M;
+            let is_inner = length - along >= APART_M;
+            if points.is_empty() || points.last().is_some_and(is_apart) && is_inner {
+                points.push([along, height]);
+            }
+        };
+        for (start, end) in at.iter().zip(at.iter().skip(1)) {
+            let (share, cells) = (
+                start.0.midpoint(end.0),
+                [start.1[0].midpoint(end.1[0]), start.1[1].midpoint(end.1[1])],
+            );
+            let heights = [height(*start)?, height((share, cells))?, height(*end)?];
+            let above = [start.0, share, end.0].map(rise);
+            push(start.0, heights[0]);
+            let least = [0, 1, 2].map(|at: usize| {
+                heights
+                    .get(at)
+                    .zip(above.get(at))
+                    .map_or(0.0, |(height, rise)| height + rise)
+            });
+            let mut peaks = [vertex(heights), vertex(least)].map(Option::unwrap_or_default);
+            peaks.sort_by(f64::total_cmp);
+            for part in peaks.into_iter().filter(|part| *part > 0.0) {
+                push(mixed(start.0, end.0, part), parabola(heights, part));
+            }
+        }
+        if let Some(end) = at.last() {
+            points.push([length, height(*end)?]);
+        }
+        Ok(points)
     }
+}
+
+/// Returns the equal steps of at most `step_m` that make up a length, and their number.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "0 to 1e6"
+)]
+pub(crate) fn steps_of(length_m: f64, step_m: f64) -> (f64, u32) {
+    let steps = (length_m / step_m).ceil().clamp(0.0, 1e6);
+    (length_m / steps.max(1.0), steps as u32)
+}
+
+const fn mixed(from: f64, to: f64, share: f64) -> f64 {
+    from + share * (to - from)
+}
+
+/// Returns the value at `share` of the parabola with these values at 0, 1/2 and 1.
+fn parabola([start, middle, end]: [f64; 3], share: f64) -> f64 {
+    let slope = 4.0 * middle - 3.0 * start - end;
+    let bend = 2.0 * (start + end) - 4.0 * middle;
+    start + share * (slope + share * bend)
+}
+
+/// Returns the place of the extremum of the parabola with these values at 0, 1/2 and 1.
+///
+/// `None` if it is not between 0 and 1, or differs by less than a millimetre from a value there.
+fn vertex([start, middle, end]: [f64; 3]) -> Option<f64> {
+    let slope = 4.0 * middle - 3.0 * start - end;
+    let bend = 2.0 * (start + end) - 4.0 * middle;
+    let share = -slope / (2.0 * bend);
+    let beside = share.min(1.0 - share);
+    (beside > 0.0 && bend.abs() * beside * beside > VERTEX_M).then_some(share)
 }
 
 fn height_at(terrain: &Terrain, point: Geodetic) -> Result<f64, String> {

@@ -7,7 +7,7 @@
 use uav_relay::Placement;
 
 use crate::diffraction::EARTH_M;
-use crate::profile::{FREE, Ground, State};
+use crate::profile::{FREE, Ground, State, steps_of};
 use crate::report::TerrainReport;
 
 /// Limits on the positions of relays, m.
@@ -31,13 +31,16 @@ struct Stretch {
     h_m: f64,
 }
 
-/// Ground along the line, at equal steps.
+/// Highest and lowest ground along the line, as points of x and height above the datum, m.
+///
+/// Between the points the ground is no higher and no lower than at them.
 struct Ridge {
+    /// Largest distance of two points.
     step_m: f64,
-    /// Highest ground within the position error, raised by the error of the heights, m above the datum.
-    highest: Vec<f64>,
-    /// Lowest ground below the relays, which are up to `off_m` beside the line, m above the datum.
-    lowest: Vec<f64>,
+    /// Highest ground within the position error, raised by the error of the heights.
+    highest: Vec<[f64; 2]>,
+    /// Lowest ground below the relays, which are up to `off_m` beside the line.
+    lowest: Vec<[f64; 2]>,
 }
 
 impl Ridge {
@@ -48,55 +51,54 @@ impl Ridge {
         let datum = |x_m: f64| Ok::<_, String>(f64::from(ground.point(x_m, 0.0)?.amsl_mm) / 1e3);
         let length = rx.x_m;
         let (step_m, steps) = steps(length, ground.step_m());
-        let heights = |x_m: f64, wide_m: f64| {
-            let (aside_m, asides) = steps_of(2.0 * wide_m, ground.step_m());
-            let each = (0..=asides).map(|aside| f64::from(aside) * aside_m - wide_m);
-            let each = each.map(|y_m| Ok(ground.height_m(x_m, y_m)? - datum(x_m)?));
-            each.collect::<Result<Vec<f64>, String>>()
+        // Points of the ground: in a cell the highest and the lowest one of a strip are at its edges, or at nodes of the elevation model.
+        let strip = |wide_m: f64, higher: fn(f64, f64) -> f64| {
+            let mut points = Vec::new();
+            for y_m in [-wide_m, wide_m] {
+                points.extend(ground.line([[0.0, y_m], [length, y_m]])?);
+            }
+            if wide_m > 0.0 {
+                let nodes = ground.nodes([[0.0, -wide_m], [length, wide_m]], |_| true)?;
+                points.extend(nodes.into_iter().map(|[x, _, height]| [x, height]));
+                for step in 0..=steps {
+                    let x_m = f64::from(step) * step_m;
+                    let across = ground.line([[x_m, -wide_m], [x_m, wide_m]])?;
+                    let height = across.into_iter().map(|[_, height]| height).reduce(higher);
+                    points.extend(height.map(|height| [x_m, height]));
+                }
+            }
+            for [x_m, height] in &mut points {
+                *x_m = x_m.clamp(0.0, length);
+                *height -= datum(*x_m)?;
+            }
+            points.sort_by(|one, other| one[0].total_cmp(&other[0]));
+            Ok::<_, String>(points)
         };
-        let (mut highest, mut lowest) = (Vec::new(), Vec::new());
-        for step in 0..=steps {
-            let x_m = f64::from(step) * step_m;
-            let all = heights(x_m, off_m + error_m)?;
-            highest.push(all.into_iter().fold(f64::NEG_INFINITY, f64::max) + ground.raise_m(x_m));
-            lowest.push(
-                heights(x_m, off_m)?
-                    .into_iter()
-                    .fold(f64::INFINITY, f64::min),
-            );
+        let mut highest = strip(off_m + error_m, f64::max)?;
+        for [x_m, height] in &mut highest {
+            *height += ground.raise_m(*x_m);
         }
         Ok((
             Self {
                 step_m,
                 highest,
-                lowest,
+                lowest: strip(off_m, f64::min)?,
             },
             [tx.amsl_m - datum(0.0)?, rx.amsl_m - datum(length)?],
         ))
     }
 
-    /// Returns x and height of the points of `heights_m`, at equal steps, from `from_m` to `to_m`.
-    fn between(
-        &self,
-        heights_m: &[f64],
-        [from_m, to_m]: [f64; 2],
-    ) -> impl Iterator<Item = [f64; 2]> {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "an index"
-        )]
-        let first = (from_m / self.step_m).ceil().max(0.0) as usize;
-        let points = heights_m.iter().enumerate().skip(first);
-        points
-            .map(|(at, height)| [at as f64 * self.step_m, *height])
-            .take_while(move |[x_m, _]| *x_m <= to_m)
+    /// Returns the points from `from_m` to `to_m`.
+    fn between(points: &[[f64; 2]], [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
+        let first = points.partition_point(|[x_m, _]| *x_m < from_m);
+        let points = points.iter().skip(first).copied();
+        points.take_while(move |[x_m, _]| *x_m <= to_m)
     }
 
     /// Returns true if `share` of the first Fresnel zone of every hop between the two intervals is free.
     fn is_free(&self, [from, to]: [Stretch; 2], share: f64, wavelength_m: f64) -> bool {
         let ([a, b], [c, d]) = (from.x_m, to.x_m);
-        self.between(&self.highest, [a, d]).all(|[x, height]| {
+        Self::between(&self.highest, [a, d]).all(|[x, height]| {
             let (before, after) = (x - a, d - x);
             let bulge = before * after / (2.0 * EARTH_M);
             let zone = (wavelength_m * before * after / (d - a)).max(0.0).sqrt();
@@ -117,18 +119,7 @@ fn steps(length_m: f64, step_m: f64) -> (f64, u32) {
     (step, steps.max(1))
 }
 
-/// Divides a length into the fewest equal steps of at most `step_m`. Returns the size of a step and their number.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "0 to 1e6"
-)]
-fn steps_of(length_m: f64, step_m: f64) -> (f64, u32) {
-    let steps = (length_m / step_m).ceil().clamp(0.0, 1e6);
-    (length_m / steps.max(1.0), steps as u32)
-}
-
-/// Returns each relay's interval of x, m, in which all hops stay as clear as they are in `report`.
+/// Returns the interval of x, m, in which each relay's hops stay as clear as they are in `report`.
 ///
 /// This holds while all relays are in their intervals, within the position error. Each relay also keeps its height above the ground. `None`
 /// for a relay without such an interval around its position.
@@ -172,8 +163,8 @@ pub fn rooms(
     // The least height counts within the position error, the greatest one above the ground straight below.
     let is_in_band = |node: &Stretch, strip: [f64; 2], inner: [f64; 2]| {
         let h = node.h_m + error;
-        let mut highest = ridge.between(&ridge.highest, strip);
-        let mut lowest = ridge.between(&ridge.lowest, inner);
+        let mut highest = Ridge::between(&ridge.highest, strip);
+        let mut lowest = Ridge::between(&ridge.lowest, inner);
         highest.all(|[_, ground]| h - ground >= least - 0.01)
             && lowest.all(|[_, ground]| h - ground <= most + 0.01)
     };
@@ -221,8 +212,9 @@ pub fn rooms(
     // The position itself may be anywhere in the interval without its error.
     Ok(rooms
         .map(|(node, is_in)| {
-            let [from, to] = node.x_m;
-            is_in.then_some([from + error, to - error])
+            let [from, to] = [node.x_m[0] + error, node.x_m[1] - error];
+            // Beside Tx or Rx the position error may lead beyond it.
+            (is_in && from <= to).then_some([from, to])
         })
         .collect())
 }

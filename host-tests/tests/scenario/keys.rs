@@ -106,37 +106,37 @@ fn channel_and_interferer_rows() -> Vec<Row> {
         row("channel.air_ground", channel("air_ground = @"), links),
         row(
             "interferer[1].power_w",
-            source("power_w = @\nx_m = 0\ny_m = 0"),
+            source("power_w = @\nx_m = 0\ny_m = 9"),
             powers,
         ),
         row(
             "interferer[1].power_dbm",
-            source("power_dbm = @\nx_m = 0\ny_m = 0"),
+            source("power_dbm = @\nx_m = 0\ny_m = 9"),
             SOURCES_DBM,
         ),
         row(
             "interferer[1].gain_dbi",
-            source("power_w = 1\ngain_dbi = @\nx_m = 0\ny_m = 0"),
+            source("power_w = 1\ngain_dbi = @\nx_m = 0\ny_m = 9"),
             GAINS,
         ),
         row(
             "interferer[1].eirp_dbm",
-            source("eirp_dbm = @\nx_m = 0\ny_m = 0"),
+            source("eirp_dbm = @\nx_m = 0\ny_m = 9"),
             SOURCES_DBM,
         ),
         row(
             "interferer[1].x_m",
-            source("power_w = 1\nx_m = @\ny_m = 0"),
+            source("power_w = 1\nx_m = @\ny_m = 9"),
             PLACES,
         ),
         row(
             "interferer[1].y_m",
-            source("power_w = 1\nx_m = 0\ny_m = @"),
+            source("power_w = 1\nx_m = 9\ny_m = @"),
             PLACES,
         ),
         row(
             "interferer[1].mast_m",
-            source("power_w = 1\nx_m = 0\ny_m = 0\nmast_m = @"),
+            source("power_w = 1\nx_m = 0\ny_m = 9\nmast_m = @"),
             (["-0.1", "0", "1000", "1000.1"], "0 to 1000 m"),
         ),
     ]

@@ -900,6 +900,15 @@ fn no_relay_is_planned_in_a_no_fly_area() {
         assert!(line.contains(part), "{line}");
     }
     assert_eq!(area::problem(&zones, &chain, false, true), None);
+    // A way that --allow-crossing accepts is named, also without --out.
+    let out = cargo_plan(folder, &[base.as_slice(), &["--allow-crossing"]].concat());
+    let text = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.success()
+            && text.contains("warning: the way between relay ")
+            && text.trim_end().ends_with("accepted by --allow-crossing"),
+        "{text}"
+    );
     // Relays that compute their own positions would be inside.
     let out = cargo_plan(
         folder,
@@ -937,9 +946,57 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     }
 }
 
-/// Checks that relays with altitudes of their own cross no no-fly area when they close a gap.
-///
-/// The planner avoids or refuses such paths, and warns of them for the loss of each relay.
+/// Checks that a plan in another folder finds the files of its scenario.
+#[test]
+fn a_plan_in_another_folder_finds_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::create_dir_all(folder.join("own")).unwrap();
+    std::fs::create_dir_all(folder.join("other")).unwrap();
+    let ring = "[[8.52, 47.21], [8.523, 47.21], [8.523, 47.212], [8.52, 47.21]]";
+    let polygon = format!(r#"{{ "type": "Polygon", "coordinates": [{ring}] }}"#);
+    std::fs::write(folder.join("own/zones.geojson"), polygon).unwrap();
+    let key = folder.join("own/net.key");
+    std::fs::write(&key, "01".repeat(32)).unwrap();
+    std::fs::set_permissions(&key, std::os::unix::fs::PermissionsExt::from_mode(0o600)).unwrap();
+    let text = AREA
+        .replace(
+            "area = { circle = [1300, 700, 300] }",
+            "x_m = 1300\ny_m = 700",
+        )
+        .replace("[20, 30]", "20");
+    let sections = "[[no_fly]]\nfile = \"zones.geojson\"\n[network]\nkey_file = \"net.key\"\n\
+        [companion]\nautopilot = \"udp:127.0.0.1:14550\"\nepoch_file = \"state/epoch\"\nlog_file = \"/var/log/relay\"\n";
+    std::fs::write(folder.join("own/flight.toml"), format!("{text}{sections}")).unwrap();
+    let of = |out: &str| {
+        let args = ["--scenario", "own/flight.toml", "--uavs", "3", "--out", out];
+        let output = cargo_plan(folder, &args);
+        assert!(output.status.success(), "{output:?}");
+        std::fs::read_to_string(folder.join(out)).unwrap()
+    };
+    let root = folder.canonicalize().unwrap().join("own");
+    let moved = of("other/plan.toml");
+    for (key, name) in [
+        ("file", "zones.geojson"),
+        ("key_file", "net.key"),
+        ("epoch_file", "state/epoch"),
+    ] {
+        let line = format!("\n{key} = \"{}\"\n", root.join(name).display());
+        assert!(moved.contains(&line), "{line}: {moved}");
+    }
+    assert!(
+        moved.contains("\"udp:127.0.0.1:14550\"") && moved.contains("\"/var/log/relay\""),
+        "{moved}"
+    );
+    let scenario = Scenario::load(&folder.join("other/plan.toml")).unwrap();
+    assert_eq!(scenario.no_fly.len(), 1);
+    let (succeeds, said) = provision(folder, "other/plan.toml");
+    assert!(succeeds && !said.contains("not signed"), "{said}");
+    // Beside the scenario nothing changes.
+    assert!(of("own/plan.toml").contains("\nfile = \"zones.geojson\"\n"));
+}
+
+/// Checks no-fly areas on the ways that relays with their own altitudes fly, and after each loss.
 #[test]
 fn relays_that_close_a_gap_keep_their_altitudes_beside_no_fly_areas() {
     let folder = tempfile::tempdir().unwrap();
@@ -1037,6 +1094,19 @@ fn wrong_areas_are_refused_by_name() {
         )
         .unwrap();
     }
+    // The hole before the boundary, and in the right order.
+    let rings = [
+        [8.521, 47.1992, 8.522, 47.1996],
+        [8.52, 47.199, 8.523, 47.201],
+    ]
+    .map(|[w, s, e, n]| format!("[[{w}, {s}], [{e}, {s}], [{e}, {n}], [{w}, {n}], [{w}, {s}]]"));
+    for (name, order) in [("inner", [0, 1]), ("outer", [1, 0])] {
+        let [first, second] = order.map(|at: usize| &rings[at]);
+        let polygon = format!(r#"{{ "type": "Polygon", "coordinates": [{first}, {second}] }}"#);
+        let both =
+            format!(r#"{{ "type": "GeometryCollection", "geometries": [{good}, {polygon}] }}"#);
+        std::fs::write(folder.join(format!("{name}.geojson")), both).unwrap();
+    }
     std::fs::write(folder.join("swapped.geojson"), r#"{ "type": "Polygon", "coordinates": [[[47.199, 8.52], [47.199, 8.523], [47.201, 8.523], [47.199, 8.52]]] }"#).unwrap();
     std::fs::write(
         folder.join("line.geojson"),
@@ -1050,6 +1120,16 @@ fn wrong_areas_are_refused_by_name() {
     };
     let area = |area: &str| AREA.replace("area = { circle = [1300, 700, 300] }", area);
     let zone = |zone: &str| format!("{AREA}[[no_fly]]\n{zone}\n");
+    let single = |place: &str| area(place).replace("[20, 30]", "20");
+    let length = parse(AREA).unwrap().distance_m;
+    assert_eq!(
+        parse(&zone("file = \"outer.geojson\""))
+            .unwrap()
+            .no_fly
+            .len(),
+        2
+    );
+    parse(&single("x_m = 0\ny_m = 1.1")).unwrap();
     let zones = parse(&zone("file = \"zones.geojson\"\nlowest_m = 10"))
         .unwrap()
         .no_fly;
@@ -1153,6 +1233,56 @@ fn wrong_areas_are_refused_by_name() {
             [
                 "interferer[0].power_dbm[1] = 130 is out of range",
                 "-30 to 120 dBm",
+            ],
+        ),
+        (
+            area("area = { circle = [100, 0, 99.9999] }"),
+            [
+                "interferer[0].area = with Tx (x = 0 m, y = 0) contains a site",
+                "at least 1 m from Tx and Rx, because an interferer at Tx leaves no SIR there; this one is 0.0001 m",
+            ],
+        ),
+        (
+            single("x_m = 0\ny_m = 0"),
+            [
+                "interferer[0].x_m = 0, y_m = 0 is out of range",
+                "at least 1 m from Tx and Rx",
+            ],
+        ),
+        (
+            single(&format!("x_m = {}\ny_m = 0.9", length - 0.2)),
+            ["interferer[0].x_m = 19", "this one is 0.92"],
+        ),
+        (
+            single("lat_deg = 47.2\nlon_deg = 8.536"),
+            [
+                "interferer[0].lat_deg = 47.2, lon_deg = 8.536",
+                "this one is 0.0000 m from Rx",
+            ],
+        ),
+        (
+            single("lat_deg = 8.52\nlon_deg = 47.2"),
+            [
+                "interferer[0].lat_deg = 8.52",
+                "; latitude and longitude are swapped",
+            ],
+        ),
+        (
+            single("lat_deg = 8.2\nlon_deg = 47.2"),
+            [
+                "interferer[0].lat_deg = 8.2",
+                " km away: are latitude and longitude swapped?",
+            ],
+        ),
+        (
+            single("lat_deg = 47.9\nlon_deg = 8.5"),
+            ["interferer[0].lat_deg = 47.9", "; this one is 78 km away"],
+        ),
+        (
+            zone("file = \"inner.geojson\""),
+            [
+                "polygon 1: ring 2 is not inside ring 1",
+                "the first ring has to be the outer boundary",
             ],
         ),
         (zone("lowest_m = 5"), ["no_fly[0].file is missing", "area"]),

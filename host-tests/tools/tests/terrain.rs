@@ -390,7 +390,7 @@ fn a_blocked_plan_is_refused_with_the_hop_the_place_and_the_metres() {
             && table.contains("buildings and trees"),
         "{table}"
     );
-    assert!(line.contains("hop 2 (relay 1 to relay 2) is blocked: the ground at x = 1475 m, y = 0 m (latitude 47.200"), "{line}");
+    assert!(line.contains("hop 2 (relay 1 to relay 2) is blocked: the ground at x = 1473 m, y = 0 m (latitude 47.200"), "{line}");
     assert!(
         line.contains(" is 34.7 m above the line of sight")
             && line.contains("relay 1 is -13.0 m, ")
@@ -785,7 +785,7 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     // Its last hop would be blocked.
     let blocked = without[0]["problem"].as_str().unwrap();
     assert!(
-        blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 44"),
+        blocked.starts_with("hop 4 (relay 4 to Rx) is blocked: the ground at x = 4399 m"),
         "{blocked}"
     );
     let blocks = path("blocks");
@@ -871,7 +871,177 @@ fn a_plan_over_terrain_is_flown_and_each_loss_is_named() {
     assert!(!Path::new(&path("three.toml")).exists());
 }
 
-/// Checks that a plan that relays cannot fly is refused, even without the option `--out`.
+/// Checks that rooms end before no-fly areas, and that accepted blocked hops are named.
+#[test]
+fn rooms_keep_out_of_no_fly_areas_and_accepted_hops_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let plan = path("plan.toml");
+    let of = |uavs: u16, more: &str| {
+        run(&format!(
+            "--scenario {EXAMPLE} --uavs {uavs} --altitude terrain --json {more}"
+        ))
+    };
+    let (_, json, line) = of(4, &format!("--out {plan}"));
+    let report: Value = serde_json::from_str(&json).unwrap();
+    let relays = report["flight"]["relays"].as_array().unwrap();
+    let room = |relay: &Value| [0, 1].map(|end: usize| relay["room_m"][end].as_f64());
+    let (at, [low, high]) = relays
+        .iter()
+        .enumerate()
+        .filter_map(|(at, relay)| Some((at, [room(relay)[0]?, room(relay)[1]?])))
+        .max_by(|a, b| (a.1[1] - a.1[0]).total_cmp(&(b.1[1] - b.1[0])))
+        .expect(&line);
+    let [x, h] = ["x_m", "altitude_m"].map(|key| relays[at][key].as_f64().unwrap());
+    let text = std::fs::read_to_string(&plan).unwrap();
+    let rooms = |zone: &str| {
+        std::fs::write(path("zone.toml"), format!("{text}{zone}")).unwrap();
+        let folder = path("blocks");
+        let (status, said, line) = run_as(
+            env!("CARGO_BIN_EXE_provision"),
+            &format!(
+                "--scenario {} --all --force --out-dir {folder}",
+                path("zone.toml")
+            ),
+        );
+        assert_eq!(status, Some(0), "{line}");
+        let own = format!("relay {}: x ", at + 1);
+        let own = said.lines().find(|line| line.starts_with(&own)).unwrap();
+        (own.split_once("room: ").unwrap().1.to_owned(), line)
+    };
+    let between = |from: f64, to: f64| format!("x {from:.1} to {to:.1} m");
+    let zone = |from: f64, to: f64, y: f64, lowest: f64| {
+        format!(
+            "[[no_fly]]\narea = {{ rectangle = [[{from}, {y}], [{to}, 60]] }}\nlowest_m = {lowest}\n"
+        )
+    };
+    assert_eq!(rooms("").0, between(low, high));
+    // The position error is 1 m: the area counts if it is nearer than that.
+    let before = low + 0.25 * (x - low);
+    assert!(x - before > 6.0, "{low} {x} {high}");
+    let cut = between(before + 1.0, high);
+    for (zone, expected) in [
+        (zone(before - 5.0, before, -60.0, 0.0), &cut),
+        (zone(before - 5.0, before, 0.9, h + 0.9), &cut),
+        (zone(before - 5.0, before, 1.1, 0.0), &between(low, high)),
+        (
+            zone(before - 5.0, before, -60.0, h + 1.1),
+            &between(low, high),
+        ),
+    ] {
+        assert_eq!(rooms(&zone).0, *expected, "{zone}");
+    }
+    // Less than the position error beside the relay.
+    let (room, line) = rooms(&zone(x + 0.5, x + 5.0, -60.0, 0.0));
+    let part = format!(
+        "warning: relay {} has no room: it is in no_fly[0] (0 to 10000 m) within the position error of 1 m (companion.position_error_m)",
+        at + 1
+    );
+    assert!(room == "none" && line.contains(&part), "{room} {line}");
+    // A blocked hop that is accepted is named each time, and the next command accepts it.
+    let three = path("three.toml");
+    let (status, table, line) = run(&format!(
+        "--scenario {EXAMPLE} --uavs 3 --altitude terrain --allow-blocked --out {three}"
+    ));
+    let blocked = "hop 4 (relay 3 to Rx) is blocked: the ground at x = ";
+    let warning = format!("warning: {blocked}");
+    assert!(
+        status == Some(0)
+            && table.contains(&warning)
+            && table.contains(&format!(
+                "--scenario {three} --all --out-dir DIR --allow-blocked"
+            )),
+        "{table} {line}"
+    );
+    let (status, _, line) = run_as(
+        env!("CARGO_BIN_EXE_provision"),
+        &format!(
+            "--scenario {three} --all --allow-blocked --out-dir {}",
+            path("three")
+        ),
+    );
+    assert!(
+        status == Some(0)
+            && line.contains(&warning)
+            && line.contains("above the line of sight; accepted by --allow-blocked"),
+        "{line}"
+    );
+}
+
+/// Checks that drones return above the ground, too.
+#[test]
+fn drones_return_above_the_ground_beside_the_chain() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let cell = 1.0 / 3600.0;
+    // A single height of 900 m, 43 m north of the line, in a plain of 500 m with a pit of 450 m.
+    let north = 47.2 + 10.4 * cell;
+    let raster = Raster::geographic(8.49, north, cell, [200, 21]);
+    raster.write(&folder.path().join("plain.tif"), |lon, lat| {
+        let is_at = |column: f64, row: f64| {
+            (lon - 8.49 - column * cell).abs() < 0.1 * cell
+                && (lat - north + row * cell).abs() < 0.1 * cell
+        };
+        if is_at(80.0, 9.0) {
+            900.0
+        } else if is_at(60.0, 11.0) {
+            450.0
+        } else {
+            500.0
+        }
+    });
+    let text = "[geometry]\naltitude_m = 60\naltitude_max_m = 100\nmin_separation_m = 4\n\
+        [site]\ntx = { lat_deg = 47.2, lon_deg = 8.5, amsl_m = 500 }\nrx = { lat_deg = 47.2, lon_deg = 8.53, amsl_m = 500 }\n\
+        [power]\ntx_w = 5\nuav_w = 1\n[terrain]\nfiles = [\"plain.tif\"]\nmast_m = 10\n\
+        [[interferer]]\npower_w = 1\nx_m = 1000\ny_m = 800\n";
+    std::fs::write(path("plain.toml"), text).unwrap();
+    let bundle = path("bundle");
+    let (status, _, line) = run_as(
+        env!("CARGO_BIN_EXE_provision"),
+        &format!(
+            "--scenario {} --uavs 2 --bundle {bundle}",
+            path("plain.toml")
+        ),
+    );
+    assert_eq!(status, Some(0), "{line}");
+    for relay in ["relay1", "relay2"] {
+        let read = |name: &str| {
+            std::fs::read_to_string(folder.path().join("bundle").join(relay).join(name)).unwrap()
+        };
+        let px4 = read("px4.params");
+        let own = px4
+            .lines()
+            .find(|line| line.contains("RTL_RETURN_ALT"))
+            .unwrap();
+        let return_m: f64 = own.split('\t').nth(3).unwrap().parse().unwrap();
+        // From the pit it is still above the top.
+        assert!(450.0 + return_m >= 910.0 && return_m < 520.0, "{own}");
+        let page = read("page.txt");
+        let said = format!("return to launch: {return_m:.0} m above home");
+        assert!(
+            page.contains(&said) && page.contains("450.0 to 9"),
+            "{page}"
+        );
+        assert!(read("ardupilot.parm").contains(&format!("RTL_ALT,{}\n", 100.0 * return_m)));
+    }
+    // Without terrain they return above the chain.
+    let (plain, _) = text.split_once("[terrain]").unwrap();
+    let (_, interferer) = text.split_once("mast_m = 10\n").unwrap();
+    std::fs::write(path("flat.toml"), format!("{plain}{interferer}")).unwrap();
+    let (status, _, line) = run_as(
+        env!("CARGO_BIN_EXE_provision"),
+        &format!(
+            "--scenario {} --uavs 2 --bundle {}",
+            path("flat.toml"),
+            path("flat")
+        ),
+    );
+    assert_eq!(status, Some(0), "{line}");
+    let px4 = std::fs::read_to_string(folder.path().join("flat/relay1/px4.params")).unwrap();
+    assert!(px4.contains("RTL_RETURN_ALT\t110\t"), "{px4}");
+}
+
+/// Checks that a plan says without `--out`, too, whether its relays can fly it.
 #[test]
 fn a_plan_that_relays_cannot_fly_is_refused_without_a_file() {
     let folder = tempfile::tempdir().unwrap();

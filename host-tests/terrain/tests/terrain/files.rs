@@ -16,6 +16,8 @@ pub(crate) struct Raster {
     pub(crate) is_point: bool,
     /// GDAL's metadata, XML.
     pub(crate) metadata: Option<&'static str>,
+    /// EPSG code of the vertical coordinate system.
+    pub(crate) vertical: Option<u16>,
 }
 
 impl Raster {
@@ -29,6 +31,7 @@ impl Raster {
             nodata: None,
             is_point: true,
             metadata: None,
+            vertical: None,
         }
     }
 
@@ -61,7 +64,11 @@ impl Raster {
             [3072, 0, 1, self.epsg]
         };
         let raster = [1025, 0, 1, if self.is_point { 2 } else { 1 }];
-        let keys = [[1, 1, 0, 2], raster, code].concat();
+        let mut keys = [[1, 1, 0, 2], raster, code].concat();
+        if let Some(vertical) = self.vertical {
+            keys.extend([4096, 0, 1, vertical]);
+            keys[3] += 1;
+        }
         let tags = image.encoder();
         tags.write_tag(
             Tag::ModelPixelScaleTag,

@@ -62,7 +62,7 @@ fn heights_are_interpolated_within_and_between_files() {
 }
 
 /// UTM coordinates by Krüger's series to the third order: independent of the crate's conversion.
-fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
+pub(crate) fn utm(lat: f64, lon: f64, zone: f64) -> [f64; 2] {
     let n: f64 = 1.0 / (2.0 * 298.257_223_563 - 1.0);
     let alpha = [
         n / 2.0 - 2.0 / 3.0 * n.powi(2) + 5.0 / 16.0 * n.powi(3),
@@ -112,6 +112,7 @@ fn utm_grids_have_the_heights_of_an_independent_projection() {
             nodata: None,
             is_point: false,
             metadata: None,
+            vertical: None,
         };
         let file = folder.path().join("utm.tif");
         raster.write(&file, height);
@@ -178,6 +179,20 @@ fn unusable_files_and_places_are_named() {
         }
         .write(&file(name), plane);
     }
+    for (name, code) in [("survey.tif", 6360), ("ellipsoid.tif", 5030)] {
+        Raster {
+            vertical: Some(code),
+            ..geographic()
+        }
+        .write(&file(name), plane);
+    }
+    // Heights above the sea level of Normal Amsterdams Peil, in metres.
+    Raster {
+        vertical: Some(5709),
+        ..geographic()
+    }
+    .write(&file("metres.tif"), plane);
+    assert!(Terrain::load(&[file("metres.tif")]).is_ok());
     std::fs::write(file("N47E008.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("zurich.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("text.tif"), "no picture").unwrap();
@@ -222,6 +237,19 @@ fn unusable_files_and_places_are_named() {
             ],
         ),
         (
+            &["survey.tif"],
+            &[
+                "survey.tif: has heights in feet: its vertical coordinate system is EPSG 6360 (key 4096); allowed: heights in metres",
+            ],
+        ),
+        (
+            &["ellipsoid.tif"],
+            &[
+                "ellipsoid.tif: has heights above the ellipsoid",
+                "code 5030 (key 4096)",
+            ],
+        ),
+        (
             &["a.tif", "coarse.tif"],
             &["coarse.tif: its cell size, 0.000555"],
         ),
@@ -238,6 +266,63 @@ fn unusable_files_and_places_are_named() {
             assert!(line.contains(part), "{names:?}: {line}: {part}");
         }
     }
+}
+
+/// Checks that the order of files that overlap decides nothing: they agree, or are refused.
+#[test]
+fn files_that_contradict_each_other_are_named_with_the_place_and_both_heights() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join(name);
+    let cell = 1.0 / 3600.0;
+    Raster::geographic(8.0, 47.1, cell, [200, 361]).write(&file("west.tif"), plane);
+    let east = || Raster::geographic(8.0 + 150.0 * cell, 47.1, cell, [200, 361]);
+    let bump = |most: f64| {
+        move |lon: f64, lat: f64| {
+            let at =
+                (lon - 8.0 - 160.0 * cell).abs() < 0.1 * cell && (lat - 47.05).abs() < 0.1 * cell;
+            plane(lon, lat) + if at { most } else { 0.3 }
+        }
+    };
+    east().write(&file("near.tif"), bump(0.9));
+    east().write(&file("other.tif"), bump(-30.0));
+    for names in [["west.tif", "near.tif"], ["near.tif", "west.tif"]] {
+        assert!(Terrain::load(&names.map(file)).is_ok());
+    }
+    for names in [["west.tif", "other.tif"], ["other.tif", "west.tif"]] {
+        let line = Terrain::load(&names.map(file)).err().unwrap();
+        let of = |name: &str| {
+            if name == "west.tif" {
+                "503.3 m"
+            } else {
+                "473.3 m"
+            }
+        };
+        for part in [
+            "west.tif".to_owned(),
+            "other.tif".to_owned(),
+            "contradict each other: at latitude 47.050000, longitude 8.044444".to_owned(),
+            format!(
+                "their heights are {} and {}; allowed: a difference of at most 1 m",
+                of(names[0]),
+                of(names[1])
+            ),
+        ] {
+            assert!(line.contains(&part), "{line}: {part}");
+        }
+    }
+    // Nothing is compared with a hole.
+    Raster {
+        nodata: Some(-9999.0),
+        ..east()
+    }
+    .write(&file("hole.tif"), |lon, lat| {
+        if lon < 8.0 + 200.0 * cell {
+            -9999.0
+        } else {
+            plane(lon, lat)
+        }
+    });
+    assert!(Terrain::load(&["hole.tif", "west.tif"].map(file)).is_ok());
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod files;
 mod grids;
 mod itu;
 mod judge;
+mod peaks;
 mod profiles;
 
 use chacha20::ChaCha8Rng;

@@ -16,7 +16,9 @@ use uav_relay_tools::plan;
 use uav_relay_tools::plan::area::{self, AreaReport, Criterion};
 use uav_relay_tools::plan::area_map::{self, Shown};
 use uav_relay_tools::plan::carried::Carried;
-use uav_relay_tools::plan::flown::{Flown, flown, planned, with_altitudes, with_files, with_plan};
+use uav_relay_tools::plan::flown::{
+    Flown, flown, moved, planned, with_altitudes, with_files, with_plan,
+};
 use uav_relay_tools::plan::locating::Locating;
 use uav_relay_tools::plan::map::{Map, geojson, kml};
 use uav_relay_tools::plan::over_terrain::{self, OverTerrain};
@@ -117,6 +119,13 @@ fn report(
     }
     let (terrain, error) = terrain(options, scenario, elevation, (plan, number))?;
     let error = joined([error, no_fly(options, scenario, plan)]);
+    if error.is_none() && options.area.allow_crossing {
+        let is_free = options.altitude == Altitude::Free;
+        if let Some(line) = area::problem(scenario, &plan.chain(), is_free, false) {
+            let line = line.replace(area::ACCEPTS, "; accepted by --allow-crossing");
+            command::print_line(&format!("warning: {line}"));
+        }
+    }
     let locating = over_area(options, scenario, plan)?;
     write_map(options, scenario, plan, terrain.as_ref())?;
     let known = elevation.zip(terrain.as_ref());
@@ -645,6 +654,12 @@ fn check_area(options: &Options, scenario: &Scenario) -> Result<(), Failure> {
         ..
     } = &options.area;
     let refuse = |line: String| Err(Failure::input(line));
+    if options.area.allow_crossing && scenario.no_fly.is_empty() {
+        return refuse(format!(
+            "--allow-crossing: is only for a scenario with a [[no_fly]], and {} has none",
+            options.file()
+        ));
+    }
     let file = |path: &PathBuf| path.display().to_string();
     let asked = [
         ("--quantile", quantile.map(|quantile| quantile.to_string())),
@@ -983,9 +998,13 @@ fn write_out(
         Some(_) => with_altitudes(&text, &flown.plan).map_err(wrong)?,
         None => text,
     };
-    // Elevation files are relative to the folder of the file.
-    let folder = |file: &Path| file.parent().map(Path::to_path_buf);
-    let is_moved = options.scenario.as_deref().and_then(folder) != folder(file);
+    // Paths are relative to the folder of the file.
+    let folder = options.scenario.as_deref().and_then(Path::parent);
+    let is_moved = folder != file.parent();
+    let text = match folder {
+        Some(folder) if is_moved => moved(&text, folder).map_err(wrong)?,
+        _ => text,
+    };
     let text = match terrain {
         Some((elevation, _)) if is_moved || !options.terrain.dem.is_empty() => {
             with_files(&text, &elevation.spec.files).map_err(wrong)?
@@ -997,7 +1016,11 @@ fn write_out(
     let file = file.display().to_string();
     let text = format!(
         "{file}: the scenario and its plan were written: {relays} relays that agree on positions with {sir:.3} dB; {}",
-        next(&file, &sections)
+        next(
+            &file,
+            &sections,
+            terrain.is_some() && options.terrain.allow_blocked
+        )
     );
     Ok(Flying {
         next: text,
@@ -1024,8 +1047,13 @@ fn sections(options: &Options, relays: u16) -> Result<Deployment, Failure> {
     Ok(sections)
 }
 
-fn next(file: &str, sections: &Deployment) -> String {
-    let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR\n");
+fn next(file: &str, sections: &Deployment, allow_blocked: bool) -> String {
+    let more = if allow_blocked {
+        " --allow-blocked"
+    } else {
+        ""
+    };
+    let firmware = format!("  cargo provision --scenario {file} --all --out-dir DIR{more}\n");
     let companions = format!("  cargo companion --config {file} --index INDEX\n");
     let is_for_companions = sections.companion != Companion::default();
     match (

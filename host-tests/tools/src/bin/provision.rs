@@ -18,7 +18,7 @@ use uav_relay_tools::plan::terrain::{Elevation, POSITION_ERROR_M};
 use uav_relay_tools::plan::terrain_flight::{Flight as Simulated, no_fly_warnings};
 use uav_relay_tools::plan::{NoPlan, Unit};
 use uav_relay_tools::provision::block::Flight;
-use uav_relay_tools::provision::bundle::{Bundle, FILL_IN};
+use uav_relay_tools::provision::bundle::{ASIDE_M, Bundle, FILL_IN};
 use uav_relay_tools::provision::config::{ADDRESS, LEN, MAX_PROBE_AFTER_MS, Secret};
 use uav_relay_tools::provision::folder::{Heading, summary};
 use uav_relay_tools::provision::{block, folder};
@@ -300,8 +300,7 @@ impl<'a> Asked<'a> {
             NoPlan::Unmet(why, _) => named(why.say(Unit::Decibels)),
         };
         let warn = |line: String| command::print_line(&named(format!("warning: {line}")));
-        let error_m = self.deployment.companion.position_error_m;
-        let error_m = error_m.map_or(POSITION_ERROR_M, f64::from);
+        let error_m = self.position_error_m();
         if self.scenario.terrain.is_none() && self.options.allow_blocked {
             return Err("--allow-blocked: is only for a scenario with a [terrain]".to_owned());
         }
@@ -336,7 +335,34 @@ impl<'a> Asked<'a> {
         Ok(Some(flight))
     }
 
-    /// Prints why terrain and no-fly areas of the scenario are not checked. Returns `None`: no flight is simulated.
+    /// Returns the lowest and the highest ground, m above the sea.
+    ///
+    /// The highest one includes the least height above the ground. Both are those from Tx to Rx, and beside the line as far as drones take off. `None` without terrain.
+    fn ground_m(&self) -> Result<Option<[f64; 2]>, String> {
+        let scenario = &self.scenario;
+        let why = |line: String| {
+            format!(
+                "{}: {line}; the ground up to {ASIDE_M} m beside the chain is needed for the altitude of the return to launch",
+                self.name
+            )
+        };
+        let elevation = Elevation::load(scenario, &[], self.position_error_m()).map_err(why)?;
+        let Some(elevation) = elevation else {
+            return Ok(None);
+        };
+        let aside_m = scenario.lateral_max_m.max(-scenario.lateral_min_m).max(0.0);
+        let [low, high] = elevation
+            .corridor_m(scenario, aside_m + ASIDE_M)
+            .map_err(why)?;
+        Ok(Some([low, high + elevation.spec.above_ground_m]))
+    }
+
+    fn position_error_m(&self) -> f64 {
+        let error_m = self.deployment.companion.position_error_m;
+        error_m.map_or(POSITION_ERROR_M, f64::from)
+    }
+
+    /// Prints that terrain and no-fly areas of the scenario are not checked, and why.
     fn unchecked(&self, why: &str) -> Option<Simulated> {
         let has_terrain = self.scenario.terrain.is_some();
         for (what, is_there) in [
@@ -445,6 +471,7 @@ impl<'a> Asked<'a> {
             None => (1..=self.uavs).collect(),
         };
         let bundle = Bundle {
+            ground_m: self.ground_m()?,
             text,
             deployment: &self.deployment,
             uavs: self.uavs,

@@ -249,11 +249,14 @@ pub fn ways([from, to]: [Point; 2], keeps: [bool; 2]) -> [[Point; 2]; 2] {
     ]
 }
 
+/// End of the line about a way that crosses a no-fly area.
+pub const ACCEPTS: &str = "; `cargo plan --allow-crossing` accepts it";
+
 fn point(at: &Placement) -> Point {
     [at.x_m, at.y_m, at.altitude_m].map(f64::from)
 }
 
-fn range(area: &NoFly) -> String {
+pub(super) fn range(area: &NoFly) -> String {
     let [low, high] = [area.altitudes_m.start(), area.altitudes_m.end()];
     format!("{} ({low} to {high} m)", area.key)
 }
@@ -290,7 +293,7 @@ pub fn problem(
                 let level = keeps.contains(&true) && (from[2] - to[2]).abs() > ROUNDING_M;
                 let level = level.then(|| format!(" from the altitude {altitude_m:.1} m"));
                 lines.push(format!(
-                    "the line from relay {index} to relay {} crosses {range} for {crossing_m:.1} m{}; a relay that closes a gap would fly through it; `cargo plan --allow-crossing` accepts this",
+                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m{}, and relays that close a gap fly there{ACCEPTS}",
                     index + 1,
                     level.unwrap_or_default()
                 ));

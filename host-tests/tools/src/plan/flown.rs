@@ -3,7 +3,7 @@
 //! On board there is a single interferer or a field. A hypothetical interferer in place of several is an approximation, and
 //! Algorithm 4 falls short in an uneven field, so the positions are judged against the full interference.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 use uav_relay_scenario::scene::Scene;
@@ -246,6 +246,75 @@ pub fn with_files(text: &str, files: &[PathBuf]) -> Result<String, String> {
         .as_table_like_mut()
         .ok_or("terrain: must be a section")?;
     terrain.insert("files", value(paths));
+    Ok(file.to_string())
+}
+
+/// Keys of the sections of a scenario file whose paths are relative to the folder of the file.
+const PATHS: [(&str, &[&str]); 3] = [
+    ("network", &["key_file"]),
+    (
+        "companion",
+        &[
+            "upstream",
+            "downstream",
+            "shared",
+            "epoch_file",
+            "upload_file",
+            "view_file",
+            "autopilot",
+            "autopilot_key_file",
+            "positions",
+            "log_file",
+            "status_socket",
+            "capture",
+        ],
+    ),
+    (
+        "ground",
+        &[
+            "tty",
+            "epoch_file",
+            "measurements",
+            "web_password",
+            "tiles",
+            "log_file",
+            "status_socket",
+            "capture",
+        ],
+    ),
+];
+
+/// Returns the scenario file `text` of `folder` for another folder.
+///
+/// Its relative paths become paths from the root folder. Elevation files are left to [`with_files`].
+///
+/// # Errors
+/// The reason if `text` is not valid TOML, or the current folder is unknown.
+pub fn moved(text: &str, folder: &Path) -> Result<String, String> {
+    let mut file = document(text)?;
+    let replace = |item: &mut Item| {
+        let given = item.as_str().filter(|given| !given.starts_with("udp:"));
+        if let Some(given) = given.filter(|given| Path::new(given).is_relative()) {
+            let path = std::path::absolute(folder.join(given))
+                .map_err(|error| format!("{given}: {error}"))?;
+            *item = value(path.display().to_string());
+        }
+        Ok::<_, String>(())
+    };
+    for (section, keys) in PATHS {
+        for key in keys {
+            let table = file.get_mut(section).and_then(Item::as_table_like_mut);
+            table
+                .and_then(|table| table.get_mut(key))
+                .map_or(Ok(()), replace)?;
+        }
+    }
+    if let Some(Ok(mut areas)) = file.remove("no_fly").map(Item::into_array_of_tables) {
+        for area in areas.iter_mut() {
+            area.get_mut("file").map_or(Ok(()), replace)?;
+        }
+        file.insert("no_fly", Item::ArrayOfTables(areas));
+    }
     Ok(file.to_string())
 }
 

@@ -33,8 +33,8 @@ const LEVELS: u32 = 12;
 /// Largest number of terrain points along the whole line during the search. A hop has its share of them.
 const POINTS: f64 = 800.0;
 
-/// Largest number of points of a profile at the end of the search, as in reports.
-pub(super) const FINE_POINTS: f64 = 20_000.0;
+/// Number of points of a profile at the end of the search: all, as in reports.
+pub(super) const FINE_POINTS: f64 = f64::INFINITY;
 
 /// Smallest width of a grid's columns, m, with which the highest ground of each column is tried, too.
 const WIDE_M: f64 = 100.0;
@@ -96,10 +96,11 @@ pub struct Search<'a> {
     scene: &'a Scene,
     ground: Ground<'a>,
     wavelength_m: f64,
-    /// Heights of the ground along the line, at equal steps.
-    line: Vec<f64>,
-    step_m: f64,
-    /// Least and greatest permitted height of a relay above the ground, m.
+    /// Ground along the line: x and height, m.
+    line: Vec<Point>,
+    /// True if the points of the line are only the highest ones of equal steps.
+    is_coarse: bool,
+    /// Least and greatest height above the ground, and the position error, m.
     clearance_m: [f64; 2],
     position_error_m: f64,
     /// True if the scenario's band of altitudes limits the altitudes in addition to `clearance_m`.
@@ -131,37 +132,19 @@ impl<'a> Search<'a> {
         points: f64,
     ) -> Result<Self, String> {
         let ground = elevation.ground(scenario)?;
-        let needed = (scene.distance_m / ground.step_m()).ceil().max(16.0);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at most 20 000, and the cells of a line"
-        )]
-        let [steps, aside] =
-            [needed.min(points), (0.5 * needed / points).floor()].map(|n| n as u32);
-        let step_m = scene.distance_m / f64::from(steps);
-        let line = (0..=steps).map(|step| {
-            let x_m = f64::from(step) * step_m;
-            let mut highest = ground.height_m(x_m, 0.0)?;
-            for near in 1..=aside {
-                let off_m = 0.5 * step_m * f64::from(near) / f64::from(aside);
-                for x_m in [x_m - off_m, x_m + off_m] {
-                    let x_m = x_m.clamp(0.0, scene.distance_m);
-                    highest = highest.max(ground.height_m(x_m, 0.0)?);
-                }
-            }
-            // The ground at a site is that below its antenna.
-            if step == 0 || step == steps {
-                highest = ground.height_m(x_m, 0.0)?;
-            }
-            Ok(highest + ground.raise_m(x_m))
-        });
+        let fine = ground.profile(ground.ends)?.points;
+        let is_coarse = fine.len() as f64 > points;
+        let line = if is_coarse {
+            coarse(&fine, scene.distance_m / points)
+        } else {
+            fine
+        };
         let most = elevation.spec.above_ground_max_m;
         Ok(Self {
             scene,
             wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
-            line: line.collect::<Result<_, String>>()?,
-            step_m,
+            line,
+            is_coarse,
             clearance_m: [elevation.spec.above_ground_m, most.unwrap_or(f64::INFINITY)],
             position_error_m: elevation.position_error_m(),
             is_banded: most.is_none(),
@@ -185,10 +168,9 @@ impl<'a> Search<'a> {
                 band.least_m, band.most_m
             )
         };
-        let heights = self.line.iter().enumerate().filter_map(|(at, height_m)| {
-            let x_m = at as f64 * self.step_m;
-            Some([x_m, height_m - self.datum_m(x_m).ok()?])
-        });
+        let heights = self.line.iter();
+        let heights =
+            heights.filter_map(|&[x_m, height_m]| Some([x_m, height_m - self.datum_m(x_m).ok()?]));
         let lowest = heights.min_by(|a, b| a[1].total_cmp(&b[1]));
         let [x_m, height_m] = lowest.unwrap_or_default();
         format!(
@@ -325,11 +307,7 @@ impl<'a> Search<'a> {
         if wide_m < WIDE_M {
             return Ok(Vec::new());
         }
-        let points = self.line.iter().enumerate();
-        let points: Vec<[f64; 2]> = points
-            .map(|(at, h)| [at as f64 * self.step_m, *h])
-            .collect();
-        let crests = points.chunk_by(|[one, _], [other, _]| {
+        let crests = self.line.chunk_by(|[one, _], [other, _]| {
             (one / wide_m)
                 .floor()
                 .total_cmp(&(other / wide_m).floor())
@@ -440,30 +418,19 @@ impl<'a> Search<'a> {
 
     /// Returns the ground between two positions on the line.
     fn profile(&self, from_m: f64, to_m: f64) -> Vec<Point> {
+        let after = |x_m: f64| self.line.partition_point(|[x, _]| *x <= x_m);
         let height = |x_m: f64| {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "0 to 800"
-            )]
-            let at = (x_m / self.step_m).floor().max(0.0) as usize;
-            let share = x_m / self.step_m - at as f64;
-            let node = |at: usize| {
-                self.line
-                    .get(at)
-                    .or(self.line.last())
-                    .copied()
-                    .unwrap_or_default()
-            };
-            node(at) * (1.0 - share) + node(at + 1) * share
+            let at = after(x_m);
+            let known = |at: usize| self.line.get(at).or(self.line.last()).copied();
+            let ends = known(at.saturating_sub(1)).zip(known(at));
+            let ([from, low], [to, high]) = ends.unwrap_or_default();
+            let share = (x_m - from) / (to - from).max(f64::MIN_POSITIVE);
+            low + share.clamp(0.0, 1.0) * (high - low)
         };
         let mut points = vec![[0.0, height(from_m)]];
-        for (at, ground) in self.line.iter().enumerate() {
-            let x_m = at as f64 * self.step_m;
-            if x_m > from_m + 1e-3 && x_m < to_m - 1e-3 {
-                points.push([x_m - from_m, *ground]);
-            }
-        }
+        let inner = self.line.iter().skip(after(from_m + 1e-3));
+        let inner = inner.take_while(|[x_m, _]| *x_m < to_m - 1e-3);
+        points.extend(inner.map(|[x_m, ground]| [x_m - from_m, *ground]));
         points.push([to_m - from_m, height(to_m)]);
         points
     }
@@ -574,6 +541,27 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Returns points at equal steps of at least `step_m`, each with the highest of the points near it.
+///
+/// The ground at the ends is that of `fine`, below the antennas.
+fn coarse(fine: &[Point], step_m: f64) -> Vec<Point> {
+    let near = |[x_m, _]: &Point| (x_m / step_m).round();
+    let chunks = fine.chunk_by(|one, other| near(one).total_cmp(&near(other)).is_eq());
+    let highest = chunks.filter_map(|points| {
+        let x_m = near(points.first()?) * step_m;
+        let heights = points.iter().map(|[_, height]| *height);
+        Some([x_m, heights.fold(f64::NEG_INFINITY, f64::max)])
+    });
+    let mut line: Vec<Point> = highest.collect();
+    if let (Some(at), Some(end)) = (line.first_mut(), fine.first()) {
+        *at = *end;
+    }
+    if let (Some(at), Some(end)) = (line.last_mut(), fine.last()) {
+        *at = *end;
+    }
+    line
+}
+
 /// Returns the best positions of `relays` relays over the terrain, on the line.
 ///
 /// # Errors
@@ -635,7 +623,7 @@ pub fn best(
     let Some((mut chain, mut sir)) = found else {
         return Err(NoPlan::Unmet(Why::Plain(search.nowhere(scenario)), None));
     };
-    if scene.distance_m / search.ground.step_m() > POINTS {
+    if search.is_coarse {
         search =
             Search::with_points(scenario, &scene, elevation, FINE_POINTS).map_err(NoPlan::Wrong)?;
         sir = search.worst_sir(&chain);

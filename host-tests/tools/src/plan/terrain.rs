@@ -89,21 +89,23 @@ impl Elevation {
             return Ok(Vec::new());
         };
         let ground = self.ground(scenario)?;
-        let altitude = |[x_m, y_m]: [f64; 2]| {
-            let datum = ground.point(x_m, y_m).ok()?;
-            let height = ground.height_m(x_m, y_m).ok()?;
-            Some(height - f64::from(datum.amsl_mm) / 1e3)
-        };
         let each = sources.iter().enumerate().map(|(at, source)| {
             let places = match scenario.areas.get(&at) {
-                None => vec![[source.x_m, source.y_m]],
-                Some(source) => sampled(&source.area, ground.step_m()),
+                None => ground
+                    .height_m(source.x_m, source.y_m)
+                    .map(|height| vec![[source.x_m, source.y_m, height]]),
+                Some(source) => heights(&ground, &source.area),
             };
             let mast_m = scenario.masts_m.get(&at).copied().unwrap_or_default();
             let none = [f64::INFINITY, f64::NEG_INFINITY];
-            let altitude_m = places.into_iter().try_fold(none, |[low, high], place| {
-                let altitude = altitude(place)? + mast_m;
-                Some([low.min(altitude), high.max(altitude)])
+            let altitude_m = places.ok().and_then(|places| {
+                places
+                    .into_iter()
+                    .try_fold(none, |[low, high], [x, y, height]| {
+                        let datum_m = f64::from(ground.point(x, y).ok()?.amsl_mm) / 1e3;
+                        let altitude = height - datum_m + mast_m;
+                        Some([low.min(altitude), high.max(altitude)])
+                    })
             });
             InterfererHeight {
                 index: at + 1,
@@ -111,6 +113,26 @@ impl Elevation {
             }
         });
         Ok(each.collect())
+    }
+
+    /// Returns the lowest and the highest ground from Tx to Rx, m above the sea.
+    ///
+    /// The ground counts up to `aside_m` beside the line.
+    /// The highest ground is raised by the error of the heights.
+    ///
+    /// # Errors
+    /// A line that names the place: it is not covered by the elevation files, or a hole.
+    pub fn corridor_m(&self, scenario: &Scenario, aside_m: f64) -> Result<[f64; 2], String> {
+        let ground = self.ground(scenario)?;
+        let [from, to] = [[0.0, -aside_m], [scenario.distance_m, aside_m]];
+        let corners = vec![from, [to[0], from[1]], to, [from[0], to[1]]];
+        let heights = heights(&ground, &Area::Polygon(corners))?;
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        Ok(heights
+            .into_iter()
+            .fold(none, |[low, high], [x, _, height]| {
+                [low.min(height), high.max(height + ground.raise_m(x))]
+            }))
     }
 
     /// Returns the report of the terrain below `plan`.
@@ -164,33 +186,24 @@ impl Elevation {
     }
 }
 
-/// Largest number of samples along one side of an area.
-const SAMPLES: f64 = 200.0;
-
-/// Returns points of an area and its boundary, spaced at most `step_m` or a 200th of the area's side.
-fn sampled(area: &Area, step_m: f64) -> Vec<[f64; 2]> {
-    let [low, high] = area.bounds();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "1 to 200"
-    )]
-    let steps = [0, 1].map(|axis: usize| {
-        let side = high
-            .get(axis)
-            .zip(low.get(axis))
-            .map_or(0.0, |(a, b)| a - b);
-        (side / step_m).ceil().clamp(1.0, SAMPLES) as u32
-    });
-    let at = |axis: usize, step: u32| {
-        let [from, to] = [low, high].map(|corner| corner.get(axis).copied().unwrap_or_default());
-        let steps = steps.get(axis).copied().unwrap_or(1);
-        from + (to - from) * f64::from(step) / f64::from(steps)
-    };
-    let all = (0..=steps[0]).flat_map(|x| (0..=steps[1]).map(move |y| (x, y)));
-    // A point outside gives the nearest one of the boundary.
-    all.map(|(x, y)| area.nearest([at(0, x), at(1, y)]))
-        .collect()
+/// Returns points [x, y, height] of an area, m, among them its highest and its lowest ground.
+///
+/// These are at nodes of the elevation model inside, or on the boundary.
+fn heights(ground: &Ground<'_>, area: &Area) -> Result<Vec<[f64; 3]>, String> {
+    let mut points = Vec::new();
+    let corners = area.corners();
+    let next = corners.iter().cycle().skip(1);
+    for (from, to) in corners.iter().zip(next) {
+        let line = ground.line([*from, *to])?;
+        let length = line.last().map_or(0.0, |[length, _]| *length);
+        points.extend(line.into_iter().map(|[along, height]| {
+            let share = along / length.max(f64::MIN_POSITIVE);
+            let at = |from: f64, to: f64| from + share * (to - from);
+            [at(from[0], to[0]), at(from[1], to[1]), height]
+        }));
+    }
+    points.extend(ground.nodes(area.bounds(), |at| area.contains(at))?);
+    Ok(points)
 }
 
 /// Returns the picture of the profile: ground, hops with the first Fresnel zone, and nodes.

@@ -10,6 +10,7 @@ use std::fmt;
 use rayon::prelude::*;
 use serde::Serialize;
 use uav_relay::{Duration, Method, Placement};
+use uav_relay_scenario::area::NoFly;
 use uav_relay_scenario::{PlannedMethod, Scenario, mission};
 use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome};
@@ -18,7 +19,7 @@ use uav_relay_terrain::diffraction::LIGHT_M_S;
 use uav_relay_terrain::profile::Ground;
 use uav_relay_terrain::room::{Limits, rooms};
 
-use super::area::entered;
+use super::area::{entered, range};
 use super::flown::{alone, shortest};
 use super::over_terrain::{Candidate, FINE_POINTS, MOST_RELAYS, Search};
 use super::terrain::Elevation;
@@ -39,8 +40,8 @@ const SLACK: f64 = 0.0023;
 /// Least relative gain in SIR for which the search accepts other altitudes.
 const GAIN: f64 = 1e-4;
 
-/// Text for the user: the meaning of a relay's room, the interval of x in which it may move.
-pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, and no clear hop becomes grazing (ground in the first Fresnel zone); none: a drift by the position error is too much";
+/// Explanation of the rooms for the user.
+pub const ROOM: &str = "room: while every relay is in its room, no hop becomes blocked, no clear hop becomes grazing, and no relay is in a no-fly area; none: that does not hold within the position error";
 
 /// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
 struct Trial {
@@ -171,7 +172,7 @@ pub struct FlownRelay {
     pub altitude_m: f32,
     /// Interval of x, m, in which no hop gets worse while this relay's neighbours are in their intervals.
     ///
-    /// Absent if there is none.
+    /// It contains no no-fly area. Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub room_m: Option<[f64; 2]>,
 }
@@ -202,9 +203,12 @@ pub struct Flight {
     pub off_m: Option<f64>,
     /// Positions of the relays.
     pub relays: Vec<FlownRelay>,
-    /// Position error of a relay, m.
+    /// Blocked hops that `--allow-blocked` accepts; absent if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blocked: Option<String>,
+    /// Reasons why relays have no room, one for each.
     #[serde(skip)]
-    position_error_m: f64,
+    confined: Vec<String>,
     /// Chains after the loss of one relay; empty for one relay and for more than 50.
     pub without: Vec<Without>,
     /// Reason why the relays cannot fly above this terrain: a blocked hop, a relay too low or too high. `None` if they can.
@@ -241,15 +245,29 @@ impl Flight {
             apart_m: scenario.min_separation_m,
             wavelength_m: LIGHT_M_S / scenario.channel.carrier_hz,
         };
-        let rooms = rooms(&ground, &places, &report, limits).map_err(NoPlan::Wrong)?;
-        let closed =
-            |loss: &Loss| without(scenario, elevation, &ground, tolerance, (loss, &places));
-        let without: Vec<Result<Without, NoPlan>> = losses.par_iter().map(closed).collect();
+        let mut rooms = rooms(&ground, &places, &report, limits).map_err(NoPlan::Wrong)?;
+        let error_m = limits.position_error_m;
+        let mut confined = Vec::new();
+        for ((index, place), room) in (1..).zip(&places).zip(&mut rooms) {
+            let entered = if room.is_some() {
+                cut(room, place, &scenario.no_fly, error_m)
+            } else {
+                Some(
+                    "one of its hops gets worse, blocked or grazing, or it passes Tx or Rx,"
+                        .to_owned(),
+                )
+            };
+            confined.extend(entered.map(|why| {
+                format!("relay {index} has no room: {why} within the position error of {error_m} m (companion.position_error_m)")
+            }));
+        }
+        let without = losses_over(scenario, elevation, &ground, tolerance, (&losses, &places))?;
         Ok(Self {
             terrain_sir_db: report.terrain_sir_db,
             loss_db: None,
             off_m: None,
-            position_error_m: elevation.position_error_m(),
+            blocked: report.blocked().filter(|_| allow_blocked),
+            confined,
             relays: (1..)
                 .zip(&places)
                 .zip(rooms)
@@ -260,7 +278,7 @@ impl Flight {
                     room_m,
                 })
                 .collect(),
-            without: without.into_iter().collect::<Result<_, _>>()?,
+            without,
             problem: elevation.problem(&report, allow_blocked),
         })
     }
@@ -285,16 +303,11 @@ impl Flight {
             .then(|| format!("more than {MOST_RELAYS} relays"))
     }
 
-    /// Returns the warnings: relays without a room, and problems of the chain after the loss of one relay.
+    /// Returns the lines about accepted blocked hops, relays without a room, and bad losses.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        let error_m = self.position_error_m;
-        let confined = self.relays.iter().filter(|relay| relay.room_m.is_none());
-        let confined = confined.map(move |relay| {
-            format!(
-                "relay {} has no room to drift: a displacement by the position error of {error_m} m (companion.position_error_m) makes one of its hops blocked, or a clear hop grazing",
-                relay.index
-            )
-        });
+        let blocked = self.blocked.iter();
+        let blocked = blocked.map(|line| format!("{line}; accepted by --allow-blocked"));
+        let confined = blocked.chain(self.confined.iter().cloned());
         confined.chain(self.without.iter().filter_map(|without| {
             let problem = without.problem.as_ref()?;
             Some(format!("without relay {}: {problem}", without.lost))
@@ -350,6 +363,34 @@ impl fmt::Display for Flight {
         }
         Ok(())
     }
+}
+
+/// Cuts `room` to its part around `place` that is outside of `no_fly`, within the position error.
+///
+/// Returns the reason why there is no room any more.
+fn cut(
+    room: &mut Option<[f64; 2]>,
+    place: &Placement,
+    no_fly: &[NoFly],
+    error_m: f64,
+) -> Option<String> {
+    let [x, y, h] = [place.x_m, place.y_m, place.altitude_m].map(f64::from);
+    for area in no_fly {
+        for [from, to] in area.intervals_m(y, h, error_m) {
+            let Some([low, high]) = room else {
+                return None;
+            };
+            if to <= x {
+                *low = low.max(to);
+            } else if from >= x {
+                *high = high.min(from);
+            } else {
+                *room = None;
+                return Some(format!("it is in {}", range(area)));
+            }
+        }
+    }
+    None
 }
 
 /// Returns the setup of a simulated flight on a shared channel without losses.
@@ -455,15 +496,22 @@ pub fn no_fly_warnings(
         )]);
     }
     let (places, losses) = losses(scenario, relays, how)?;
+    Ok(lines_of(&scenario.no_fly, &losses, &places))
+}
+
+/// Returns a line for each loss that leads another relay into a no-fly area.
+///
+/// The chain is at `places` before.
+fn lines_of(no_fly: &[NoFly], losses: &[Loss], places: &[Placement]) -> Vec<String> {
     let lines = losses.iter().filter_map(|loss| {
         let problems = match &loss.places {
-            Some(to) => entered(&scenario.no_fly, &loss.left, [&loss.before(&places), to]),
+            Some(to) => entered(no_fly, &loss.left, [&loss.before(places), to]),
             None => vec![NOWHERE.to_owned()],
         };
         let problem = problems.join("; ");
         (!problems.is_empty()).then(|| format!("without relay {}: {problem}", loss.lost))
     });
-    Ok(lines.collect())
+    lines.collect()
 }
 
 impl Loss {
@@ -474,7 +522,20 @@ impl Loss {
     }
 }
 
-/// Checks terrain and no-fly areas below the other relays after a loss. `places` are all positions before the loss.
+/// Returns terrain and no-fly areas below the others, after each of the losses in a chain at `places`.
+fn losses_over(
+    scenario: &Scenario,
+    elevation: &Elevation,
+    ground: &Ground<'_>,
+    tolerance: f64,
+    (losses, places): (&[Loss], &[Placement]),
+) -> Result<Vec<Without>, NoPlan> {
+    let closed = |loss: &Loss| without(scenario, elevation, ground, tolerance, (loss, places));
+    let without: Vec<Result<Without, NoPlan>> = losses.par_iter().map(closed).collect();
+    without.into_iter().collect()
+}
+
+/// Returns terrain and no-fly areas below the others, after a loss in a chain at `places`.
 fn without(
     scenario: &Scenario,
     elevation: &Elevation,
@@ -546,4 +607,73 @@ fn lowest(ground: &Ground<'_>, from: Placement, to: Placement) -> Result<Option<
         ]
     });
     Ok(heights.min_by(|one, other| one[1].total_cmp(&other[1])))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by it")]
+
+    use std::path::Path;
+
+    use uav_relay::Placement;
+    use uav_relay_scenario::Scenario;
+
+    use super::{Flight, Loss, NOWHERE, losses_over};
+    use crate::plan::terrain::Elevation;
+
+    /// Checks what a user reads if the others find no positions after a loss.
+    ///
+    /// The simulated relays of a scenario file always find some, so the outcome is given here.
+    #[test]
+    fn a_loss_after_which_the_others_find_no_positions_is_named() {
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/hills.toml");
+        let scenario = Scenario::load(&example).unwrap();
+        let elevation = Elevation::load(&scenario, &[], 1.0).unwrap().unwrap();
+        let ground = elevation.ground(&scenario).unwrap();
+        let places = [1000.0, 2500.0, 4000.0].map(|x_m| Placement::on_line(x_m, 150.0));
+        let nowhere = |lost: u16| Loss {
+            lost,
+            left: (1..=3).filter(|index| *index != lost).collect(),
+            places: None,
+        };
+        let found = Loss {
+            places: Some(vec![places[0], places[2]]),
+            ..nowhere(2)
+        };
+        let losses = [nowhere(1), found, nowhere(3)];
+        let without =
+            losses_over(&scenario, &elevation, &ground, 1e-4, (&losses, &places)).unwrap();
+        for (at, loss) in without.iter().enumerate() {
+            let is_known = at == 1;
+            assert_eq!(loss.terrain_sir_db.is_some(), is_known);
+            assert_eq!(loss.problem.as_deref() == Some(NOWHERE), !is_known);
+        }
+        let flight = Flight {
+            terrain_sir_db: 1.0,
+            loss_db: None,
+            off_m: None,
+            relays: Vec::new(),
+            blocked: None,
+            confined: Vec::new(),
+            without,
+            problem: None,
+        };
+        let text = flight.to_string();
+        for lost in [1, 3] {
+            let line = format!("warning: without relay {lost}: the other relays find no positions");
+            assert_eq!(text.matches(&line).count(), 1, "{text}");
+        }
+        assert!(
+            !text.contains("worst hop 1.000 dB, without relay"),
+            "{text}"
+        );
+        // The same without terrain.
+        let lines = super::lines_of(&scenario.no_fly, &losses, &places);
+        assert_eq!(
+            lines,
+            [1, 3].map(|lost| format!("without relay {lost}: the other relays find no positions"))
+        );
+        let json = serde_json::to_value(&flight).unwrap();
+        assert!(json["without"][0].get("terrain_sir_db").is_none(), "{json}");
+    }
 }

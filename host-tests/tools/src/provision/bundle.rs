@@ -27,6 +27,9 @@ const WRITABLE: [&str; 2] = ["/var/lib/uav-relay", "/run/uav-relay"];
 /// Largest MAVLink system number of a drone; ground stations have the next numbers.
 const MAX_SYSTEM: u16 = 250;
 
+/// Distance beside the relays' range of y within which drones take off, m.
+pub const ASIDE_M: f64 = 50.0;
+
 /// Largest radius and altitude of ArduCopter's fences, m.
 const FENCE_RADIUS_M: f64 = 10_000.0;
 const FENCE_ALT_M: f64 = 1_000.0;
@@ -58,6 +61,10 @@ pub struct Bundle<'a> {
     pub places: &'a [(Placement, Profile)],
     /// Simulated flight over the terrain; `None` without terrain.
     pub simulated: Option<&'a Flight>,
+    /// Lowest and highest ground, m above the sea, if there is a terrain.
+    ///
+    /// It counts up to [`ASIDE_M`] beside the flight. The highest ground includes the least height above the ground.
+    pub ground_m: Option<[f64; 2]>,
     /// Line from Tx to Rx.
     pub line: &'a Line,
     /// Key of the network.
@@ -295,30 +302,41 @@ impl Bundle<'_> {
         GuardConfig::of(self.mission, profile).geofence
     }
 
-    /// Returns the parameters that the chain needs in the autopilot of relay `index`.
+    /// Returns the altitude above home at which relay `index` returns, m.
     ///
-    /// Drones return at different altitudes, because a returning drone crosses the line along which the other drones
-    /// fly.
+    /// Drones return at different altitudes, because a returning drone crosses the line of the others. All are above the
+    /// chain and, if there is a terrain, above the ground between Tx and Rx.
+    fn return_m(&self, index: u16) -> f64 {
+        let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
+        let highest = (1..=self.uavs).map(|of| f64::from(self.fence(of).most_altitude_m));
+        // Altitudes are above the line between the sites, those of an autopilot above its home.
+        let highest_m = tx.max(rx) + highest.fold(20.0, f64::max);
+        let [low, high] = self.ground_m.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+        let top_m = highest_m.max(high) - tx.min(rx).min(low);
+        let separation_m = f64::from(self.mission.config().min_separation_m);
+        let step_m = (separation_m + 2.0).max(6.0).ceil();
+        (top_m + 10.0).ceil() + step_m * f64::from(index - 1)
+    }
+
+    /// Returns the parameters that the chain needs in the autopilot of relay `index`.
     ///
     /// # Errors
     /// The highest altitude is above the range of a fence.
     fn parameters(&self, index: u16) -> Result<Vec<Parameter>, String> {
         let config = self.mission.config();
         let fence = self.fence(index);
-        let [tx, rx] = self.line.sites.map(|site| f64::from(site.amsl_mm) / 1e3);
-        let highest = (1..=self.uavs).map(|of| f64::from(self.fence(of).most_altitude_m));
-        // Altitudes are above the line between the sites, those of an autopilot above its home.
-        let top_m = highest.fold(20.0, f64::max) + (tx - rx).abs();
-        let step_m = (f64::from(config.min_separation_m) + 2.0).max(6.0).ceil();
-        let return_m = |index: u16| (top_m + 10.0).ceil() + step_m * f64::from(index - 1);
+        let return_m = |index: u16| self.return_m(index);
         let wide_m = f64::from(fence.most_y_m.max(-fence.least_y_m));
         // A drone takes off near its place, so that the largest radius contains its flight.
         let radius_m = (f64::from(config.distance_m) + wide_m + 200.0).ceil();
         let radius_m = radius_m.min(FENCE_RADIUS_M);
         let ceiling_m = return_m(self.uavs) + 20.0;
         if ceiling_m > FENCE_ALT_M {
+            let over = self.ground_m.map_or(String::new(), |[low, high]| {
+                format!(" and above the ground, {low:.1} to {high:.1} m above the sea,")
+            });
             return Err(format!(
-                "FENCE_ALT_MAX would be {ceiling_m} m, but ArduCopter allows at most {FENCE_ALT_M} m: {} drones return one above the other, above the chain; use fewer drones or a lower chain",
+                "FENCE_ALT_MAX would be {ceiling_m} m: {} drones that return above each other, above the chain{over} need a fence above {FENCE_ALT_M} m, which ArduCopter does not have",
                 self.uavs
             ));
         }
@@ -422,6 +440,13 @@ impl Bundle<'_> {
             for line in flight.warnings() {
                 _ = writeln!(page, "warning: {line}");
             }
+        }
+        if let Some([low, high]) = self.ground_m {
+            _ = writeln!(
+                page,
+                "return to launch: {:.0} m above home, at least 10 m above the ground and the chain, if home is at most {ASIDE_M:.0} m beside the chain; ground with the least height above it: {low:.1} to {high:.1} m above the mean sea level",
+                self.return_m(index)
+            );
         }
         let neighbour = |side| match (side, index) {
             (Side::Upstream, 1) => "the transmitter".to_owned(),
