@@ -508,7 +508,7 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
             .as_ref()
             .ok()
             .and_then(|text| metadatum(text, role));
-        if let Some(value) = value.filter(|value| !["1", "0", "m", "metre"].contains(value)) {
+        if let Some(value) = value.filter(|value| !is_metres(value)) {
             return Err(format!(
                 "has heights with the {role} {value} (tag {GDAL_METADATA}); allowed: heights in metres, without scale or offset"
             ));
@@ -566,9 +566,17 @@ fn geotiff(path: &Path) -> Result<Tile, String> {
 
 /// Returns the value of the item `role` of GDAL's metadata; `None` without such an item.
 fn metadatum<'a>(text: &'a str, role: &str) -> Option<&'a str> {
-    let (_, after) = text.split_once(&format!("role=\"{role}\""))?;
-    let (_, value) = after.split_once('>')?;
+    let mut after = ['"', '\'']
+        .into_iter()
+        .filter_map(|quote| text.split_once(&format!("role={quote}{role}{quote}")));
+    let (_, value) = after.next()?.1.split_once('>')?;
     Some(value.split_once('<')?.0.trim())
+}
+
+/// Returns true if `value` is the scale 1, the offset 0 or the unit metre.
+fn is_metres(value: &str) -> bool {
+    let is_number = [1.0, 0.0].map(Ok).contains(&value.parse::<f64>());
+    is_number || ["m", "metre", "meter"].contains(&value.to_lowercase().as_str())
 }
 
 /// Converts the decoded values of a GeoTIFF picture to heights.

@@ -172,6 +172,14 @@ fn unusable_files_and_places_are_named() {
             "feet.tif",
             r#"<Item name="UNITTYPE" sample="0" role="unittype">ft</Item>"#,
         ),
+        (
+            "quotes.tif",
+            "<Item name='UNITTYPE' sample='0' role='unittype'>US survey foot</Item>",
+        ),
+        (
+            "meter.tif",
+            r#"<Item name="UNITTYPE" sample="0" role="unittype">Meter</Item>"#,
+        ),
     ] {
         Raster {
             metadata: Some(metadata),
@@ -193,6 +201,7 @@ fn unusable_files_and_places_are_named() {
     }
     .write(&file("metres.tif"), plane);
     assert!(Terrain::load(&[file("metres.tif")]).is_ok());
+    assert!(Terrain::load(&[file("meter.tif")]).is_ok());
     std::fs::write(file("N47E008.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("zurich.hgt"), [0; 1000]).unwrap();
     std::fs::write(file("text.tif"), "no picture").unwrap();
@@ -224,6 +233,10 @@ fn unusable_files_and_places_are_named() {
             &[
                 "feet.tif: has heights with the unittype ft (tag 42112); allowed: heights in metres, without scale or offset",
             ],
+        ),
+        (
+            &["quotes.tif"],
+            &["quotes.tif: has heights with the unittype US survey foot (tag 42112)"],
         ),
         (
             &["swiss.tif"],
