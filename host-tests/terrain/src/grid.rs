@@ -31,8 +31,8 @@ const ALIGNED: f64 = 0.02;
 const SAME_M: f64 = 1.0;
 
 /// EPSG codes of vertical coordinate systems in feet.
-const IN_FEET: [u16; 13] = [
-    5614, 5702, 5754, 6130, 6131, 6132, 6358, 6360, 8050, 8051, 8052, 8053, 8228,
+const IN_FEET: [u16; 15] = [
+    5614, 5702, 5754, 6130, 6131, 6132, 6358, 6359, 6360, 8050, 8051, 8052, 8053, 8228, 8897,
 ];
 
 /// Metres per degree of latitude, for the size of cells and the text of errors.
