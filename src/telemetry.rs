@@ -5,6 +5,7 @@ use crate::guard::HoldReason;
 use crate::node::round::state::Phase;
 use crate::place::Placement;
 use crate::time::Instant;
+use crate::wire::CANDIDATES;
 use crate::wire::message::{Coarse, Detail, Entry};
 
 /// State that a relay has reported to the ground station through the chain.
@@ -37,6 +38,10 @@ pub struct Report {
     pub silent: [bool; 2],
     /// True if the relay has received another node with its own number within the last three `dead_after`.
     pub is_duplicated: bool,
+    /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
+    pub refuses_setpoint: bool,
+    /// Number of the nearest node whose messages the relay has refused for another mission; `None` for none.
+    pub other_mission: Option<u16>,
     /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
@@ -55,14 +60,18 @@ const PHASES: [Phase; 8] = [
     Phase::NoQuorum,
 ];
 
-/// Control states in the order of their numbers in a report, from 1.
-const CONTROLS: [State; 5] = [
+/// Control states in the order of their numbers in a report, from 1. The last one is [`REFUSED`].
+const CONTROLS: [State; 6] = [
     State::Silent,
     State::Grounded,
     State::Standby,
     State::Engaged,
     State::Blind,
+    State::Engaged,
 ];
+
+/// Number of the control state of a drone that the relay controls, but whose autopilot flies to another target.
+pub(crate) const REFUSED: u16 = 6;
 
 /// Hold reasons in the order of their numbers in a report, from 1.
 const HOLDS: [HoldReason; 7] = [
@@ -74,6 +83,15 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Pending,
     HoldReason::Halted,
 ];
+
+/// Returns the number of the node whose other mission the relay of this entry refuses; `None` for none.
+fn other_mission(entry: &Entry) -> Option<u16> {
+    match entry.refusal() {
+        0 => None,
+        toward_tx @ 1..=CANDIDATES => entry.relay().checked_sub(toward_tx),
+        toward_rx => Some(entry.relay() + (toward_rx - CANDIDATES)),
+    }
+}
 
 /// Returns the element of `all` with this number, counted from 1; `None` for 0 or a number too large.
 fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
@@ -88,6 +106,7 @@ impl Report {
     pub fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
         let state = entry.state();
         let digit = |unit: u16| state / unit % 8;
+        let control = state / 4096;
         let mut report = Self {
             relay: entry.relay(),
             at,
@@ -96,11 +115,13 @@ impl Report {
             agreed: None,
             phase: numbered(&PHASES, digit(1) + 1).unwrap_or(Phase::Idle),
             holds_lease: state / 2048 % 2 == 1,
-            control: numbered(&CONTROLS, state / 4096 % 6),
+            control: numbered(&CONTROLS, control % 7),
             hold_reasons: [8, 64].map(|unit| numbered(&HOLDS, digit(unit))),
             neighbours: [None; 2],
             silent: [512, 1024].map(|unit| state / unit % 2 == 1),
-            is_duplicated: state >= 6 * 4096,
+            is_duplicated: control >= 7,
+            refuses_setpoint: control % 7 == REFUSED,
+            other_mission: other_mission(entry),
             interference_w: None,
             version: 0,
         };
@@ -132,7 +153,7 @@ mod tests {
         };
         for (holds_lease, is_duplicated) in [(false, false), (true, false), (false, true)] {
             let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * 4;
-            let flags = 2048 * u16::from(holds_lease) + 24_576 * u16::from(is_duplicated);
+            let flags = 2048 * u16::from(holds_lease) + 28_672 * u16::from(is_duplicated);
             let report = report(rest + flags);
             assert_eq!(
                 (report.holds_lease, report.is_duplicated, report.phase),

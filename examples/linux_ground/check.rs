@@ -116,6 +116,14 @@ fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'sta
     let all = [
         (now.since(report.at) >= OLD, "report older than 10 s"),
         (report.is_duplicated, "another relay has its number"),
+        (
+            report.other_mission.is_some(),
+            "a relay near it has another mission",
+        ),
+        (
+            report.refuses_setpoint,
+            "the autopilot flies to another target",
+        ),
         (control.is_none(), "no autopilot"),
         (control == Some(State::Silent), "autopilot silent"),
         (

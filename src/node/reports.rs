@@ -7,7 +7,7 @@
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
-//! | own control state, or that in a stored entry, has changed and [begins an alarm](begins_alarm) | send the entry ahead of its turn, also during an agreement |
+//! | own control state, or that in a stored entry, has changed and [begins an alarm](begins_alarm); a node is refused for another mission | send the entry ahead of its turn, also during an agreement |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -23,9 +23,11 @@ use super::context::Member;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
 use crate::flight::autopilot::state::State;
+use crate::mission::MAX_RELAYS;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
+use crate::telemetry::REFUSED;
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
@@ -162,15 +164,15 @@ struct Watched {
     count: u8,
     /// True if entries of other relays have arrived since the last report.
     is_fed: bool,
-    /// True if this relay's control state begins an alarm that has not been reported.
+    /// True if a change of this relay's state begins an alarm that has not been reported.
     is_alarmed: bool,
     /// True if a stored entry (state of another relay) begins an alarm and has not been sent.
     stores_alarm: bool,
 }
 
 /// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), the setpoint, and the agreed position.
-pub(crate) type Own = (u16, [Option<Placement>; 2]);
+/// state) and its [refusal](Entry::refusal), the setpoint, and the agreed position.
+pub(crate) type Own = ([u16; 2], [Option<Placement>; 2]);
 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
@@ -188,10 +190,20 @@ impl Reporting {
         if before == control {
             return;
         }
-        let (from, begins) = (self.reported + STEP, begins_alarm(before, control));
+        self.schedule(begins_alarm(before, control), control == ENGAGED);
+    }
+
+    /// Records that a node was refused for another mission. The report about it is sent ahead of its turn.
+    pub(crate) fn handle_refusal(&mut self) {
+        self.schedule(true, false);
+    }
+
+    /// Schedules this relay's entry for a change, which begins an alarm or ends all of them.
+    fn schedule(&mut self, begins: bool, ends: bool) {
+        let from = self.reported + STEP;
         for watched in &mut self.watched {
             (watched.due, watched.own_from) = (watched.due.min(from), from);
-            watched.is_alarmed = begins || watched.is_alarmed && control != ENGAGED;
+            watched.is_alarmed = begins || watched.is_alarmed && !ends;
         }
     }
 
@@ -320,12 +332,14 @@ const fn earlier(at: Instant, span: Duration) -> Instant {
 /// Returns true if the change of the control state from `before` to `now` begins an alarm. Each state is a number
 /// from 1; 0 stands for unknown.
 ///
-/// An alarm begins if the autopilot is no longer received, or has no position any more, or if the relay no longer
-/// controls the drone.
+/// An alarm begins if the autopilot is no longer received, has no position any more, or flies to another target, or if
+/// the relay no longer controls the drone.
 const fn begins_alarm(before: u16, now: u16) -> bool {
     const SILENT: u16 = State::Silent as u16 + 1;
     const BLIND: u16 = State::Blind as u16 + 1;
-    before != now && before != 0 && (now == SILENT || now == BLIND || before == ENGAGED)
+    let is_fault = now == SILENT || now == BLIND || now == REFUSED;
+    let is_released = before == ENGAGED || before == REFUSED && now != ENGAGED;
+    before != now && before != 0 && (is_fault || is_released)
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
@@ -484,7 +498,8 @@ impl Reporting {
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
             if at > old.at + ROUNDING {
                 let [was, is] = [old.entry, entry].map(|entry| entry.control());
-                let begins = begins_alarm(was, is);
+                let is_refusal = old.entry.refusal() == 0 && entry.refusal() > 0;
+                let begins = begins_alarm(was, is) || is_refusal;
                 if begins {
                     stored.rank = Rank::Alarm;
                 } else if was == is {
@@ -536,7 +551,9 @@ impl Reporting {
             let state_at = position.map_or(now, |(at, _)| at);
             *reported = state_at.max(*reported + STEP).min(now);
             let age = age(now, *reported);
-            let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
+            let [state, refusal] = own.0;
+            let relay = member.node + MAX_RELAYS * refusal;
+            let entry = Entry::new(relay, age, state + 4096 * control, at);
             _ = report.entries.push(entry);
         }
         self.stored.retain(|stored| {

@@ -11,7 +11,8 @@
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
-//! | engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
+//! | a relay refuses another one for another mission, and has not received it since | warning, one for the refused relay |
+//! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
 //! An alarm of a relay that does not report any more stays as it was.
@@ -155,6 +156,8 @@ pub struct StationView {
     known: BTreeMap<u16, Known>,
     /// Neighbours that have reported a relay as silent, by relay, and the time of their last such report.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
+    /// Relays that are refused for another mission: the relays that refuse them, and the time of the first such report.
+    refused: BTreeMap<u16, (Vec<u16>, Instant)>,
     frames: Frames,
     /// Time of the last accepted frame; before the first frame it is the time of the start.
     frame_at: Instant,
@@ -191,6 +194,7 @@ impl StationView {
         self.count(now, frames, is_new);
         self.follow_version(now);
         self.drop_answered_claims(now);
+        self.follow_refusals(now);
         let lasting = self.lasting(now, chain);
         self.alarms.settle(seconds(now), lasting);
         let reports: Vec<Report> = self.known.values().map(|it| it.report).collect();
@@ -274,6 +278,21 @@ impl StationView {
         self.claims.retain(|_, claims| !claims.is_empty());
     }
 
+    /// Updates the relays that are refused for another mission. `now` is the time at which reports count as recent.
+    fn follow_refusals(&mut self, now: Instant) {
+        let mut refused: BTreeMap<u16, (Vec<u16>, Instant)> = BTreeMap::new();
+        let reports = self.known.values().map(|it| it.report);
+        for by in reports.filter(|by| now.since(by.at) < SILENT_AFTER.times(2)) {
+            if let Some(number) = by.other_mission {
+                let before = self.refused.get(&number).map(|it| it.1);
+                let (all, at) = refused.entry(number).or_insert((Vec::new(), by.at));
+                all.push(by.relay);
+                *at = before.unwrap_or_else(|| by.at.min(*at));
+            }
+        }
+        self.refused = refused;
+    }
+
     fn claims(&self, number: u16) -> Vec<u16> {
         let claims = self.claims.get(&number).into_iter().flatten();
         claims.map(|(by, _)| *by).collect()
@@ -307,6 +326,14 @@ impl StationView {
             let note = format!(": {rejected} of {all} since its start");
             add(Reason::Rejected, 0, Vec::new(), note);
         }
+        for (number, (by, since)) in &self.refused {
+            // A relay of another mission sends no reports to this station.
+            let is_back = |it: &Known| it.report.at > *since;
+            let is_listed = (1..=chain.relays).contains(number);
+            if is_listed && !self.known.get(number).is_some_and(is_back) {
+                add(Reason::Mission, *number, by.clone(), String::new());
+            }
+        }
         for known in self.known.values() {
             let number = known.report.relay;
             let by = self.claims(number);
@@ -331,7 +358,10 @@ impl StationView {
                 (Reason::Blind, known.is_blind()),
                 (Reason::LinkLost, known.is_link_lost),
                 (Reason::Released, known.is_released),
-                (Reason::Stuck, known.is_stuck()),
+                (
+                    Reason::Stuck,
+                    known.is_stuck() || known.report.refuses_setpoint,
+                ),
             ];
             for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
                 add(reason, number, vec![number], String::new());

@@ -43,6 +43,8 @@ fn healthy(relay: u16) -> Report {
         neighbours: [Some(relay - 1).filter(|it| *it > 0), next],
         silent: [false; 2],
         is_duplicated: false,
+        refuses_setpoint: false,
+        other_mission: None,
         interference_w: None,
         version: 0,
     }
@@ -137,6 +139,8 @@ impl Watched {
             "skipsback" => (report.neighbours[0], report.silent[0]) = (Some(relay - 2), false),
             "deafnext" | "nonextyet" => report.silent[1] = true,
             "duplicated" => report.is_duplicated = true,
+            "refuses" => report.refuses_setpoint = true,
+            "mission2" => report.other_mission = Some(2),
             "deafback" => report.silent[0] = true,
             other => panic!("{other}"),
         }

@@ -90,7 +90,12 @@ const SCRIPT: [&[Fault]; 14] = [
     &[("stop", 5, LOST, "relay # toward")],
     &[("epoch", 6, LOST, "relay # has started with an epoch")],
     &[("key", 3, LOST, "relay # signs with another key")],
-    &[("mission", 7, LOST, "relay # has another mission")],
+    &[(
+        "mission",
+        7,
+        "warning relay # has another mission",
+        "relay # has another mission",
+    )],
     &[("no quorum", 0, "critical no quorum", "no quorum  ")],
 ];
 

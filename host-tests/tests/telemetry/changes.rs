@@ -104,7 +104,7 @@ fn the_last_state_reaches_the_station() {
                 if rng.random_bool(0.5) {
                     let state = STATES[rng.random_range(0..5)];
                     *control = Some(state);
-                    chain.input(now, relay, |it| it.report_control(state));
+                    chain.input(now, relay, |it| it.report_control(state, false));
                 } else {
                     let at = Instant::from_micros(now.as_micros() - rng.random_range(0..300_000));
                     let given = place(&mut rng);
@@ -172,7 +172,7 @@ fn alarms_are_known_in_time() {
         let mut now = s(50);
         chain.advance(now);
         for relay in 1..=8 {
-            chain.input(now, relay, |it| it.report_control(State::Engaged));
+            chain.input(now, relay, |it| it.report_control(State::Engaged, false));
         }
         now = span[0];
         chain.advance(now);
@@ -190,7 +190,7 @@ fn alarms_are_known_in_time() {
                 let index = [rng.random_range(0..8), 7][rng.random_range(0..2)];
                 let state = STATES[rng.random_range(0..5)];
                 let before = core::mem::replace(&mut states[index], state);
-                chain.input(now, index as u16 + 1, |it| it.report_control(state));
+                chain.input(now, index as u16 + 1, |it| it.report_control(state, false));
                 if before != state {
                     begun[index] = begins_alarm(before, state).then_some(now);
                 }

@@ -7,6 +7,7 @@ use crate::node::round::state::Phase;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
+use crate::wire::CANDIDATES;
 use crate::wire::message::Message;
 
 impl Node {
@@ -71,8 +72,15 @@ impl Node {
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
         let holds_lease = u16::from(self.lease().is_some());
         let is_duplicated = u16::from(self.duplicate.is_observed(now, &self.member.settings));
-        let flags = 512 * (c + 2 * d + 4 * holds_lease) + 24_576 * is_duplicated;
+        let flags = 512 * (c + 2 * d + 4 * holds_lease) + 28_672 * is_duplicated;
         let state = self.phase() as u16 + 8 * a + 64 * b + flags;
-        (state, [self.setpoint(), self.agreed_place()])
+        let [before, after] = sides.map(|side| self.layers.neighbours.at(side).refused(now));
+        let is_before = before != 0 && (after == 0 || before <= after);
+        let refusal = match after {
+            _ if is_before => before,
+            0 => 0,
+            after => CANDIDATES + after,
+        };
+        ([state, refusal], [self.setpoint(), self.agreed_place()])
     }
 }

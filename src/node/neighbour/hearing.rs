@@ -67,6 +67,14 @@ impl ReportLimiter {
         self.nodes |= new;
         new != 0
     }
+
+    /// Returns the distance of the nearest node that was reported in the last two minutes; 0 for none.
+    pub(super) fn nearest(&self, now: Instant) -> u16 {
+        let is_old = self.nodes == 0 || now.since(self.since) >= MINUTE.times(2);
+        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        let distance = self.nodes.trailing_zeros() as u16 + 1;
+        if is_old { 0 } else { distance }
+    }
 }
 
 /// Returns the bit of the node `distance` relays away in a mask of nodes. 0 if it is not one of the four nearest

@@ -721,6 +721,12 @@ impl Neighbour {
         self.mismatches.should_report(distance, now)
     }
 
+    /// Returns the distance of the nearest node that was reported for another mission in the last two minutes; 0 for
+    /// none.
+    pub(crate) fn refused(&self, now: Instant) -> u16 {
+        self.mismatches.nearest(now)
+    }
+
     /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true, once,
     /// when [`FORGED`] such handshakes were received in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {

@@ -86,6 +86,8 @@ impl Chain {
                 neighbours: relay.neighbours(),
                 silent: [false; 2],
                 is_duplicated: false,
+                refuses_setpoint: false,
+                other_mission: None,
                 interference_w: None,
                 version: relay.version(),
             };
