@@ -77,6 +77,14 @@ impl Web {
         Ok((web, posts))
     }
 
+    /// Clears a lost relay: the page no longer has it, until it reports again.
+    ///
+    /// # Errors
+    /// The reason if the relay is not lost.
+    pub(crate) fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
+        self.view.clear(now, relay)
+    }
+
     /// Shows a snapshot if it is time for the next one. Returns the time of the next snapshot. The function does not
     /// wait for a browser.
     pub(crate) fn turn(

@@ -44,8 +44,14 @@ impl Chain<'_> {
     ///
     /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
     /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
-    /// beyond it [`SILENT_AFTER`] later.
-    pub fn snapshot(&self, now: Instant, reports: &[Report], alarms: &Alarms) -> Snapshot {
+    /// beyond it [`SILENT_AFTER`] later. The relays `cleared`, which have no report, are not part of the snapshot.
+    pub fn snapshot(
+        &self,
+        now: Instant,
+        reports: &[Report],
+        alarms: &Alarms,
+        cleared: &[u16],
+    ) -> Snapshot {
         let is_skipped = |report: &Report| {
             let mut later = reports
                 .iter()
@@ -57,7 +63,10 @@ impl Chain<'_> {
             now.since(report.at) >= SILENT_AFTER
                 && (alarms.is_lost(report.relay) || is_skipped(report))
         };
-        let mut relays: Vec<RelaySnapshot> = (1..=self.relays).map(RelaySnapshot::new).collect();
+        let mut relays: Vec<RelaySnapshot> = (1..=self.relays)
+            .filter(|it| !cleared.contains(it))
+            .map(RelaySnapshot::new)
+            .collect();
         for report in reports {
             let mut known = RelaySnapshot {
                 age_s: Some(now.since(report.at).as_micros() as f64 / 1e6),

@@ -96,7 +96,11 @@ const TILES: &str = "/tiles/";
 const MAX_ZOOM: u8 = 24;
 
 /// Path of a POST, by its task.
-const TASKS: [(&str, Task); 2] = [("/preview", Task::Preview), ("/upload", Task::Upload)];
+const TASKS: [(&str, Task); 3] = [
+    ("/preview", Task::Preview),
+    ("/upload", Task::Upload),
+    ("/clear", Task::Clear),
+];
 
 /// Task that a page gives to the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -105,6 +109,8 @@ pub enum Task {
     Preview,
     /// Upload the mission of the preview whose number and digest are in the body.
     Upload,
+    /// Clear the lost relay whose number is in the body.
+    Clear,
 }
 
 /// Secrets that requests have to carry.

@@ -15,7 +15,8 @@
 //! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
-//! An alarm of a relay that does not report any more stays as it was.
+//! An alarm of a relay that does not report any more stays as it was. An operator can [clear](StationView::clear) a lost relay: it then
+//! has no alarm and is not part of the snapshot, until a newer report of it arrives.
 
 use std::collections::BTreeMap;
 
@@ -158,6 +159,10 @@ pub struct StationView {
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
     /// Relays that are refused for another mission: the relays that refuse them, and the time of the first such report.
     refused: BTreeMap<u16, (Vec<u16>, Instant)>,
+    /// Lost relays that an operator has cleared, and the times of the acts.
+    cleared: BTreeMap<u16, Instant>,
+    /// Log lines of the next snapshot.
+    acts: Vec<LogLine>,
     frames: Frames,
     /// Time of the last accepted frame; before the first frame it is the time of the start.
     frame_at: Instant,
@@ -174,6 +179,24 @@ impl StationView {
         self.version.map(|(version, _)| version)
     }
 
+    /// Removes a lost relay and its alarm from the snapshots, until a report of its state after `now` arrives.
+    ///
+    /// # Errors
+    /// The reason if the relay is not lost: it has reported within [`SILENT_AFTER`], or has no alarm that it is lost.
+    pub fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
+        let known = self.known.get(&relay);
+        let is_silent = known.is_some_and(|it| now.since(it.report.at) >= SILENT_AFTER);
+        if !is_silent || !self.alarms.lasts(Reason::Lost, relay) {
+            return Err(format!("relay {relay} is not lost"));
+        }
+        self.cleared.insert(relay, now);
+        self.acts.push(LogLine {
+            time_s: seconds(now),
+            text: format!("operator: lost relay {relay} cleared"),
+        });
+        Ok(())
+    }
+
     /// Returns the state of `chain` at the time `now`, its alarms, and the log since the last call.
     ///
     /// `reports` are the relays' newest reports. Those about relays that the chain does not list are ignored.
@@ -184,7 +207,7 @@ impl StationView {
         reports: impl IntoIterator<Item = &'a Report>,
         frames: Frames,
     ) -> Snapshot {
-        let mut log = Vec::new();
+        let mut log = std::mem::take(&mut self.acts);
         let mut is_new = false;
         for report in reports {
             let is_listed = (1..=chain.relays).contains(&report.relay);
@@ -197,11 +220,12 @@ impl StationView {
         self.follow_refusals(now);
         let lasting = self.lasting(now, chain);
         self.alarms.settle(seconds(now), lasting);
-        let reports: Vec<Report> = self.known.values().map(|it| it.report).collect();
+        let reports: Vec<Report> = self.shown().map(|it| it.report).collect();
+        let cleared: Vec<u16> = self.cleared.keys().copied().collect();
         Snapshot {
             name: Some(format!("Chain of {} relays", chain.relays)),
             log,
-            ..chain.snapshot(now, &reports, &self.alarms)
+            ..chain.snapshot(now, &reports, &self.alarms, &cleared)
         }
     }
 
@@ -217,6 +241,10 @@ impl StationView {
             text: format!("relay {number}: {text}"),
         };
         log.extend(changes(before.as_ref(), &report).into_iter().map(line));
+        if self.cleared.get(&number).is_some_and(|at| report.at > *at) {
+            self.cleared.remove(&number);
+            log.push(line("reports again after it was cleared".to_owned()));
+        }
         let known = self.known.entry(number);
         known
             .or_insert_with(|| Known::new(report))
@@ -293,6 +321,12 @@ impl StationView {
         self.refused = refused;
     }
 
+    /// Returns the relays that are known and not cleared.
+    fn shown(&self) -> impl Iterator<Item = &Known> {
+        let known = self.known.iter();
+        known.filter_map(|(number, it)| (!self.cleared.contains_key(number)).then_some(it))
+    }
+
     fn claims(&self, number: u16) -> Vec<u16> {
         let claims = self.claims.get(&number).into_iter().flatten();
         claims.map(|(by, _)| *by).collect()
@@ -334,7 +368,7 @@ impl StationView {
                 add(Reason::Mission, *number, by.clone(), String::new());
             }
         }
-        for known in self.known.values() {
+        for known in self.shown() {
             let number = known.report.relay;
             let by = self.claims(number);
             let heard_at = known.report.at.max(self.resumed_at);
@@ -382,7 +416,7 @@ impl StationView {
                 Reason::Infeasible => it.report.phase == Phase::Infeasible,
                 _ => it.has_expired(),
             };
-            let by = self.known.values().filter(lasts);
+            let by = self.shown().filter(lasts);
             let by: Vec<u16> = by.map(|it| it.report.relay).collect();
             if !by.is_empty() {
                 add(reason, 0, by, String::new());

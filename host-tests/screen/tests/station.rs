@@ -291,3 +291,53 @@ fn a_silent_relay_that_its_neighbours_have_closed_up_over_is_lost() {
     (0..20).for_each(|_| watched.second());
     assert_eq!(watched.condition(3), Some(Condition::Normal));
 }
+
+#[test]
+fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
+    let mut watched = Watched::new();
+    watched.second();
+    let clear = |watched: &mut Watched, relay| {
+        let now = Instant::from_millis(1_000 * watched.second);
+        watched.view.clear(now, relay)
+    };
+    for relay in [0, 3, 9] {
+        assert!(clear(&mut watched, relay).is_err(), "{relay} is not lost");
+    }
+    watched.changes("3:noquorum 3:off 2:deafnext");
+    watched.relays.get_mut(&3).unwrap().at = Instant::from_millis(1_500);
+    (0..4).for_each(|_| watched.second());
+    // A neighbour does not receive it, but its last report is recent.
+    assert!(watched.lasting().contains("relay 3 lost"));
+    assert!(clear(&mut watched, 3).is_err());
+    (0..4).for_each(|_| watched.second());
+    assert_eq!(clear(&mut watched, 3), Ok(()));
+    let late = watched.relays.get(&3).copied().unwrap();
+    for _ in 0..20 {
+        watched.second();
+        assert_eq!(watched.lasting(), ".");
+        let listed: Vec<u16> = watched.last.relays.iter().map(|it| it.number).collect();
+        assert_eq!(listed, [1, 2, 4, 5]);
+        assert_eq!(watched.hops(), "Tx-1 1-2 2-4 4-5 5-Rx ");
+    }
+    assert!(clear(&mut watched, 3).is_err(), "cleared twice");
+    // An older state that took long on its way does not bring it back.
+    watched.relays.get_mut(&3).unwrap().at = late.at + uav_relay::Duration::from_millis(500);
+    watched.second();
+    assert_eq!(watched.last.relays.len(), 4);
+    watched.changes("3:ok 2:ok");
+    watched.second();
+    assert_eq!(watched.lasting(), ".");
+    assert_eq!(watched.condition(3), Some(Condition::Normal));
+    // It can be lost again.
+    watched.changes("3:off");
+    (0..11).for_each(|_| watched.second());
+    assert!(watched.lasting().contains("Critical relay 3"));
+    let acts = watched.log.iter().filter(|it| it.contains("cleared"));
+    assert_eq!(
+        acts.collect::<Vec<_>>(),
+        [
+            "operator: lost relay 3 cleared",
+            "relay 3: reports again after it was cleared"
+        ]
+    );
+}
