@@ -39,7 +39,7 @@ impl Reporting {
         None
     }
 
-    pub(crate) fn handle_refusal(&mut self) {}
+    pub(crate) fn handle_refusal(&mut self, _: &Member) {}
 
     pub(crate) fn handle_timeout(&mut self, _: Instant) {}
 

@@ -73,6 +73,9 @@ const STEP: Duration = Duration::from_millis(500);
 /// differ because each relay rounds the age of an entry.
 const ROUNDING: Duration = Duration::from_millis(300);
 
+/// Difference of the times at which two relays with consecutive numbers send entries that begin alarms.
+const SPREAD: Duration = Duration::from_millis(30);
+
 /// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
 
@@ -185,23 +188,27 @@ impl Reporting {
 
     /// Records the drone's control state. A change is reported as soon as the telemetry's share of the data rate
     /// allows it. The beginning of an alarm is reported earlier.
-    pub(crate) fn handle_control(&mut self, control: u16) {
+    pub(crate) fn handle_control(&mut self, member: &Member, control: u16) {
         let before = core::mem::replace(&mut self.control, control);
         if before == control {
             return;
         }
-        self.schedule(begins_alarm(before, control), control == ENGAGED);
+        self.schedule(member, begins_alarm(before, control), control == ENGAGED);
     }
 
     /// Records that a node was refused for another mission. The report about it is sent ahead of its turn.
-    pub(crate) fn handle_refusal(&mut self) {
-        self.schedule(true, false);
+    pub(crate) fn handle_refusal(&mut self, member: &Member) {
+        self.schedule(member, true, false);
     }
 
     /// Schedules this relay's entry for a change, which begins an alarm or ends all of them.
-    fn schedule(&mut self, begins: bool, ends: bool) {
-        let from = self.reported + STEP;
-        for watched in &mut self.watched {
+    fn schedule(&mut self, member: &Member, begins: bool, ends: bool) {
+        let sides = [Side::Upstream, Side::Downstream];
+        for (watched, side) in self.watched.iter_mut().zip(sides) {
+            // If all drones have the same fault, the relays farther from the station report first.
+            let behind = member.all.saturating_sub(from_end(member, side)) % 8;
+            let turn = self.checked + SPREAD.times(behind.into());
+            let from = turn.max(self.reported + STEP);
             (watched.due, watched.own_from) = (watched.due.min(from), from);
             watched.is_alarmed = begins || watched.is_alarmed && !ends;
         }
@@ -508,7 +515,8 @@ impl Reporting {
                 stored.detail = detail.or(old.detail);
                 *old = stored;
                 return begins;
-            } else if old.detail.is_none() {
+            } else if old.detail.is_none() && old.rank > Rank::Sent {
+                // Details that were sent do not come back by another way.
                 old.detail = detail;
             }
         } else if let Err(stored) = self.stored.push(stored) {

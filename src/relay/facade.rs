@@ -731,7 +731,7 @@ impl Relay {
         } else {
             state as u16 + 1
         };
-        self.node.reporting.handle_control(control);
+        self.node.report_control(control);
     }
 
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See

@@ -334,8 +334,8 @@ impl Stage {
         self.flown[relay - 1].drone.order(order);
     }
 
-    fn kill(&self, relay: usize) {
-        self.flown[relay - 1].relay.signal(Signal::KILL);
+    fn kill(&mut self, relay: usize) {
+        self.flown[relay - 1].relay.killed();
     }
 
     fn restart(&mut self, relay: usize, more: &str) {

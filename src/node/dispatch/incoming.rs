@@ -142,7 +142,7 @@ impl Node {
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.should_report_mismatch(distance, now) {
-            self.reporting.handle_refusal();
+            self.reporting.handle_refusal(&self.member);
             self.raise_node_event(NodeEvent::Mission, side, from);
         }
     }

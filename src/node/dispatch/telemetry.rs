@@ -24,6 +24,12 @@ impl Node {
         }
     }
 
+    /// Records the drone's control state, from 1. See [`Reporting::handle_control`](crate::node::reports::Reporting).
+    #[cfg(feature = "telemetry")]
+    pub(crate) fn report_control(&mut self, control: u16) {
+        self.reporting.handle_control(&self.member, control);
+    }
+
     /// Records that a frame of node `from` was received on the shared channel, whatever its destination.
     pub(crate) fn on_channel(&mut self, now: Instant, from: u16) {
         self.reporting.handle_frame(now, from);
