@@ -44,7 +44,7 @@ impl Chain<'_> {
     ///
     /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
     /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
-    /// beyond it [`SILENT_AFTER`] later. The relays `cleared`, which have no report, are not part of the snapshot.
+    /// beyond it, or itself as the last relay before Tx or Rx, [`SILENT_AFTER`] later. The relays `cleared`, which have no report, are not part of the snapshot.
     pub fn snapshot(
         &self,
         now: Instant,
@@ -56,7 +56,8 @@ impl Chain<'_> {
             let mut later = reports
                 .iter()
                 .filter(|by| by.at.since(report.at) >= SILENT_AFTER);
-            let is_closed = later.any(|by| has_beyond(by, report.relay));
+            let is_closed =
+                later.any(|by| has_beyond(by, report.relay) || self.is_end(by, report.relay));
             is_closed && report.neighbours != [None; 2] && alarms.lasts(Reason::Lost, report.relay)
         };
         let is_lost = |report: &Report| {
@@ -108,6 +109,19 @@ impl Chain<'_> {
             alarms: alarms.all(),
             ..Snapshot::default()
         }
+    }
+
+    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`.
+    fn is_end(&self, by: &Report, number: u16) -> bool {
+        let [before, after] = by.neighbours;
+        let (toward, away) = if number < by.relay {
+            (before, after)
+        } else {
+            (after, before)
+        };
+        // A relay without details has no neighbours in its report, nor has one outside of the chain.
+        let has_others = away.is_some() || self.relays == 2 && by.agreed.is_some();
+        toward.is_none() && has_others && by.relay != number
     }
 
     fn profile(&self, mission: &Mission, relay: u16) -> Profile {

@@ -135,6 +135,7 @@ impl Watched {
             }
             "version2" => report.version = 2,
             "nonext" => report.neighbours[1] = None,
+            "noback" => report.neighbours[0] = None,
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
             "skipsback" => (report.neighbours[0], report.silent[0]) = (Some(relay - 2), false),
             "deafnext" | "nonextyet" => report.silent[1] = true,
@@ -340,4 +341,34 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
             "relay 3: reports again after it was cleared"
         ]
     );
+}
+
+#[test]
+fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() {
+    for (lost, change, hops) in [
+        (1, "2:noback", "Tx-2 2-3 3-4 4-5 5-Rx "),
+        (5, "4:nonext", "Tx-1 1-2 2-3 3-4 4-Rx "),
+    ] {
+        let mut watched = Watched::new();
+        watched.second();
+        // A relay that is not silent is not lost, whatever its neighbour reports.
+        watched.changes(change);
+        (0..8).for_each(|_| watched.second());
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+        watched.changes("24:ok");
+        watched.changes(&format!("{lost}:off"));
+        (0..7).for_each(|_| watched.second());
+        // A report without details has no neighbours, too.
+        watched.changes("24:brief");
+        (0..7).for_each(|_| watched.second());
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+        watched.changes("24:ok");
+        watched.changes(change);
+        watched.second();
+        assert_eq!(watched.condition(lost), Some(Condition::Lost));
+        assert_eq!(watched.hops(), hops);
+        watched.changes(&format!("{lost}:ok"));
+        watched.second();
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+    }
 }
