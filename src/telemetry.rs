@@ -42,6 +42,8 @@ pub struct Report {
     pub refuses_setpoint: bool,
     /// Number of the nearest node whose messages the relay has refused for another mission; `None` for none.
     pub other_mission: Option<u16>,
+    /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
+    pub other_key: Option<u16>,
     /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
@@ -84,12 +86,13 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the number of the node whose other mission the relay of this entry refuses; `None` for none.
-fn other_mission(entry: &Entry) -> Option<u16> {
-    match entry.refusal() {
-        0 => None,
-        toward_tx @ 1..=CANDIDATES => entry.relay().checked_sub(toward_tx),
-        toward_rx => Some(entry.relay() + (toward_rx - CANDIDATES)),
+/// Returns the number of the node that the relay of this entry refuses, for another mission (`first` 1) or another key
+/// (`first` 9). `None` for none.
+fn refused(entry: &Entry, first: u16) -> Option<u16> {
+    match entry.refusal().checked_sub(first)? {
+        toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
+        toward_rx if toward_rx < 2 * CANDIDATES => Some(entry.relay() + toward_rx + 1 - CANDIDATES),
+        _ => None,
     }
 }
 
@@ -121,7 +124,8 @@ impl Report {
             silent: [512, 1024].map(|unit| state / unit % 2 == 1),
             is_duplicated: control >= 7,
             refuses_setpoint: control % 7 == REFUSED,
-            other_mission: other_mission(entry),
+            other_mission: refused(entry, 1),
+            other_key: refused(entry, 1 + 2 * CANDIDATES),
             interference_w: None,
             version: 0,
         };
@@ -144,6 +148,27 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_refused_node_is_named_by_its_number() {
+        let refused = |refusal: u16, relay: u16| {
+            let entry = Entry::new(relay + 1_000 * refusal, 0, 0, Coarse::of(None));
+            let report = Report::of(&entry, None, Instant::ZERO);
+            (report.relay, report.other_mission, report.other_key)
+        };
+        for relay in [5, 1_000] {
+            assert_eq!(refused(0, relay), (relay, None, None));
+            for distance in 1..=4 {
+                let [before, after] = [relay - distance, relay + distance].map(Some);
+                assert_eq!(refused(distance, relay), (relay, before, None));
+                assert_eq!(refused(distance + 4, relay), (relay, after, None));
+                assert_eq!(refused(distance + 8, relay), (relay, None, before));
+                assert_eq!(refused(distance + 12, relay), (relay, None, after));
+            }
+        }
+        // Decoded reports may name nodes before Tx.
+        assert_eq!(refused(4, 3), (3, None, None));
+    }
 
     #[test]
     fn every_part_of_a_state_is_independent() {

@@ -117,6 +117,10 @@ fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'sta
         (now.since(report.at) >= OLD, "report older than 10 s"),
         (report.is_duplicated, "another relay has its number"),
         (
+            report.other_key.is_some(),
+            "a relay near it signs with another key",
+        ),
+        (
             report.other_mission.is_some(),
             "a relay near it has another mission",
         ),

@@ -11,7 +11,7 @@
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
-//! | a relay refuses another one for another mission, and has not received it since | warning, one for the refused relay |
+//! | a relay refuses another one for another mission or key, and no report of that one has come since | warning or critical, one for the refused relay |
 //! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
@@ -157,8 +157,9 @@ pub struct StationView {
     known: BTreeMap<u16, Known>,
     /// Neighbours that have reported a relay as silent, by relay, and the time of their last such report.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
-    /// Relays that are refused for another mission: the relays that refuse them, and the time of the first such report.
-    refused: BTreeMap<u16, (Vec<u16>, Instant)>,
+    /// Relays that are refused for another mission or key: the relays that refuse them, and the time of the first such
+    /// report.
+    refused: BTreeMap<(Reason, u16), (Vec<u16>, Instant)>,
     /// Lost relays that an operator has cleared, and the times of the acts.
     cleared: BTreeMap<u16, Instant>,
     /// Log lines of the next snapshot.
@@ -306,14 +307,21 @@ impl StationView {
         self.claims.retain(|_, claims| !claims.is_empty());
     }
 
-    /// Updates the relays that are refused for another mission. `now` is the time at which reports count as recent.
+    /// Updates the relays that are refused, at the time `now`.
     fn follow_refusals(&mut self, now: Instant) {
-        let mut refused: BTreeMap<u16, (Vec<u16>, Instant)> = BTreeMap::new();
+        let mut refused: BTreeMap<(Reason, u16), (Vec<u16>, Instant)> = BTreeMap::new();
         let reports = self.known.values().map(|it| it.report);
         for by in reports.filter(|by| now.since(by.at) < SILENT_AFTER.times(2)) {
-            if let Some(number) = by.other_mission {
-                let before = self.refused.get(&number).map(|it| it.1);
-                let (all, at) = refused.entry(number).or_insert((Vec::new(), by.at));
+            let refusals = [
+                (Reason::Mission, by.other_mission),
+                (Reason::Key, by.other_key),
+            ];
+            for key in refusals
+                .into_iter()
+                .filter_map(|(reason, it)| Some((reason, it?)))
+            {
+                let before = self.refused.get(&key).map(|it| it.1);
+                let (all, at) = refused.entry(key).or_insert((Vec::new(), by.at));
                 all.push(by.relay);
                 *at = before.unwrap_or_else(|| by.at.min(*at));
             }
@@ -360,12 +368,12 @@ impl StationView {
             let note = format!(": {rejected} of {all} since its start");
             add(Reason::Rejected, 0, Vec::new(), note);
         }
-        for (number, (by, since)) in &self.refused {
-            // A relay of another mission sends no reports to this station.
+        for ((reason, number), (by, since)) in &self.refused {
+            // Reports of a relay with another mission or key do not reach this station.
             let is_back = |it: &Known| it.report.at > *since;
             let is_listed = (1..=chain.relays).contains(number);
             if is_listed && !self.known.get(number).is_some_and(is_back) {
-                add(Reason::Mission, *number, by.clone(), String::new());
+                add(*reason, *number, by.clone(), String::new());
             }
         }
         for known in self.shown() {

@@ -45,6 +45,7 @@ fn healthy(relay: u16) -> Report {
         is_duplicated: false,
         refuses_setpoint: false,
         other_mission: None,
+        other_key: None,
         interference_w: None,
         version: 0,
     }
@@ -141,6 +142,7 @@ impl Watched {
             "deafnext" | "nonextyet" => report.silent[1] = true,
             "duplicated" => report.is_duplicated = true,
             "refuses" => report.refuses_setpoint = true,
+            "key2" => report.other_key = Some(2),
             "mission2" => report.other_mission = Some(2),
             "deafback" => report.silent[0] = true,
             other => panic!("{other}"),

@@ -89,7 +89,12 @@ const SCRIPT: [&[Fault]; 14] = [
     ],
     &[("stop", 5, LOST, "relay # toward")],
     &[("epoch", 6, LOST, "relay # has started with an epoch")],
-    &[("key", 3, LOST, "relay # signs with another key")],
+    &[(
+        "key",
+        3,
+        "critical relay # signs with another key",
+        "relay # signs with another key",
+    )],
     &[(
         "mission",
         7,

@@ -265,6 +265,7 @@ impl Node {
             .at_mut(side)
             .should_report_forged(distance)
         {
+            self.reporting.handle_refusal(&self.member);
             self.raise_node_event(NodeEvent::Key, side, from);
         }
     }

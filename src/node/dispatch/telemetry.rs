@@ -81,12 +81,14 @@ impl Node {
         let flags = 512 * (c + 2 * d + 4 * holds_lease) + 28_672 * is_duplicated;
         let state = self.phase() as u16 + 8 * a + 64 * b + flags;
         let [before, after] = sides.map(|side| self.layers.neighbours.at(side).refused(now));
-        let is_before = before != 0 && (after == 0 || before <= after);
-        let refusal = match after {
-            _ if is_before => before,
-            0 => 0,
-            after => CANDIDATES + after,
-        };
+        let mut refusals = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
+        // A mission is refused by its signed digest; the other key may be a forger's.
+        let refusal = refusals.find_map(|((before, after), kind)| match (before, after) {
+            (0, 0) => None,
+            (before, after) if after == 0 || before != 0 && before <= after => Some(kind + before),
+            (_, after) => Some(kind + CANDIDATES + after),
+        });
+        let refusal = refusal.unwrap_or(0);
         ([state, refusal], [self.setpoint(), self.agreed_place()])
     }
 }

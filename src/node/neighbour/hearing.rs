@@ -31,6 +31,14 @@ impl ConsecutiveCounts {
         *times = times.saturating_add(1).min(most);
         reached
     }
+
+    /// Returns the distance of the nearest node with `most` events in a row; 0 for none.
+    pub(super) fn nearest(&self, most: u8) -> u16 {
+        let mut nodes = (1..).zip(self.0);
+        nodes
+            .find_map(|(distance, times)| (times >= most).then_some(distance))
+            .unwrap_or(0)
+    }
 }
 
 /// Set of nodes on one side that have been received recently.

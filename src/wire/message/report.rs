@@ -18,8 +18,8 @@ const UNKNOWN: i32 = -(1 << 23);
 /// Number of values of a relay's combined state: see [`Entry::state`].
 const STATES: u16 = 57_344;
 
-/// Number of values of [`Entry::refusal`]: none, four toward Tx, four toward Rx.
-const REFUSALS: u16 = 9;
+/// Number of values of [`Entry::refusal`]: none, and for another mission and another key four toward Tx, four toward Rx.
+const REFUSALS: u16 = 17;
 
 /// Upper 16 bits of the largest finite f32.
 const LARGEST: u16 = 0x7F7F;
@@ -102,9 +102,9 @@ impl Entry {
         self.relay.number() - MAX_RELAYS * self.refusal()
     }
 
-    /// Returns the direction and distance of the nearest node whose other mission the relay refuses; 0 for none.
+    /// Returns the direction and distance of the nearest node that the relay refuses for another mission; 0 for none.
     ///
-    /// 1 to 4: so many numbers toward Tx; 5 to 8: 1 to 4 numbers toward Rx.
+    /// 1 to 4: so many numbers toward Tx; 5 to 8: 1 to 4 numbers toward Rx. 9 to 16: the same for another key.
     pub const fn refusal(&self) -> u16 {
         self.relay.number().saturating_sub(1) / MAX_RELAYS
     }

@@ -88,6 +88,7 @@ impl Chain {
                 is_duplicated: false,
                 refuses_setpoint: false,
                 other_mission: None,
+                other_key: None,
                 interference_w: None,
                 version: relay.version(),
             };
