@@ -5,6 +5,7 @@ use crate::guard::HoldReason;
 use crate::node::round::state::Phase;
 use crate::place::Placement;
 use crate::time::Instant;
+use crate::wire::CANDIDATES;
 use crate::wire::message::{Coarse, Detail, Entry};
 
 /// State that a relay has reported to the ground station through the chain.
@@ -37,6 +38,12 @@ pub struct Report {
     pub silent: [bool; 2],
     /// True if the relay has received another node with its own number within three times `dead_after`.
     pub is_duplicated: bool,
+    /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
+    pub refuses_setpoint: bool,
+    /// Number of the nearest node whose messages the relay has refused for another mission; `None` for none.
+    pub other_mission: Option<u16>,
+    /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
+    pub other_key: Option<u16>,
     /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
@@ -55,14 +62,18 @@ const PHASES: [Phase; 8] = [
     Phase::NoQuorum,
 ];
 
-/// Control states in the order of their numbers in a report, from 1.
-const CONTROLS: [State; 5] = [
+/// Control states in the order of their numbers in a report, from 1. The last one is [`REFUSED`].
+const CONTROLS: [State; 6] = [
     State::Silent,
     State::Grounded,
     State::Standby,
     State::Engaged,
     State::Blind,
+    State::Engaged,
 ];
+
+/// Number of the control state of a drone that the relay controls, but whose autopilot flies to another target.
+pub(crate) const REFUSED: u16 = 6;
 
 /// Hold reasons in the order of their numbers in a report, from 1.
 const HOLDS: [HoldReason; 7] = [
@@ -74,6 +85,16 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Pending,
     HoldReason::Halted,
 ];
+
+/// Returns the number of the node that the relay of this entry refuses, for another mission (`first` 1) or another key
+/// (`first` 9). `None` for none.
+fn refused(entry: &Entry, first: u16) -> Option<u16> {
+    match entry.refusal().checked_sub(first)? {
+        toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
+        toward_rx if toward_rx < 2 * CANDIDATES => Some(entry.relay() + toward_rx + 1 - CANDIDATES),
+        _ => None,
+    }
+}
 
 /// Returns the element of `all` with this number, counted from 1; `None` for 0 or a number too large.
 fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
@@ -88,6 +109,7 @@ impl Report {
     pub fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
         let state = entry.state();
         let digit = |unit: u16| state / unit % 8;
+        let control = state / 4096;
         let mut report = Self {
             relay: entry.relay(),
             at,
@@ -96,11 +118,14 @@ impl Report {
             agreed: None,
             phase: numbered(&PHASES, digit(1) + 1).unwrap_or(Phase::Idle),
             holds_lease: state / 2048 % 2 == 1,
-            control: numbered(&CONTROLS, state / 4096 % 6),
+            control: numbered(&CONTROLS, control % 7),
             hold_reasons: [8, 64].map(|unit| numbered(&HOLDS, digit(unit))),
             neighbours: [None; 2],
             silent: [512, 1024].map(|unit| state / unit % 2 == 1),
-            is_duplicated: state >= 6 * 4096,
+            is_duplicated: control >= 7,
+            refuses_setpoint: control % 7 == REFUSED,
+            other_mission: refused(entry, 1),
+            other_key: refused(entry, 1 + 2 * CANDIDATES),
             interference_w: None,
             version: 0,
         };
@@ -125,6 +150,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_refused_node_is_named_by_its_number() {
+        let refused = |refusal: u16, relay: u16| {
+            let entry = Entry::new(relay + 1_000 * refusal, 0, 0, Coarse::of(None));
+            let report = Report::of(&entry, None, Instant::ZERO);
+            (report.relay, report.other_mission, report.other_key)
+        };
+        for relay in [5, 1_000] {
+            assert_eq!(refused(0, relay), (relay, None, None));
+            for distance in 1..=4 {
+                let [before, after] = [relay - distance, relay + distance].map(Some);
+                assert_eq!(refused(distance, relay), (relay, before, None));
+                assert_eq!(refused(distance + 4, relay), (relay, after, None));
+                assert_eq!(refused(distance + 8, relay), (relay, None, before));
+                assert_eq!(refused(distance + 12, relay), (relay, None, after));
+            }
+        }
+        // Decoded reports may name nodes before Tx.
+        assert_eq!(refused(4, 3), (3, None, None));
+    }
+
+    #[test]
     fn every_part_of_a_state_is_independent() {
         let report = |state| {
             let entry = Entry::new(2, 0, state, Coarse::of(None));
@@ -132,7 +178,7 @@ mod tests {
         };
         for (holds_lease, is_duplicated) in [(false, false), (true, false), (false, true)] {
             let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * 4;
-            let flags = 2048 * u16::from(holds_lease) + 24_576 * u16::from(is_duplicated);
+            let flags = 2048 * u16::from(holds_lease) + 28_672 * u16::from(is_duplicated);
             let report = report(rest + flags);
             assert_eq!(
                 (report.holds_lease, report.is_duplicated, report.phase),

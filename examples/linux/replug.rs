@@ -66,6 +66,13 @@ impl Replug {
         self.tap = Some(tap);
     }
 
+    /// Adds a comment to the next frame in the capture, if enabled: an act of the operator.
+    pub fn note(&mut self, note: &str) {
+        if let Some(tap) = &mut self.tap {
+            tap.note(note);
+        }
+    }
+
     /// Closes a tty that has failed, and tries to reopen it when it is time. Logs each loss and each return once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);

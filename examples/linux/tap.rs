@@ -28,6 +28,8 @@ struct Piece {
     at: Duration,
     direction: Direction,
     bytes: Vec<u8>,
+    /// Comment on the next frame; empty for none.
+    note: String,
 }
 
 /// State of a capture of serial traffic, shared by all its ports.
@@ -44,6 +46,8 @@ pub struct Tap {
     port: usize,
     state: Arc<CaptureState>,
     sender: SyncSender<Piece>,
+    /// Comment that the next piece takes along; empty for none.
+    note: String,
     left_out: u64,
     is_over: bool,
 }
@@ -62,12 +66,24 @@ impl Tap {
             at,
             direction,
             bytes: bytes.to_vec(),
+            note: std::mem::take(&mut self.note),
         };
         match self.sender.try_send(piece) {
             Ok(()) => {}
-            Err(TrySendError::Full(_)) => self.left_out = self.left_out.saturating_add(1),
+            Err(TrySendError::Full(piece)) => {
+                self.note = piece.note;
+                self.left_out = self.left_out.saturating_add(1);
+            }
             Err(TrySendError::Disconnected(_)) => self.is_over = true,
         }
+    }
+
+    /// Adds a comment to the next frame of this port.
+    pub fn note(&mut self, note: &str) {
+        if !self.note.is_empty() {
+            self.note.push_str("; ");
+        }
+        self.note.push_str(note);
     }
 
     /// Returns true if the capture has ended because its file could not be written.
@@ -120,6 +136,7 @@ pub fn attach<'a>(
             port,
             state: Arc::clone(&state),
             sender: sender.clone(),
+            note: String::new(),
             left_out: 0,
             is_over: false,
         });
@@ -185,9 +202,14 @@ fn write(
         .iter()
         .map(|_| <[FrameSplitter; 2]>::default())
         .collect();
+    let mut note = String::new();
     while let Ok(first) = pieces.recv() {
         let mut next = Some(first);
         while let Some(piece) = next {
+            if !piece.note.is_empty() {
+                note.push_str(if note.is_empty() { "" } else { "; " });
+                note.push_str(&piece.note);
+            }
             let way = usize::from(piece.direction == Direction::Out);
             let port = interfaces.get(piece.port).zip(cuts.get_mut(piece.port));
             if let Some((&interface, [into, out])) = port {
@@ -198,7 +220,7 @@ fn write(
                         bytes: frame.bytes,
                         len: frame.len,
                         direction: piece.direction,
-                        comment: "",
+                        comment: &std::mem::take(&mut note),
                     };
                     capture.frame(interface, &frame)
                 })?;

@@ -117,6 +117,18 @@ fn faults(now: Instant, report: &Report, relays: u16, version: u16) -> Vec<&'sta
     let all = [
         (now.since(report.at) >= OLD, "report older than 10 s"),
         (report.is_duplicated, "another relay has its number"),
+        (
+            report.other_key.is_some(),
+            "a relay near it signs with another key",
+        ),
+        (
+            report.other_mission.is_some(),
+            "a relay near it has another mission",
+        ),
+        (
+            report.refuses_setpoint,
+            "the autopilot flies to another target",
+        ),
         (control.is_none(), "no autopilot"),
         (control == Some(State::Silent), "autopilot silent"),
         (

@@ -1,11 +1,12 @@
-//! Tasks of the page and of the status socket: previews and uploads, with their state for the page.
+//! Tasks of the page and of the status socket: previews and uploads, with their state for the page, and lost relays that are cleared.
 //!
 //! | request | answer |
 //! | --- | --- |
 //! | `preview`: values of the new mission by the names of the `--new-` options, `receiver` as `X,Y`, and `shown`, the mission of the map | the preview's number; the result is part of the snapshots |
 //! | `upload`: number and digest of the newest preview, which the page has shown, and the time of the page's newest snapshot | the upload begins. Each preview can be uploaded once |
+//! | `clear`: number of a lost relay, and the time of the page's newest snapshot | the page no longer has the relay, until it reports again |
 //!
-//! Both use the stages of an upload from the command line.
+//! The first two use the stages of an upload from the command line.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::Receiver;
@@ -20,6 +21,7 @@ use uav_relay::{
 };
 use uav_relay_linux::command::one_line;
 use uav_relay_linux::log::Log;
+use uav_relay_linux::replug::Replug;
 use uav_relay_linux::site::{degrees, site};
 use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 use uav_relay_screen::{Post, Task};
@@ -28,6 +30,7 @@ use crate::change::{changes, fields};
 use crate::forecast::Move;
 use crate::new::{Basis, NewOptions};
 use crate::options::Plan;
+use crate::screen::Web;
 use crate::uploading::{Form, Preview, Uploading, digest_of};
 
 /// Maximum distance of a drone from its agreed position, m, for the drone to count as arrived.
@@ -69,7 +72,16 @@ struct Confirmed {
     time_s: f64,
 }
 
-/// Handler of the tasks (previews and uploads) from the page and from the status socket.
+/// Body of a request that clears a lost relay.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Cleared {
+    relay: u16,
+    /// Time of the newest snapshot that the page had, s.
+    time_s: f64,
+}
+
+/// Tasks of the page and of the status socket.
 #[derive(Debug)]
 pub(crate) struct Desk {
     /// Tasks that the page gives to the program; `None` without a page.
@@ -85,6 +97,8 @@ pub(crate) struct Parts<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) ground: &'a mut Ground,
     pub(crate) uploading: &'a mut Option<Uploading>,
+    pub(crate) web: Option<&'a mut Web>,
+    pub(crate) tty: &'a mut Replug,
 }
 
 impl Desk {
@@ -108,7 +122,7 @@ impl Desk {
         }
     }
 
-    /// Handles a command of the status socket: `preview NAME=VALUE ...` or `upload NUMBER DIGEST`.
+    /// Handles a command of the status socket: `preview NAME=VALUE ...`, `upload NUMBER DIGEST` or `clear-lost NUMBER`.
     pub(crate) fn command(
         &mut self,
         now: Instant,
@@ -129,12 +143,16 @@ impl Desk {
                 let body = json!({ "preview": number, "digest": digest, "time_s": time_s });
                 (Task::Upload, body)
             }),
+            ["clear-lost", relay] => relay.parse::<u16>().ok().map(|relay| {
+                let time_s = now.as_micros() as f64 / 1e6;
+                (Task::Clear, json!({ "relay": relay, "time_s": time_s }))
+            }),
             _ => None,
         };
         let reply = match task.filter(|_| parts.plan.options.stand) {
             Some((task, body)) => self.perform(now, log, &mut parts, task, &body.to_string(), by),
             None => Err(format!(
-                "command {line:?}: must be empty (reads the state) or, for a station with --stand, `preview NAME=VALUE ...` or `upload NUMBER DIGEST`"
+                "command {line:?}: must be `preview NAME=VALUE ...`, `upload NUMBER DIGEST` or `clear-lost NUMBER`, which need a station with --stand, or empty to read the state"
             )),
         };
         let is_done = reply.is_ok();
@@ -153,7 +171,17 @@ impl Desk {
         let (name, reply) = match task {
             Task::Preview => ("preview", self.preview(now, parts, body)),
             Task::Upload => ("upload", upload(now, parts, body)),
+            Task::Clear => ("clear-lost", clear(now, parts, body)),
         };
+        if reply.is_ok() && task != Task::Preview {
+            let answer: Value =
+                serde_json::from_str(reply.as_deref().unwrap_or_default()).unwrap_or_default();
+            let number = answer.get("relay").or_else(|| answer.get("preview"));
+            let number = number.unwrap_or_default();
+            parts
+                .tty
+                .note(&format!("operator: {name} {number} by {by}"));
+        }
         if reply.is_err() && now < self.logs_at {
             return reply;
         }
@@ -179,6 +207,7 @@ impl Desk {
             plan,
             ground,
             uploading,
+            ..
         } = parts;
         if plan.loaded.mission.field().is_some() {
             return Err(UploadError::Field.to_string());
@@ -244,15 +273,31 @@ fn place(text: &str) -> Result<[f32; 2], String> {
     }
 }
 
+/// Checks that a request with the page's time `time_s` was not held on the way.
+fn check_age(now: Instant, time_s: f64) -> Result<(), String> {
+    let age_s = now.as_micros() as f64 / 1e6 - time_s;
+    if (-1.0..=OLDEST_S).contains(&age_s) {
+        return Ok(());
+    }
+    Err(format!(
+        "the page shows the state of {age_s:.1} s ago, but at most {OLDEST_S} s are allowed: wait until the page is up to date, and try again"
+    ))
+}
+
+/// Clears a lost relay on the page.
+fn clear(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, String> {
+    let asked: Cleared = serde_json::from_str(body).map_err(|error| error.to_string())?;
+    check_age(now, asked.time_s)?;
+    let web = parts.web.as_mut();
+    let web = web.ok_or("there is no page with the relay: start the station with --web")?;
+    web.clear(now, asked.relay)?;
+    Ok(json!({ "relay": asked.relay }).to_string())
+}
+
 /// Starts the upload of a preview that the operator has confirmed.
 fn upload(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, String> {
     let asked: Confirmed = serde_json::from_str(body).map_err(|error| error.to_string())?;
-    let age_s = now.as_micros() as f64 / 1e6 - asked.time_s;
-    if !(-1.0..=OLDEST_S).contains(&age_s) {
-        return Err(format!(
-            "the page shows the state of {age_s:.1} s ago, but at most {OLDEST_S} s are allowed: wait until the page is up to date, and try again"
-        ));
-    }
+    check_age(now, asked.time_s)?;
     let uploading = parts
         .uploading
         .as_mut()

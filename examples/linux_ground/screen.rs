@@ -78,7 +78,16 @@ impl Web {
         Ok((web, posts))
     }
 
-    /// Updates the page if an update is due. Returns the time of the next update. Never waits for a browser.
+    /// Clears a lost relay: the page no longer has it, until it reports again.
+    ///
+    /// # Errors
+    /// The reason if the relay is not lost.
+    pub(crate) fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
+        self.view.clear(now, relay)
+    }
+
+    /// Shows a snapshot if it is time for the next one. Returns the time of the next snapshot. The function does not
+    /// wait for a browser.
     pub(crate) fn turn(
         &mut self,
         now: Instant,

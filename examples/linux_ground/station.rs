@@ -139,6 +139,8 @@ impl<'a> Station<'a> {
             plan: self.plan,
             ground: &mut self.ground,
             uploading: &mut self.uploading,
+            web: self.web.as_mut(),
+            tty: &mut self.tty,
         };
         self.desk.turn(time, &self.service.log, parts);
         let (ground, uploading) = (&mut self.ground, self.uploading.as_ref());
@@ -241,6 +243,7 @@ impl<'a> Station<'a> {
             hearing,
             uploading,
             desk,
+            web,
             ..
         } = self;
         service.tend(time, "station", |log, command| {
@@ -249,6 +252,8 @@ impl<'a> Station<'a> {
                     plan,
                     ground: &mut *ground,
                     uploading: &mut *uploading,
+                    web: web.as_mut(),
+                    tty: &mut *tty,
                 };
                 return desk.command(time, log, parts, line, by);
             }

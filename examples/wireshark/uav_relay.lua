@@ -263,9 +263,9 @@ local messages = {
             { name = "version", kind = "u16", unit = "", text = "flown version" },
         } }, unit = "", text = "of the first entry's relay:" },
         { name = "entries", kind = "list", most = 4, of = { kind = "group", fields = {
-            { name = "relay", kind = "u16", unit = "", text = "number of the relay" },
+            { name = "relay", kind = "u16", unit = "", text = "number of the relay + 1000 m" },
             { name = "age_ds", kind = "u8", unit = "0.1 s", text = "age; 255: more, ignored", per = 10, base = "s" },
-            { name = "state", kind = "u16", unit = "", text = "phase + 8 h + 64 k + 512 s + 1024 t + 2048 l + 4096 c + 24576 d" },
+            { name = "state", kind = "u16", unit = "", text = "phase + 8 h + 64 k + 512 s + 1024 t + 2048 l + 4096 c + 28672 d" },
             { name = "position", kind = "array", size = 3, of = { kind = "i24" }, unit = "0.25 m", text = "x, y, altitude of the drone", per = 4, base = "m" },
         } }, unit = "", text = "states" },
     } },

@@ -7,7 +7,7 @@
 //! | Report received from a side, the other side is watched | store its entries; send them with the next report, which is due now |
 //! | that Report answers an older Watch | hand the newest Watch on again, at most every second: to the neighbour, or to the sender if it is four numbers away |
 //! | first frame of a new session with the relay one number away | hand the Watch of the other side on to it |
-//! | own control state, or that in a stored entry, has changed and [begins an alarm](begins_alarm) | send the entry ahead of its turn, also during an agreement |
+//! | own control state, or that in a stored entry, has changed and [begins an alarm](begins_alarm); a node is refused for another mission | send the entry ahead of its turn, also during an agreement |
 //! | report due | send the own entry if it is due, and stored ones that fit; for three periods, entries that were sent and not replaced again |
 //!
 //! On a shared channel a Watch is handed on to the relay four numbers away, repeatedly until that relay reports, and every fourth one to the
@@ -23,9 +23,11 @@ use super::context::Member;
 use super::neighbour::Neighbours;
 use super::neighbour::hearing::{CANDIDATES, mask};
 use crate::flight::autopilot::state::State;
+use crate::mission::MAX_RELAYS;
 use crate::place::Placement;
 use crate::settings::Wiring;
 use crate::side::Side;
+use crate::telemetry::REFUSED;
 use crate::time::{Duration, Instant};
 use crate::wire::message::{Coarse, Detail, Entry, Message, Reports};
 
@@ -70,6 +72,9 @@ const STEP: Duration = Duration::from_millis(500);
 /// Maximum time difference between two copies of an entry (relay's state) that came by different ways. The copies
 /// differ because each relay rounds the age of an entry.
 const ROUNDING: Duration = Duration::from_millis(300);
+
+/// Difference of the times at which two relays with consecutive numbers send entries that begin alarms.
+const SPREAD: Duration = Duration::from_millis(30);
 
 /// Age above which a position of the drone counts as unknown.
 const OLD: Duration = Duration::from_millis(2_000);
@@ -162,15 +167,15 @@ struct Watched {
     count: u8,
     /// True if entries of other relays have arrived since the last report.
     is_fed: bool,
-    /// True if this relay's control state begins an alarm that has not been reported.
+    /// True if a change of this relay's state begins an alarm that has not been reported.
     is_alarmed: bool,
     /// True if a stored entry (state of another relay) begins an alarm and has not been sent.
     stores_alarm: bool,
 }
 
 /// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state), the setpoint, and the agreed position. `None` for an unknown position.
-pub(crate) type Own = (u16, [Option<Placement>; 2]);
+/// state) and its [refusal](Entry::refusal), the setpoint, and the agreed position.
+pub(crate) type Own = ([u16; 2], [Option<Placement>; 2]);
 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
@@ -183,15 +188,29 @@ impl Reporting {
 
     /// Records the drone's control state. A change is reported as soon as the telemetry's share of the data rate
     /// allows it. The beginning of an alarm is reported earlier.
-    pub(crate) fn handle_control(&mut self, control: u16) {
+    pub(crate) fn handle_control(&mut self, member: &Member, control: u16) {
         let before = core::mem::replace(&mut self.control, control);
         if before == control {
             return;
         }
-        let (from, begins) = (self.reported + STEP, begins_alarm(before, control));
-        for watched in &mut self.watched {
+        self.schedule(member, begins_alarm(before, control), control == ENGAGED);
+    }
+
+    /// Records that a node was refused for another mission. The report about it is sent ahead of its turn.
+    pub(crate) fn handle_refusal(&mut self, member: &Member) {
+        self.schedule(member, true, false);
+    }
+
+    /// Schedules this relay's entry for a change, which begins an alarm or ends all of them.
+    fn schedule(&mut self, member: &Member, begins: bool, ends: bool) {
+        let sides = [Side::Upstream, Side::Downstream];
+        for (watched, side) in self.watched.iter_mut().zip(sides) {
+            // If all drones have the same fault, the relays farther from the station report first.
+            let behind = member.all.saturating_sub(from_end(member, side)) % 8;
+            let turn = self.checked + SPREAD.times(behind.into());
+            let from = turn.max(self.reported + STEP);
             (watched.due, watched.own_from) = (watched.due.min(from), from);
-            watched.is_alarmed = begins || watched.is_alarmed && control != ENGAGED;
+            watched.is_alarmed = begins || watched.is_alarmed && !ends;
         }
     }
 
@@ -320,12 +339,14 @@ const fn earlier(at: Instant, span: Duration) -> Instant {
 /// Returns true if the change of the control state from `before` to `now` begins an alarm. Each state is a number
 /// from 1; 0 stands for unknown.
 ///
-/// An alarm begins if the autopilot is no longer received, or has no position any more, or if the relay no longer
-/// controls the drone.
+/// An alarm begins if the autopilot is no longer received, has no position any more, or flies to another target, or if
+/// the relay no longer controls the drone.
 const fn begins_alarm(before: u16, now: u16) -> bool {
     const SILENT: u16 = State::Silent as u16 + 1;
     const BLIND: u16 = State::Blind as u16 + 1;
-    before != now && before != 0 && (now == SILENT || now == BLIND || before == ENGAGED)
+    let is_fault = now == SILENT || now == BLIND || now == REFUSED;
+    let is_released = before == ENGAGED || before == REFUSED && now != ENGAGED;
+    before != now && before != 0 && (is_fault || is_released)
 }
 
 const fn is_relay(member: &Member, node: u16) -> bool {
@@ -484,7 +505,8 @@ impl Reporting {
         if let Some(old) = all.find(|old| old.entry.relay() == entry.relay()) {
             if at > old.at + ROUNDING {
                 let [was, is] = [old.entry, entry].map(|entry| entry.control());
-                let begins = begins_alarm(was, is);
+                let is_refusal = old.entry.refusal() == 0 && entry.refusal() > 0;
+                let begins = begins_alarm(was, is) || is_refusal;
                 if begins {
                     stored.rank = Rank::Alarm;
                 } else if was == is {
@@ -493,7 +515,8 @@ impl Reporting {
                 stored.detail = detail.or(old.detail);
                 *old = stored;
                 return begins;
-            } else if old.detail.is_none() {
+            } else if old.detail.is_none() && old.rank > Rank::Sent {
+                // Details that were sent do not come back by another way.
                 old.detail = detail;
             }
         } else if let Err(stored) = self.stored.push(stored) {
@@ -536,7 +559,9 @@ impl Reporting {
             let state_at = position.map_or(now, |(at, _)| at);
             *reported = state_at.max(*reported + STEP).min(now);
             let age = age(now, *reported);
-            let entry = Entry::new(member.node, age, own.0 + 4096 * control, at);
+            let [state, refusal] = own.0;
+            let relay = member.node + MAX_RELAYS * refusal;
+            let entry = Entry::new(relay, age, state + 4096 * control, at);
             _ = report.entries.push(entry);
         }
         self.stored.retain(|stored| {

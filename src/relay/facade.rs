@@ -722,10 +722,19 @@ impl Relay {
     }
 
     /// Records the control state of the drone, for the reports to a ground station that watches.
+    ///
+    /// `refuses` is true while the autopilot flies to a target other than the setpoint.
     #[cfg(feature = "telemetry")]
     #[doc(hidden)]
-    pub fn report_control(&mut self, state: crate::flight::autopilot::state::State) {
-        self.node.reporting.handle_control(state as u16 + 1);
+    pub fn report_control(&mut self, state: crate::flight::autopilot::state::State, refuses: bool) {
+        use crate::telemetry::REFUSED;
+        let is_refused = state.is_flown() && refuses;
+        let control = if is_refused {
+            REFUSED
+        } else {
+            state as u16 + 1
+        };
+        self.node.report_control(control);
     }
 
     /// Reports that relays on `side` that are lost or under a pilot's control are not in the air any more. See

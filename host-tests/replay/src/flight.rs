@@ -303,6 +303,7 @@ impl<'a> Recorder<'a> {
     /// `now`.
     fn advance(&mut self, flight: &mut Flight, now: f64, frames: &[Frame]) -> Snapshot {
         for frame in frames.get(self.used[1]..).unwrap_or_default() {
+            self.act(flight, now, frame);
             match &frame.message {
                 Some(Message::Offer { upload, .. }) => {
                     self.uploads.insert(upload.version(), *upload);
@@ -350,6 +351,25 @@ impl<'a> Recorder<'a> {
         }
         self.nearest(flight, now, None);
         snapshot
+    }
+
+    /// Repeats the acts of the operator that a frame's comment names, and logs them.
+    fn act(&mut self, flight: &mut Flight, now: f64, frame: &Frame) {
+        let acts = frame.comment.split("; ");
+        for act in acts.filter_map(|it| it.strip_prefix("operator: ")) {
+            let words: Vec<&str> = act.split_whitespace().collect();
+            let cleared = match words.as_slice() {
+                ["clear-lost", relay, ..] => relay.parse().ok(),
+                _ => None,
+            };
+            // The relay may not be lost in the captures of all nodes.
+            if cleared.is_none_or(|relay| self.view.clear(instant(now), relay).is_err()) {
+                flight.log.push(LogLine {
+                    time_s: frame.at - flight.begin,
+                    text: format!("operator: {act}"),
+                });
+            }
+        }
     }
 
     fn snapshot(&mut self, relays: u16, now: f64, new: &[Report]) -> Snapshot {

@@ -25,6 +25,8 @@ pub struct Frame {
     pub header: Header,
     /// Message of the frame; `None` for a handshake, and for a message that no relay accepts.
     pub message: Option<Message>,
+    /// Comment on the frame: acts of the operator at the ground station. Empty without a comment.
+    pub comment: String,
 }
 
 /// Frames of one capture file, in the order of the file.
@@ -113,6 +115,7 @@ fn frame(packet: &Packet<'_>) -> Option<Frame> {
         wire: packet.wire.to_vec(),
         header,
         message: Message::decode(body).ok().filter(|_| !handshake),
+        comment: packet.comment.to_owned(),
     })
 }
 

@@ -39,6 +39,7 @@ fn report(at: f64, relay: u16, x_m: f32) -> Frame {
             counter: 0,
         },
         message: Some(Message::Report(reports)),
+        comment: String::new(),
     }
 }
 
@@ -77,6 +78,70 @@ fn outages_of_a_long_flight_are_alarms_and_losses() {
         "{:?}",
         flight.losses
     );
+}
+
+/// Checks that a relay that the operator has cleared is gone from then on, until it reports again.
+#[test]
+fn a_relay_that_the_operator_cleared_is_gone_until_it_reports_again() {
+    let flown = |end: i32| {
+        let mut frames = Vec::new();
+        for second in 0..end {
+            for relay in [1, 2, 3] {
+                if relay != 2 || second <= 20 || second > 90 {
+                    frames.push(report(f64::from(second), relay, 100.0 * f32::from(relay)));
+                }
+            }
+        }
+        for frame in &mut frames {
+            let acts = match (frame.at, frame.header.sender) {
+                // Relay 3 is not lost: the act is logged only.
+                (15.0, 1) => "operator: clear-lost 3 by the page; operator: upload 1 by the page",
+                (60.0, 3) => "operator: clear-lost 2 by the page at 127.0.0.1",
+                _ => continue,
+            };
+            acts.clone_into(&mut frame.comment);
+        }
+        Flight::new(&frames, 3, None)
+    };
+    let listed = |flight: &Flight| {
+        flight
+            .last
+            .relays
+            .iter()
+            .map(|it| it.number)
+            .collect::<Vec<_>>()
+    };
+    let lasting = |flight: &Flight| {
+        flight
+            .alarms
+            .iter()
+            .filter(|it| it.cleared_s.is_none())
+            .count()
+    };
+    let before = flown(59);
+    assert_eq!((listed(&before), lasting(&before)), (vec![1, 2, 3], 1));
+    let cleared = flown(80);
+    assert_eq!((listed(&cleared), lasting(&cleared)), (vec![1, 3], 0));
+    let alarm = cleared.alarms.iter().find(|it| it.lost == Some(2)).unwrap();
+    assert!((alarm.cleared_s.unwrap() - 60.0).abs() < 1.0, "{alarm:?}");
+    let back = flown(100);
+    assert_eq!((listed(&back), lasting(&back)), (vec![1, 2, 3], 0));
+    let acts: Vec<_> = back
+        .log
+        .iter()
+        .filter(|it| it.text.contains("operator") || it.text.contains("cleared"))
+        .collect();
+    let texts: Vec<&str> = acts.iter().map(|it| &it.text[..]).collect();
+    assert_eq!(
+        texts,
+        [
+            "operator: clear-lost 3 by the page",
+            "operator: upload 1 by the page",
+            "operator: lost relay 2 cleared",
+            "relay 2: reports again after it was cleared"
+        ]
+    );
+    assert!((acts[2].time_s - 60.0).abs() < 1.0);
 }
 
 #[test]

@@ -161,6 +161,7 @@ impl Alarms {
                 urgency: reason.urgency(),
                 text,
                 cleared_s: None,
+                lost: (reason == Reason::Lost).then_some(subject),
             },
             reason,
             subject,

@@ -42,22 +42,32 @@ pub struct Chain<'a> {
 impl Chain<'_> {
     /// Returns the state of the chain at the time `now`, from the newest report of each relay.
     ///
-    /// A relay whose report is old counts as lost in two cases: another relay has reported it as lost, or it had neighbours, an alarm about
-    /// its missing reports lasts, and the chain has closed the gap. The gap is closed if a report at least [`SILENT_AFTER`] newer contains
-    /// a neighbour beyond the relay.
-    pub fn snapshot(&self, now: Instant, reports: &[Report], alarms: &Alarms) -> Snapshot {
+    /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
+    /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
+    /// beyond it, or itself as the last relay before Tx or Rx, [`SILENT_AFTER`] later. The relays `cleared`, which have no report, are not part of the snapshot.
+    pub fn snapshot(
+        &self,
+        now: Instant,
+        reports: &[Report],
+        alarms: &Alarms,
+        cleared: &[u16],
+    ) -> Snapshot {
         let is_skipped = |report: &Report| {
             let mut later = reports
                 .iter()
                 .filter(|by| by.at.since(report.at) >= SILENT_AFTER);
-            let is_closed = later.any(|by| has_beyond(by, report.relay));
+            let is_closed =
+                later.any(|by| has_beyond(by, report.relay) || self.is_end(by, report.relay));
             is_closed && report.neighbours != [None; 2] && alarms.lasts(Reason::Lost, report.relay)
         };
         let is_lost = |report: &Report| {
             now.since(report.at) >= SILENT_AFTER
                 && (alarms.is_lost(report.relay) || is_skipped(report))
         };
-        let mut relays: Vec<RelaySnapshot> = (1..=self.relays).map(RelaySnapshot::new).collect();
+        let mut relays: Vec<RelaySnapshot> = (1..=self.relays)
+            .filter(|it| !cleared.contains(it))
+            .map(RelaySnapshot::new)
+            .collect();
         for report in reports {
             let mut known = RelaySnapshot {
                 age_s: Some(now.since(report.at).as_micros() as f64 / 1e6),
@@ -99,6 +109,19 @@ impl Chain<'_> {
             alarms: alarms.all(),
             ..Snapshot::default()
         }
+    }
+
+    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`.
+    fn is_end(&self, by: &Report, number: u16) -> bool {
+        let [before, after] = by.neighbours;
+        let (toward, away) = if number < by.relay {
+            (before, after)
+        } else {
+            (after, before)
+        };
+        // A relay without details has no neighbours in its report, nor has one outside of the chain.
+        let has_others = away.is_some() || self.relays == 2 && by.agreed.is_some();
+        toward.is_none() && has_others && by.relay != number
     }
 
     fn profile(&self, mission: &Mission, relay: u16) -> Profile {

@@ -97,8 +97,12 @@ const TILES: &str = "/tiles/";
 /// Largest zoom level of a map tile.
 const MAX_ZOOM: u8 = 24;
 
-/// Paths to which a page sends POST requests, with the task of each path.
-const TASKS: [(&str, Task); 2] = [("/preview", Task::Preview), ("/upload", Task::Upload)];
+/// Path of a POST, by its task.
+const TASKS: [(&str, Task); 3] = [
+    ("/preview", Task::Preview),
+    ("/upload", Task::Upload),
+    ("/clear", Task::Clear),
+];
 
 /// Task that a page gives to the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -107,6 +111,8 @@ pub enum Task {
     Preview,
     /// Uploads a mission that a preview has shown. The request's body contains the preview's number and digest.
     Upload,
+    /// Clear the lost relay whose number is in the body.
+    Clear,
 }
 
 /// Password and token that the server expects in requests.

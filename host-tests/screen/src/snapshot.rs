@@ -233,6 +233,8 @@ pub struct Alarm {
     pub text: String,
     /// Time when the reason of the alarm ended; `None` while it lasts.
     pub cleared_s: Option<f64>,
+    /// Number of the relay that the alarm reports as lost; `None` for other alarms.
+    pub lost: Option<u16>,
 }
 
 /// Line of the log of the whole chain.

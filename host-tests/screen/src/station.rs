@@ -11,10 +11,12 @@
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
-//! | engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
+//! | a relay refuses another one for another mission or key, and no report of that one has come since | warning or critical, one for the refused relay |
+//! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
-//! An alarm of a relay that does not report any more stays as it was.
+//! An alarm of a relay that does not report any more stays as it was. An operator can [clear](StationView::clear) a lost relay: it then
+//! has no alarm and is not part of the snapshot, until a newer report of it arrives.
 
 use std::collections::BTreeMap;
 
@@ -161,6 +163,13 @@ pub struct StationView {
     ///
     /// The key of the outer map is the silent relay, the key of the inner map the neighbour.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
+    /// Relays that are refused for another mission or key: the relays that refuse them, and the time of the first such
+    /// report.
+    refused: BTreeMap<(Reason, u16), (Vec<u16>, Instant)>,
+    /// Lost relays that an operator has cleared, and the times of the acts.
+    cleared: BTreeMap<u16, Instant>,
+    /// Log lines of the next snapshot.
+    acts: Vec<LogLine>,
     frames: Frames,
     /// Time of the last accepted frame; before the first frame it is the time of the start.
     frame_at: Instant,
@@ -178,6 +187,24 @@ impl StationView {
         self.version.map(|(version, _)| version)
     }
 
+    /// Removes a lost relay and its alarm from the snapshots, until a report of its state after `now` arrives.
+    ///
+    /// # Errors
+    /// The reason if the relay is not lost: it has reported within [`SILENT_AFTER`], or has no alarm that it is lost.
+    pub fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
+        let known = self.known.get(&relay);
+        let is_silent = known.is_some_and(|it| now.since(it.report.at) >= SILENT_AFTER);
+        if !is_silent || !self.alarms.lasts(Reason::Lost, relay) {
+            return Err(format!("relay {relay} is not lost"));
+        }
+        self.cleared.insert(relay, now);
+        self.acts.push(LogLine {
+            time_s: seconds(now),
+            text: format!("operator: lost relay {relay} cleared"),
+        });
+        Ok(())
+    }
+
     /// Returns the state of `chain` at the time `now`, its alarms, and the log since the last call.
     ///
     /// `reports` are the relays' newest reports. Reports of relays with a number above `chain.relays` are ignored.
@@ -188,7 +215,7 @@ impl StationView {
         reports: impl IntoIterator<Item = &'a Report>,
         frames: Frames,
     ) -> Snapshot {
-        let mut log = Vec::new();
+        let mut log = std::mem::take(&mut self.acts);
         let mut is_new = false;
         for report in reports {
             let is_listed = (1..=chain.relays).contains(&report.relay);
@@ -198,13 +225,15 @@ impl StationView {
         self.count(now, frames, is_new);
         self.follow_version(now);
         self.drop_answered_claims(now);
+        self.follow_refusals(now);
         let lasting = self.lasting(now, chain);
         self.alarms.settle(seconds(now), lasting);
-        let reports: Vec<Report> = self.known.values().map(|it| it.report).collect();
+        let reports: Vec<Report> = self.shown().map(|it| it.report).collect();
+        let cleared: Vec<u16> = self.cleared.keys().copied().collect();
         Snapshot {
             name: Some(format!("Chain of {} relays", chain.relays)),
             log,
-            ..chain.snapshot(now, &reports, &self.alarms)
+            ..chain.snapshot(now, &reports, &self.alarms, &cleared)
         }
     }
 
@@ -220,6 +249,10 @@ impl StationView {
             text: format!("relay {number}: {text}"),
         };
         log.extend(changes(before.as_ref(), &report).into_iter().map(line));
+        if self.cleared.get(&number).is_some_and(|at| report.at > *at) {
+            self.cleared.remove(&number);
+            log.push(line("reports again after it was cleared".to_owned()));
+        }
         let known = self.known.entry(number);
         known
             .or_insert_with(|| Known::new(report))
@@ -281,6 +314,34 @@ impl StationView {
         self.claims.retain(|_, claims| !claims.is_empty());
     }
 
+    /// Updates the relays that are refused, at the time `now`.
+    fn follow_refusals(&mut self, now: Instant) {
+        let mut refused: BTreeMap<(Reason, u16), (Vec<u16>, Instant)> = BTreeMap::new();
+        let reports = self.known.values().map(|it| it.report);
+        for by in reports.filter(|by| now.since(by.at) < SILENT_AFTER.times(2)) {
+            let refusals = [
+                (Reason::Mission, by.other_mission),
+                (Reason::Key, by.other_key),
+            ];
+            for key in refusals
+                .into_iter()
+                .filter_map(|(reason, it)| Some((reason, it?)))
+            {
+                let before = self.refused.get(&key).map(|it| it.1);
+                let (all, at) = refused.entry(key).or_insert((Vec::new(), by.at));
+                all.push(by.relay);
+                *at = before.unwrap_or_else(|| by.at.min(*at));
+            }
+        }
+        self.refused = refused;
+    }
+
+    /// Returns the relays that are known and not cleared.
+    fn shown(&self) -> impl Iterator<Item = &Known> {
+        let known = self.known.iter();
+        known.filter_map(|(number, it)| (!self.cleared.contains_key(number)).then_some(it))
+    }
+
     fn claims(&self, number: u16) -> Vec<u16> {
         let claims = self.claims.get(&number).into_iter().flatten();
         claims.map(|(by, _)| *by).collect()
@@ -314,7 +375,15 @@ impl StationView {
             let note = format!(": {rejected} of {all} since its start");
             add(Reason::Rejected, 0, Vec::new(), note);
         }
-        for known in self.known.values() {
+        for ((reason, number), (by, since)) in &self.refused {
+            // Reports of a relay with another mission or key do not reach this station.
+            let is_back = |it: &Known| it.report.at > *since;
+            let is_listed = (1..=chain.relays).contains(number);
+            if is_listed && !self.known.get(number).is_some_and(is_back) {
+                add(*reason, *number, by.clone(), String::new());
+            }
+        }
+        for known in self.shown() {
             let number = known.report.relay;
             let by = self.claims(number);
             let heard_at = known.report.at.max(self.resumed_at);
@@ -338,7 +407,10 @@ impl StationView {
                 (Reason::Blind, known.is_blind()),
                 (Reason::LinkLost, known.is_link_lost),
                 (Reason::Released, known.is_released),
-                (Reason::Stuck, known.is_stuck()),
+                (
+                    Reason::Stuck,
+                    known.is_stuck() || known.report.refuses_setpoint,
+                ),
             ];
             for (reason, _) in own.into_iter().filter(|(_, is)| *is) {
                 add(reason, number, vec![number], String::new());
@@ -359,7 +431,7 @@ impl StationView {
                 Reason::Infeasible => it.report.phase == Phase::Infeasible,
                 _ => it.has_expired(),
             };
-            let by = self.known.values().filter(lasts);
+            let by = self.shown().filter(lasts);
             let by: Vec<u16> = by.map(|it| it.report.relay).collect();
             if !by.is_empty() {
                 add(reason, 0, by, String::new());

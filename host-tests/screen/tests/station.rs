@@ -43,6 +43,9 @@ fn healthy(relay: u16) -> Report {
         neighbours: [Some(relay - 1).filter(|it| *it > 0), next],
         silent: [false; 2],
         is_duplicated: false,
+        refuses_setpoint: false,
+        other_mission: None,
+        other_key: None,
         interference_w: None,
         version: 0,
     }
@@ -133,10 +136,14 @@ impl Watched {
             }
             "version2" => report.version = 2,
             "nonext" => report.neighbours[1] = None,
+            "noback" => report.neighbours[0] = None,
             "skipsnext" => (report.neighbours[1], report.silent[1]) = (Some(relay + 2), false),
             "skipsback" => (report.neighbours[0], report.silent[0]) = (Some(relay - 2), false),
             "deafnext" | "nonextyet" => report.silent[1] = true,
             "duplicated" => report.is_duplicated = true,
+            "refuses" => report.refuses_setpoint = true,
+            "key2" => report.other_key = Some(2),
+            "mission2" => report.other_mission = Some(2),
             "deafback" => report.silent[0] = true,
             other => panic!("{other}"),
         }
@@ -288,4 +295,84 @@ fn a_silent_relay_that_its_neighbours_have_closed_up_over_is_lost() {
     watched.changes("12345:off");
     (0..20).for_each(|_| watched.second());
     assert_eq!(watched.condition(3), Some(Condition::Normal));
+}
+
+#[test]
+fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
+    let mut watched = Watched::new();
+    watched.second();
+    let clear = |watched: &mut Watched, relay| {
+        let now = Instant::from_millis(1_000 * watched.second);
+        watched.view.clear(now, relay)
+    };
+    for relay in [0, 3, 9] {
+        assert!(clear(&mut watched, relay).is_err(), "{relay} is not lost");
+    }
+    watched.changes("3:noquorum 3:off 2:deafnext");
+    watched.relays.get_mut(&3).unwrap().at = Instant::from_millis(1_500);
+    (0..4).for_each(|_| watched.second());
+    // A neighbour does not receive it, but its last report is recent.
+    assert!(watched.lasting().contains("relay 3 lost"));
+    assert!(clear(&mut watched, 3).is_err());
+    (0..4).for_each(|_| watched.second());
+    assert_eq!(clear(&mut watched, 3), Ok(()));
+    let late = watched.relays.get(&3).copied().unwrap();
+    for _ in 0..20 {
+        watched.second();
+        assert_eq!(watched.lasting(), ".");
+        let listed: Vec<u16> = watched.last.relays.iter().map(|it| it.number).collect();
+        assert_eq!(listed, [1, 2, 4, 5]);
+        assert_eq!(watched.hops(), "Tx-1 1-2 2-4 4-5 5-Rx ");
+    }
+    assert!(clear(&mut watched, 3).is_err(), "cleared twice");
+    // An older state that took long on its way does not bring it back.
+    watched.relays.get_mut(&3).unwrap().at = late.at + uav_relay::Duration::from_millis(500);
+    watched.second();
+    assert_eq!(watched.last.relays.len(), 4);
+    watched.changes("3:ok 2:ok");
+    watched.second();
+    assert_eq!(watched.lasting(), ".");
+    assert_eq!(watched.condition(3), Some(Condition::Normal));
+    // It can be lost again.
+    watched.changes("3:off");
+    (0..11).for_each(|_| watched.second());
+    assert!(watched.lasting().contains("Critical relay 3"));
+    let acts = watched.log.iter().filter(|it| it.contains("cleared"));
+    assert_eq!(
+        acts.collect::<Vec<_>>(),
+        [
+            "operator: lost relay 3 cleared",
+            "relay 3: reports again after it was cleared"
+        ]
+    );
+}
+
+#[test]
+fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() {
+    for (lost, change, hops) in [
+        (1, "2:noback", "Tx-2 2-3 3-4 4-5 5-Rx "),
+        (5, "4:nonext", "Tx-1 1-2 2-3 3-4 4-Rx "),
+    ] {
+        let mut watched = Watched::new();
+        watched.second();
+        // A relay that is not silent is not lost, whatever its neighbour reports.
+        watched.changes(change);
+        (0..8).for_each(|_| watched.second());
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+        watched.changes("24:ok");
+        watched.changes(&format!("{lost}:off"));
+        (0..7).for_each(|_| watched.second());
+        // A report without details has no neighbours, too.
+        watched.changes("24:brief");
+        (0..7).for_each(|_| watched.second());
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+        watched.changes("24:ok");
+        watched.changes(change);
+        watched.second();
+        assert_eq!(watched.condition(lost), Some(Condition::Lost));
+        assert_eq!(watched.hops(), hops);
+        watched.changes(&format!("{lost}:ok"));
+        watched.second();
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+    }
 }

@@ -78,8 +78,9 @@ const alarms = {
     const { lasting, lasting: [first] } = this;
     document.title = first ? `${MARKS[first.urgency]} ${lasting.length > 1 ? `(${lasting.length}) ` : ""}${first.text}` : byId("name").textContent;
     this.announce(open);
-    const state = JSON.stringify(visible.map((alarm) => [alarm, this.acknowledged.has(alarm.number)]));
-    if (state === this.shown) return;
+    const state = JSON.stringify([Boolean(desk.token), visible.map((alarm) => [alarm, this.acknowledged.has(alarm.number)])]);
+    // A button that is held stays.
+    if (state === this.shown || byId("alarm-list").querySelector(".held")) return;
     this.shown = state;
     byId("no-alarms").hidden = visible.length > 0;
     byId("acknowledge-all").disabled = open.length === 0;
@@ -89,7 +90,7 @@ const alarms = {
   },
 
   item(alarm) {
-    const { number, urgency, text, time_s: begun, cleared_s: cleared } = alarm;
+    const { number, urgency, text, time_s: begun, cleared_s: cleared, lost } = alarm;
     const made = (name, content, kind = "") => Object.assign(document.createElement(name), { textContent: content, className: kind });
     const item = made("li", "", `${urgency} ${cleared === null ? "" : "past"}`);
     const words = made("span", "");
@@ -102,6 +103,14 @@ const alarms = {
       button.dataset.alarm = number;
       button.setAttribute("aria-label", `Acknowledge: ${text}`);
       button.addEventListener("click", () => this.acknowledge([number]));
+      item.append(button);
+    }
+    if (typeof lost === "number" && cleared === null && desk.token) {
+      const button = made("button", `Hold for 1 s to clear relay ${lost}`);
+      button.type = "button";
+      button.title = "Removes the relay from this page until it reports again. The neighbours still keep clear of its drone.";
+      button.dataset.clear = lost;
+      holdable(button, () => () => !document.body.classList.contains("stale"), () => clear(lost));
       item.append(button);
     }
     return item;

@@ -1,5 +1,5 @@
 "use strict";
-// Form for a new mission, its preview, and the button that is held to upload it. A page that only shows has no token, and no form.
+// Form for a new mission, its preview, and the buttons that are held to upload it and to clear a lost relay. A page that only shows has no token, and no form.
 
 /** Time for which the button has to be held, ms. */
 const HOLD = 1000;
@@ -62,9 +62,20 @@ async function upload() {
   describe();
 }
 
+/** Clears a lost relay at the station. */
+async function clear(relay) {
+  let text = "";
+  try {
+    await post("/clear", { relay, time_s: received.last.time_s });
+  } catch (error) {
+    text = `Relay ${relay} is not cleared. ${failure(error)}`;
+  }
+  say("clear-state", text);
+}
+
 /** Forgets the preview of earlier values, or of another run of the program. */
 function edited() {
-  release();
+  release(byId("hold"));
   desk.turn += 1;
   desk.mine = null;
   desk.note = "";
@@ -123,7 +134,7 @@ function describe() {
   const { state } = desk;
   say("desk-state", [desk.note, stateText(state)].filter(Boolean).join(" "));
   byId("hold").disabled = !isReady();
-  if (!isReady()) release();
+  if (!isReady()) release(byId("hold"));
   const shown = state.preview;
   const key = shown ? JSON.stringify([state.number, state.stage, shown]) : "";
   if (key === desk.shown) return;
@@ -141,22 +152,36 @@ function describe() {
   map.request();
 }
 
-function release() {
+/** Ends the holding of a button; without an argument that of any button. */
+function release(button) {
+  const held = document.querySelector(".held");
+  if (button && button !== held) return;
   clearTimeout(desk.held);
   desk.held = 0;
-  byId("hold").classList.remove("held");
+  held?.classList.remove("held");
 }
 
-function hold() {
-  if (!isReady() || desk.held) return;
-  byId("hold").classList.add("held");
-  const begun = performance.now();
-  const { number, digest } = desk.state;
-  desk.held = setTimeout(() => {
-    release();
-    const isSame = number === desk.state.number && digest === desk.state.digest;
-    if (isReady() && isSame && performance.now() - begun < HOLD + DELAY) upload();
-  }, HOLD);
+/** Lets a button do `act` after it was held. `begin` returns a function that has to return true at both ends of that time. */
+function holdable(button, begin, act) {
+  const hold = () => {
+    const isReady = begin();
+    if (!isReady() || desk.held) return;
+    button.classList.add("held");
+    const begun = performance.now();
+    desk.held = setTimeout(() => {
+      const isHeld = button.classList.contains("held");
+      release();
+      if (isHeld && isReady() && performance.now() - begun < HOLD + DELAY) act();
+    }, HOLD);
+  };
+  button.addEventListener("pointerdown", (event) => event.button === 0 && event.isPrimary && hold());
+  for (const end of ["pointerup", "pointerleave", "pointercancel", "blur", "keyup"]) button.addEventListener(end, () => release(button));
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("keydown", (event) => {
+    if (event.key !== " " && event.key !== "Enter") return;
+    event.preventDefault();
+    if (!event.repeat) hold();
+  });
 }
 
 /** A drag of Rx fills the form; a mission without sites can only move it along the line. */
@@ -173,13 +198,8 @@ byId("form").addEventListener("submit", (event) => {
   preview();
 });
 byId("form").addEventListener("input", edited);
-const button = byId("hold");
-button.addEventListener("pointerdown", (event) => event.button === 0 && event.isPrimary && hold());
-for (const end of ["pointerup", "pointerleave", "pointercancel", "blur", "keyup"]) button.addEventListener(end, release);
-for (const [target, end] of [[window, "blur"], [document, "visibilitychange"]]) target.addEventListener(end, release);
-button.addEventListener("contextmenu", (event) => event.preventDefault());
-button.addEventListener("keydown", (event) => {
-  if (event.key !== " " && event.key !== "Enter") return;
-  event.preventDefault();
-  if (!event.repeat) hold();
-});
+holdable(byId("hold"), () => {
+  const { number, digest } = desk.state;
+  return () => isReady() && number === desk.state.number && digest === desk.state.digest;
+}, upload);
+for (const [target, end] of [[window, "blur"], [document, "visibilitychange"]]) target.addEventListener(end, () => release());

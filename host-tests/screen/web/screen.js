@@ -110,8 +110,8 @@ function show(snapshot) {
   map.take(snapshot);
   profile.take(snapshot);
   table(snapshot);
-  alarms.take(snapshot.alarms);
   takeDesk(snapshot);
+  alarms.take(snapshot.alarms);
   received.first ||= performance.now();
   connection();
 }

@@ -62,7 +62,7 @@ fn run(vehicle: &mut Vehicle, relay: &mut Relay, ms: u64) -> Vec<Placement> {
         let (is_news, position) = vehicle.link.exchange(relay, now);
         // Control before the position: the first position of an engaged drone is where its relay starts.
         expected.handle_control(now, vehicle.link.is_flown());
-        expected.report_control(vehicle.link.state());
+        expected.report_control(vehicle.link.state(), false);
         if let Some(position) = position {
             assert!(is_news);
             expected.handle_position(now, position.place, position.at);

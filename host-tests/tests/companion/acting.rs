@@ -3,6 +3,8 @@
 use std::io::Read as _;
 use std::time::{Duration, Instant};
 
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 
 use crate::chain::{Chain, Place, simulated};
@@ -49,7 +51,7 @@ impl Page {
 
     fn post(&self, path: &str, body: &Value) -> (u16, String) {
         let mut body = body.clone();
-        if path == "/upload" && body["time_s"].is_null() {
+        if path != "/preview" && body["time_s"].is_null() {
             body["time_s"] = self.newest()["time_s"].take();
         }
         self.sends(path, &body, ["", ""])
@@ -94,9 +96,9 @@ fn chain_with_page() -> (Chain, Relay, Page) {
     }
     chain.lines("converged: ");
     let (tty, signed) = (chain.media[0].tty(2), chain.files.signed("key", "tx"));
-    let socket = chain.files.text("status");
+    let [socket, capture] = ["status", "ground.pcapng"].map(|name| chain.files.text(name));
     let mut station = Relay::ground(&format!(
-        "--of 2 --end tx --shared --stand --web 127.0.0.1:0 --tty {tty} --status-socket {socket} {signed}"
+        "--of 2 --end tx --shared --stand --web 127.0.0.1:0 --tty {tty} --status-socket {socket} {signed} --capture {capture}"
     ));
     let page = Page::open(&mut station);
     (chain, station, page)
@@ -212,6 +214,144 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     }
 }
 
+/// Checks that random previews equal, to the bit, the setpoints that the relays then have.
+///
+/// `COUNT=200 cargo test --test companion acting::random_previews -- --nocapture` uploads 200 missions.
+#[test]
+fn random_previews_are_flown_as_they_were_shown() {
+    let number = |name, default| {
+        std::env::var(name).map_or(default, |it: String| it.parse::<u64>().unwrap())
+    };
+    let (count, seed) = (number("COUNT", 3), number("SEED", 1));
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (mut chain, station, page) = chain_with_page();
+    let (mut flown, mut refused) = (0, 0);
+    while flown < count {
+        let mut body = json!({ "interferer": format!(
+            "{},{:.1},{:.1}",
+            rng.random_range(20..200),
+            rng.random_range(0.0..1_000.0),
+            rng.random_range(150.0..600.0) * [1.0, -1.0][rng.random_range(0..2)],
+        ) });
+        if rng.random_bool(0.5) {
+            body["receiver"] = json!(format!("{:.1},0", rng.random_range(700.0..1_010.0)));
+        }
+        if rng.random_bool(0.5) {
+            body["tx-power"] = json!(format!("{:.2}", rng.random_range(0.5..4.0)));
+        }
+        if rng.random_bool(0.3) {
+            body["uav-power"] = json!(format!("{:.2}", rng.random_range(0.5..4.0)));
+        }
+        if rng.random_bool(0.1) {
+            body["altitude"] = json!("50");
+        }
+        let (status, answer) = page.post("/preview", &body);
+        assert_eq!(status, 200, "{answer}");
+        let number = serde_json::from_str::<Value>(&answer).unwrap()["preview"].take();
+        let begun = Instant::now();
+        let state = snapshots(&page.address)
+            .map(|mut it| it["desk"].take())
+            .find(|it| {
+                assert!(begun.elapsed() < LIMIT, "{it:#}");
+                it["number"] == number && (it["stage"] == "ready" || it["stage"] == "failed")
+            });
+        let state = state.unwrap();
+        if state["stage"] == "failed" {
+            // The limit is named, and the relay that would be farthest outside, if its position is beyond a limit. Rx
+            // beyond the line of the loaded mission is refused by itself.
+            let why = state["fault"].as_str().unwrap();
+            let names = body["altitude"].is_null() || why.contains("farthest outside is relay ");
+            assert!(why.contains("must be within") && names, "{body}: {why}");
+            refused += 1;
+            continue;
+        }
+        assert!(body["altitude"].is_null(), "{body}");
+        let moves = state["preview"]["moves"].as_array().unwrap();
+        let request = json!({ "preview": number, "digest": state["digest"] });
+        assert_eq!(page.post("/upload", &request).0, 200);
+        assert_eq!(page.until("flown")["number"], number);
+        for (relay, moved) in chain.relays.iter_mut().zip(moves) {
+            let to = ["x_m", "y_m", "h_m"].map(|part| f32_bits(&moved["to"][part]));
+            // A setpoint that stays has no new line.
+            while moved["metres"] != 0.0 && crate::process::bits(&relay.line("setpoint: ")) != to {}
+        }
+        flown += 1;
+    }
+    println!("{flown} uploads flown as shown, {refused} refused");
+    station.stopped();
+}
+
+/// Checks that a lost relay is cleared at the station only, and is back at its next report. The capture has the act.
+#[test]
+fn a_lost_relay_is_cleared_from_the_page_until_it_reports_again() {
+    let (mut chain, station, page) = chain_with_page();
+    let numbers = |snapshot: &Value| {
+        let relays = snapshot["relays"].as_array().unwrap().iter();
+        relays
+            .map(|it| it["number"].as_u64().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let lasting = |snapshot: &Value| {
+        let alarms = snapshot["alarms"].as_array().unwrap().iter();
+        alarms.filter(|it| it["cleared_s"].is_null()).count()
+    };
+    let shows = |is_so: &dyn Fn(&Value) -> bool| {
+        let begun = Instant::now();
+        snapshots(&page.address).find(|it| {
+            assert!(begun.elapsed() < LIMIT, "{it:#}");
+            is_so(it)
+        })
+    };
+    shows(&|it| lasting(it) == 0);
+    let refused = page.post("/clear", &json!({ "relay": 2 }));
+    assert_eq!(refused, (409, "relay 2 is not lost".to_owned()));
+    chain.relays.pop().unwrap().stopped();
+    shows(&|it| {
+        it["alarms"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|it| it["lost"] == 2 && it["cleared_s"].is_null())
+    });
+    shows(&|it| it["relays"][1]["age_s"].as_f64().unwrap() > 5.0);
+    // A request of another origin, without the token, or that was held on the way clears nothing.
+    let request = json!({ "relay": 2, "time_s": page.newest()["time_s"] });
+    let foreign = [
+        ["Origin: http://127", "Origin: http://evil.example?127"],
+        ["X-Relay-Token", "X-Other"],
+    ];
+    for change in foreign {
+        assert_eq!(page.sends("/clear", &request, change).0, 403);
+    }
+    let held = json!({ "relay": 2, "time_s": page.newest()["time_s"].as_f64().unwrap() - 6.0 });
+    assert!(
+        page.post("/clear", &held)
+            .1
+            .contains("at most 5 s are allowed")
+    );
+    assert_eq!(numbers(&page.newest()), [1, 2]);
+    assert_eq!(
+        page.post("/clear", &json!({ "relay": 2 })),
+        (200, "{\"relay\":2}".to_owned())
+    );
+    shows(&|it| numbers(it) == [1] && lasting(it) == 0);
+    // Replayed, and at the socket: it is not lost any more.
+    assert_eq!(page.post("/clear", &json!({ "relay": 2 })).0, 409);
+    let socket = chain.files.path("status");
+    let told = answer(&socket, "clear-lost 2\n", false);
+    assert!(told.contains("relay 2 is not lost"), "{told}");
+    let signed = chain.files.signed("key", "epoch2b");
+    std::fs::remove_file(chain.files.path("epoch2")).ok();
+    let relay = chain.relay(2, &signed);
+    chain.relays.push(relay);
+    shows(&|it| numbers(it) == [1, 2] && it["relays"][1]["age_s"].as_f64().unwrap() < 5.0);
+    station.stopped();
+    let capture = std::fs::read(chain.files.path("ground.pcapng")).unwrap();
+    let act = b"operator: clear-lost 2 by the page at 127.0.0.1";
+    let acts = capture.windows(act.len()).filter(|it| it == act).count();
+    assert_eq!(acts, 1);
+}
+
 #[test]
 fn requests_without_their_secrets_do_not_reach_the_chain() {
     let (mut chain, station, page) = chain_with_page();
@@ -317,13 +457,18 @@ fn the_status_socket_takes_the_same_tasks() {
             said["text"].as_str().unwrap().to_owned(),
         )
     };
-    let usage = "must be empty (reads the state) or, for a station with --stand, `preview NAME=VALUE ...` or `upload NUMBER DIGEST`";
+    let usage = "must be `preview NAME=VALUE ...`, `upload NUMBER DIGEST` or `clear-lost NUMBER`, which need a station with --stand, or empty to read the state";
     for line in ["land", "preview altitude", "upload 1", "upload x 0x1"] {
         assert_eq!(
             commanded(line),
             (false, format!("command {line:?}: {usage}"))
         );
     }
+    let refused = commanded("clear-lost 1");
+    assert!(
+        !refused.0 && refused.1.contains("start the station with --web"),
+        "{refused:?}"
+    );
     let refused = commanded("preview land=1");
     assert!(
         refused.1.contains("unexpected argument '--new-land'"),

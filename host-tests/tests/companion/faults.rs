@@ -91,8 +91,18 @@ const SCRIPT: [&[Fault]; 14] = [
     ],
     &[("stop", 5, LOST, "relay # toward")],
     &[("epoch", 6, LOST, "relay # has started with an epoch")],
-    &[("key", 3, LOST, "relay # signs with another key")],
-    &[("mission", 7, LOST, "relay # has another mission")],
+    &[(
+        "key",
+        3,
+        "critical relay # signs with another key",
+        "relay # signs with another key",
+    )],
+    &[(
+        "mission",
+        7,
+        "warning relay # has another mission",
+        "relay # has another mission",
+    )],
     &[("no quorum", 0, "critical no quorum", "no quorum  ")],
 ];
 
@@ -331,8 +341,8 @@ impl Stage {
         self.flown[relay - 1].drone.order(order);
     }
 
-    fn kill(&self, relay: usize) {
-        self.flown[relay - 1].relay.signal(Signal::KILL);
+    fn kill(&mut self, relay: usize) {
+        self.flown[relay - 1].relay.killed();
     }
 
     fn restart(&mut self, relay: usize, more: &str) {

@@ -157,6 +157,12 @@ impl Relay {
         Pid::from_child(&self.child)
     }
 
+    /// Kills the process, and waits until its files and ports are free.
+    pub(crate) fn killed(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
     /// Waits until the process exits. Returns its exit status and its lines.
     pub(crate) fn end(mut self) -> Ended {
         wait_until(|| self.child.try_wait().unwrap().is_some());

@@ -104,7 +104,7 @@ fn the_last_state_reaches_the_station() {
                 if rng.random_bool(0.5) {
                     let state = STATES[rng.random_range(0..5)];
                     *control = Some(state);
-                    chain.input(now, relay, |it| it.report_control(state));
+                    chain.input(now, relay, |it| it.report_control(state, false));
                 } else {
                     let at = Instant::from_micros(now.as_micros() - rng.random_range(0..300_000));
                     let given = place(&mut rng);
@@ -148,8 +148,66 @@ fn begins_alarm(before: State, now: State) -> bool {
     before != now && (matches!(now, State::Silent | State::Blind) || before == State::Engaged)
 }
 
-/// Checks that the station knows of each new alarm in time. Missions are uploaded, so that the chain often agrees on new positions
-/// meanwhile.
+/// Checks that eight drones that lose their positions at once, as by a jammer, are known in time although their reports
+/// collide.
+#[test]
+fn alarms_of_all_relays_at_once_are_known_in_time() {
+    let (mut delays_s, mut lasts_s, mut most) = (Vec::new(), Vec::new(), 0.0_f64);
+    for seed in 1..=10 {
+        let span = [s(60), s(160)];
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
+        setup.seed = seed;
+        let mut chain = Chain::new(setup).unwrap();
+        let mut figures = Figures::default();
+        let mut now = span[0];
+        chain.advance(now);
+        for turn in 0..10 {
+            let state = [State::Blind, State::Engaged][turn % 2];
+            let begun = now;
+            let mut at: Vec<(Instant, u16)> = (1..=8)
+                .map(|relay| (now + ms(rng.random_range(0..200)), relay))
+                .collect();
+            at.sort();
+            let mut shown_s = [None; 8];
+            while now < begun + ms(10_000) {
+                while let Some((_, relay)) = at.first().filter(|(from, _)| *from <= now) {
+                    chain.input(now, *relay, |it| it.report_control(state, false));
+                    at.remove(0);
+                }
+                now = now + ms(20);
+                chain.advance(now);
+                figures.frames.extend(chain.frames(now));
+                for (shown_s, relay) in shown_s.iter_mut().zip(1..) {
+                    if report(&chain, relay).is_some_and(|it| it.control == Some(state)) {
+                        shown_s.get_or_insert(seconds(now.since(begun)));
+                    }
+                }
+            }
+            if turn > 1 && state == State::Blind {
+                let all = shown_s.map(|it| it.unwrap_or(10.0));
+                lasts_s.push(quantile(&all, 1.0));
+                delays_s.extend(all);
+            }
+        }
+        most = most.max(figures.most_bytes(span));
+    }
+    let [delay_s, last_s] =
+        [&delays_s, &lasts_s].map(|all| [0.5, 0.95, 1.0].map(|share| quantile(all, share)));
+    println!(
+        "{} alarms of eight relays at once, collisions: known after (50 %, 95 %, most) {delay_s:.2?} s, all eight {last_s:.2?} s; {:.1} % of the rate",
+        lasts_s.len(),
+        100.0 * most / RATE
+    );
+    assert!(
+        delay_s[1] <= 2.0 && last_s[1] <= 3.0,
+        "{delay_s:?} {last_s:?}"
+    );
+    assert!(most <= 0.105 * RATE, "{most}");
+}
+
+/// Checks the time until the station knows that an alarm has begun. Missions are uploaded, so that the chain often agrees
+/// on new positions meanwhile.
 #[test]
 fn alarms_are_known_in_time() {
     let (mut delays_s, mut ages_s, mut most) = (Vec::new(), Vec::new(), 0.0_f64);
@@ -172,7 +230,7 @@ fn alarms_are_known_in_time() {
         let mut now = s(50);
         chain.advance(now);
         for relay in 1..=8 {
-            chain.input(now, relay, |it| it.report_control(State::Engaged));
+            chain.input(now, relay, |it| it.report_control(State::Engaged, false));
         }
         now = span[0];
         chain.advance(now);
@@ -190,7 +248,7 @@ fn alarms_are_known_in_time() {
                 let index = [rng.random_range(0..8), 7][rng.random_range(0..2)];
                 let state = STATES[rng.random_range(0..5)];
                 let before = core::mem::replace(&mut states[index], state);
-                chain.input(now, index as u16 + 1, |it| it.report_control(state));
+                chain.input(now, index as u16 + 1, |it| it.report_control(state, false));
                 if before != state {
                     begun[index] = begins_alarm(before, state).then_some(now);
                 }

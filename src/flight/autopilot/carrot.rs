@@ -404,7 +404,12 @@ impl Target {
         }
         let before = self.other_targets;
         self.other_targets = before.saturating_add(1);
-        before < REFUSED_AFTER && self.other_targets >= REFUSED_AFTER
+        before < REFUSED_AFTER && self.is_refused()
+    }
+
+    /// Returns true while the autopilot reports another target.
+    pub(super) const fn is_refused(self) -> bool {
+        self.other_targets >= REFUSED_AFTER
     }
 
     /// Schedules the next target after the drone's own position was sent as the target to a waiting PX4. A PX4

@@ -888,7 +888,7 @@ impl Autopilot {
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
         #[cfg(feature = "telemetry")]
-        relay.report_control(self.state());
+        relay.report_control(self.state(), self.target.is_some_and(Target::is_refused));
         let position = self.poll_position();
         if let Some(Position { at, place, .. }) = position {
             relay.handle_position(now, place, at);

@@ -142,6 +142,7 @@ impl Node {
         let distance = from.abs_diff(self.member.node);
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.should_report_mismatch(distance, now) {
+            self.reporting.handle_refusal(&self.member);
             self.raise_node_event(NodeEvent::Mission, side, from);
         }
     }
@@ -264,6 +265,7 @@ impl Node {
             .at_mut(side)
             .should_report_forged(distance)
         {
+            self.reporting.handle_refusal(&self.member);
             self.raise_node_event(NodeEvent::Key, side, from);
         }
     }

@@ -7,6 +7,7 @@ use crate::node::round::state::Phase;
 use crate::side::Side;
 use crate::stats::bump;
 use crate::time::{Duration, Instant};
+use crate::wire::CANDIDATES;
 use crate::wire::message::Message;
 
 impl Node {
@@ -21,6 +22,12 @@ impl Node {
         } else if !(self.reporting).handle(now, &self.member, (side, from), message) {
             bump(&mut self.telemetry.stats.stale);
         }
+    }
+
+    /// Records the drone's control state, from 1. See [`Reporting::handle_control`](crate::node::reports::Reporting).
+    #[cfg(feature = "telemetry")]
+    pub(crate) fn report_control(&mut self, control: u16) {
+        self.reporting.handle_control(&self.member, control);
     }
 
     /// Records that a frame of node `from` was received on the shared channel, whatever its destination.
@@ -71,8 +78,17 @@ impl Node {
         let ([a, b], [c, d]) = (sides.map(hold), sides.map(silent));
         let holds_lease = u16::from(self.lease().is_some());
         let is_duplicated = u16::from(self.duplicate.is_observed(now, &self.member.settings));
-        let flags = 512 * (c + 2 * d + 4 * holds_lease) + 24_576 * is_duplicated;
+        let flags = 512 * (c + 2 * d + 4 * holds_lease) + 28_672 * is_duplicated;
         let state = self.phase() as u16 + 8 * a + 64 * b + flags;
-        (state, [self.setpoint(), self.agreed_place()])
+        let [before, after] = sides.map(|side| self.layers.neighbours.at(side).refused(now));
+        let mut refusals = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
+        // A mission is refused by its signed digest; the other key may be a forger's.
+        let refusal = refusals.find_map(|((before, after), kind)| match (before, after) {
+            (0, 0) => None,
+            (before, after) if after == 0 || before != 0 && before <= after => Some(kind + before),
+            (_, after) => Some(kind + CANDIDATES + after),
+        });
+        let refusal = refusal.unwrap_or(0);
+        ([state, refusal], [self.setpoint(), self.agreed_place()])
     }
 }

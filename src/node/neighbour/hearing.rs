@@ -31,6 +31,14 @@ impl ConsecutiveCounts {
         *times = times.saturating_add(1).min(most);
         reached
     }
+
+    /// Returns the distance of the nearest node with `most` events in a row; 0 for none.
+    pub(super) fn nearest(self, most: u8) -> u16 {
+        let mut nodes = (1..).zip(self.0);
+        nodes
+            .find_map(|(distance, times)| (times >= most).then_some(distance))
+            .unwrap_or(0)
+    }
 }
 
 /// Set of nodes on one side that have been received recently.
@@ -66,6 +74,14 @@ impl ReportLimiter {
         let new = mask(distance) & !self.nodes;
         self.nodes |= new;
         new != 0
+    }
+
+    /// Returns the distance of the nearest node that was reported in the last two minutes; 0 for none.
+    pub(super) fn nearest(&self, now: Instant) -> u16 {
+        let is_old = self.nodes == 0 || now.since(self.since) >= MINUTE.times(2);
+        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        let distance = self.nodes.trailing_zeros() as u16 + 1;
+        if is_old { 0 } else { distance }
     }
 }
 

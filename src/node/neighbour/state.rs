@@ -721,6 +721,12 @@ impl Neighbour {
         self.mismatches.should_report(distance, now)
     }
 
+    /// Returns the distances of the nearest node that was reported for another mission in the last two minutes, and of
+    /// the nearest node whose last handshakes were signed with another key; 0 for none.
+    pub(crate) fn refused(&self, now: Instant) -> [u16; 2] {
+        [self.mismatches.nearest(now), self.forged.nearest(FORGED)]
+    }
+
     /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true, once,
     /// when [`FORGED`] such handshakes were received in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {

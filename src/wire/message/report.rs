@@ -16,7 +16,10 @@ const MOST_ENTRIES: usize = 4;
 const UNKNOWN: i32 = -(1 << 23);
 
 /// Number of values of a relay's combined state: see [`Entry::state`].
-const STATES: u16 = 49_152;
+const STATES: u16 = 57_344;
+
+/// Number of values of [`Entry::refusal`]: none, and for another mission and another key four toward Tx, four toward Rx.
+const REFUSALS: u16 = 17;
 
 /// Upper 16 bits of the largest finite f32.
 const LARGEST: u16 = 0x7F7F;
@@ -71,9 +74,10 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Creates an entry on relay `relay`, whose state is `age` tenths of a second old.
+    /// Creates an entry on a relay, whose state is `age` tenths of a second old.
     ///
-    /// `state` combines its phase, hold reasons, control state and flags: see [`Entry::state`].
+    /// `relay` is its number, plus 1000 times its [refusal](Entry::refusal). `state` combines its phase, hold reasons,
+    /// control state and flags: see [`Entry::state`].
     pub const fn new(relay: u16, age: u8, state: u16, at: Coarse) -> Self {
         Self {
             relay: Word::new(relay),
@@ -95,20 +99,27 @@ impl Entry {
 
     /// Returns the node number of the relay in the mission, 1 to N.
     pub const fn relay(&self) -> u16 {
-        self.relay.number()
+        self.relay.number() - MAX_RELAYS * self.refusal()
+    }
+
+    /// Returns the direction and distance of the nearest node that the relay refuses for another mission; 0 for none.
+    ///
+    /// 1 to 4: so many numbers toward Tx; 5 to 8: 1 to 4 numbers toward Rx. 9 to 16: the same for another key.
+    pub const fn refusal(&self) -> u16 {
+        self.relay.number().saturating_sub(1) / MAX_RELAYS
     }
 
     /// Returns the relay's combined state as one number. Its digits are the phase, two hold reasons, flags, the
     /// control state and a flag.
     ///
-    /// Their units are 1, 8, 64, 512, 4096 and 24576.
+    /// Their units are 1, 8, 64, 512, 4096 and 28672.
     pub const fn state(&self) -> u16 {
         self.state.number()
     }
 
     /// Returns the control state of the drone, from 1; 0 without an autopilot.
     pub(crate) const fn control(&self) -> u16 {
-        self.state.number() / 4096 % 6
+        self.state.number() / 4096 % 7
     }
 }
 
@@ -200,8 +211,9 @@ impl Reports {
             before.max(after) <= CANDIDATES && detail.power.number() <= LARGEST
         };
         let mut entries = report.entries.iter();
-        let are_sound = entries
-            .all(|entry| (1..=MAX_RELAYS).contains(&entry.relay()) && entry.state() < STATES);
+        let are_sound = entries.all(|entry| {
+            (1..=REFUSALS * MAX_RELAYS).contains(&entry.relay.number()) && entry.state() < STATES
+        });
         if are_sound && report.detail.is_none_or(is_sound) {
             Ok(report)
         } else {

@@ -332,6 +332,7 @@ fn only_alarms_that_last_sound_and_are_in_the_title() {
         urgency,
         text: format!("alarm {number}"),
         cleared_s,
+        lost: None,
     };
     let shown = Shown::begin(move || Snapshot {
         alarms: vec![
@@ -457,6 +458,78 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     // The browser reports each refused request.
     let errors = browser.errors();
     assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
+}
+
+/// Checks that the button of a lost relay's alarm, held for 1 s, sends one request, and that a refusal is shown.
+#[test]
+fn a_lost_relay_is_cleared_by_a_button_that_is_held() {
+    let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None, None).unwrap();
+    let is_cleared = Arc::new(AtomicBool::new(false));
+    let (is_gone, mut second) = (Arc::clone(&is_cleared), 0);
+    let shown = Shown::on(screen, move || {
+        second += 1;
+        let cleared_s = is_gone.load(Ordering::Relaxed).then_some(9.0);
+        let alarm = |number, lost, text: String| Alarm {
+            number,
+            time_s: 1.0,
+            urgency: Urgency::Critical,
+            text,
+            cleared_s,
+            lost,
+        };
+        let mut snapshot = full(5, 8.0);
+        // The text of another alarm changes all the time.
+        let silent = alarm(2, None, format!("nothing received for {second} s"));
+        snapshot.alarms = vec![
+            alarm(1, Some(3), "relay 3 lost: reported by relay 2".to_owned()),
+            silent,
+        ];
+        snapshot
+            .relays
+            .retain(|it| cleared_s.is_none() || it.number != 3);
+        snapshot
+    });
+    let mut browser = Browser::start(&shown.screen.url(), 390, 844);
+    browser.until(&shows(6));
+    browser.until("document.querySelector('[data-clear]') !== null");
+    let buttons = browser.value("document.querySelectorAll('[data-clear]').length");
+    assert_eq!(buttons, 1);
+    let over = "document.documentElement.scrollWidth - window.innerWidth";
+    assert!(number(&mut browser, over) <= 0.0);
+    let press = "document.querySelector('[data-clear]').dispatchEvent(new PointerEvent('pointerdown', { isPrimary: true }))";
+    // Neither a click nor a short press clears it.
+    browser.run("document.querySelector('[data-clear]').click()");
+    browser.run(press);
+    thread::sleep(Duration::from_millis(600));
+    browser
+        .run("document.querySelector('[data-clear]').dispatchEvent(new PointerEvent('pointerup'))");
+    thread::sleep(Duration::from_millis(800));
+    assert!(posts.try_recv().is_err(), "clicked, and held for 0.6 s");
+    save("clear", &browser.screenshot());
+    for is_refused in [true, false] {
+        let begun = Instant::now();
+        browser.run(press);
+        let task = posts.recv_timeout(Duration::from_secs(20)).unwrap();
+        assert!(begun.elapsed() > Duration::from_millis(950));
+        assert_eq!(
+            (task.task, &task.body[..]),
+            (Task::Clear, "{\"relay\":3,\"time_s\":8}")
+        );
+        if is_refused {
+            task.reply(Err("relay 3 is not lost".to_owned()));
+            browser
+                .until("byId('clear-state').textContent.includes('Refused: relay 3 is not lost')");
+        } else {
+            is_cleared.store(true, Ordering::Relaxed);
+            task.reply(Ok("{\"relay\":3}".to_owned()));
+            browser.until("byId('clear-state').textContent === ''");
+        }
+    }
+    browser.until("document.querySelector('[data-clear]') === null && alarms.lasting.length === 0");
+    browser.until(&shows(5));
+    let names = browser
+        .text("[...document.querySelectorAll('#rows th')].map((it) => it.textContent).join()");
+    assert_eq!(names, "1,2,4,5,Rx");
 }
 
 #[test]
@@ -1003,6 +1076,7 @@ fn the_page_has_no_serious_fault_of_accessibility() {
         urgency,
         text: format!("relay {number} lost: reported by relays 2 and 4"),
         cleared_s,
+        lost: None,
     };
     let shown = Shown::begin(move || Snapshot {
         alarms: vec![

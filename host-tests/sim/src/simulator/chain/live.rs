@@ -89,6 +89,9 @@ impl Chain {
                 neighbours: relay.neighbours(),
                 silent: [false; 2],
                 is_duplicated: false,
+                refuses_setpoint: false,
+                other_mission: None,
+                other_key: None,
                 interference_w: None,
                 version: relay.version(),
             };
