@@ -290,7 +290,7 @@ fn clear(now: Instant, parts: &mut Parts<'_>, body: &str) -> Result<String, Stri
     check_age(now, asked.time_s)?;
     let web = parts.web.as_mut();
     let web = web.ok_or("there is no page with the relay: start the station with --web")?;
-    web.clear(now, asked.relay)?;
+    web.clear(now, asked.relay, parts.ground)?;
     Ok(json!({ "relay": asked.relay }).to_string())
 }
 

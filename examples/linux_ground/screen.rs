@@ -82,8 +82,13 @@ impl Web {
     ///
     /// # Errors
     /// The reason if the relay is not lost.
-    pub(crate) fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
-        self.view.clear(now, relay)
+    pub(crate) fn clear(
+        &mut self,
+        now: Instant,
+        relay: u16,
+        ground: &Ground,
+    ) -> Result<(), String> {
+        self.view.clear(now, relay, ground.reports())
     }
 
     /// Shows a snapshot if it is time for the next one. Returns the time of the next snapshot. The function does not

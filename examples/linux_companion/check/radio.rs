@@ -19,7 +19,7 @@ use uav_relay::guard::Fence;
 use uav_relay::serial::SerialPort as _;
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame::{Header, open};
-use uav_relay::wire::message::Message;
+use uav_relay::wire::message::{Entry, Message};
 use uav_relay::{
     Auth, Departure, Duration, Event, Instant, MAX_FRAME, Placement, Port, Relay, Settings, Stats,
 };
@@ -248,9 +248,7 @@ impl Radio {
         heard.received = Some(now);
         if let Content::Message(Message::Report(reports)) = &content {
             for entry in &reports.entries {
-                // Its drone is in the air: `Standby`, `Engaged` or `Blind`.
-                self.heard.entry(entry.relay()).or_default().flies |=
-                    entry.state() / 4_096 % 6 >= 3;
+                self.heard.entry(entry.relay()).or_default().flies |= is_in_air(entry);
             }
             return;
         }
@@ -424,6 +422,11 @@ impl Content {
     }
 }
 
+/// Returns true if the drone of a report's entry is in the air: standby, engaged or blind.
+const fn is_in_air(entry: &Entry) -> bool {
+    entry.control() >= 3
+}
+
 /// Returns header and content of an intact frame; `None` for a damaged frame.
 fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
     let mut deframer = Deframer::new();
@@ -440,4 +443,24 @@ fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
         Content::Message(Message::decode(opened.body).ok()?)
     };
     Some((opened.header, content))
+}
+
+#[cfg(test)]
+mod tests {
+    use uav_relay::wire::message::{Coarse, Entry};
+
+    use super::is_in_air;
+
+    /// Checks every control state, without and with the flag that another node has the relay's number.
+    #[test]
+    fn a_report_says_if_the_drone_is_in_the_air() {
+        let states = [false, false, false, true, true, true, true];
+        for (control, expected) in (0..).zip(states) {
+            for duplicated in [0, 28_672] {
+                let state = 4_095 + 4_096 * control + duplicated;
+                let entry = Entry::new(3, 0, state, Coarse::of(None));
+                assert_eq!(is_in_air(&entry), expected, "{control} {duplicated}");
+            }
+        }
+    }
 }

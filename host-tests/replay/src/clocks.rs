@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use uav_relay_capture::Direction;
 
-use crate::recording::{Frame, Recording};
+use crate::recording::{Frame, Recording, retain};
 
 /// Length of the time windows, s. For each window one clock offset is computed. Clocks drift by at most 100 ppm, which
 /// is 2 ms in a window.
@@ -193,16 +193,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     frames.sort_by(|one, other| one.at.total_cmp(&other.at));
     // A frame that was captured by several nodes, or replayed by an attacker, counts once.
     let mut known = std::collections::HashSet::new();
-    let comments = frames.iter().filter(|frame| !frame.comment.is_empty());
-    let comments = comments.map(|frame| (frame.wire.clone(), frame.comment.clone()));
-    let mut comments: HashMap<_, _> = comments.collect();
-    frames.retain_mut(|frame| {
-        // The comment may be in the file of another node.
-        if let Some(comment) = comments.remove(&frame.wire) {
-            frame.comment = comment;
-        }
-        known.insert(frame.wire.clone())
-    });
+    retain(&mut frames, "", |it| known.insert(it.wire.clone()));
     // Another clock may step after its last common frame.
     if let Some(steps) = without_steps(&mut frames) {
         warnings.push(format!("the time of the flight jumps {steps}: corrected"));

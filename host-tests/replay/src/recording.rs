@@ -25,8 +25,35 @@ pub struct Frame {
     pub header: Header,
     /// Message of the frame; `None` for a handshake, and for a message that no relay accepts.
     pub message: Option<Message>,
-    /// Comment on the frame: acts of the operator at the ground station. Empty without a comment.
+    /// Comment on the frame: acts of the operator at the ground station, and those on packets that are left out before it.
+    /// Empty without a comment.
     pub comment: String,
+}
+
+/// Adds `more` to a comment.
+fn join(comment: &mut String, more: &str) {
+    if !comment.is_empty() && !more.is_empty() {
+        comment.push_str("; ");
+    }
+    comment.push_str(more);
+}
+
+/// Leaves frames out of `frames`. The comment on such a frame goes to the next one that is kept; at the end, with
+/// `last`, a comment on what follows, to the last one.
+pub(crate) fn retain(frames: &mut Vec<Frame>, last: &str, mut is_kept: impl FnMut(&Frame) -> bool) {
+    let mut acts = String::new();
+    frames.retain_mut(|frame| {
+        join(&mut acts, &std::mem::take(&mut frame.comment));
+        let is_kept = is_kept(frame);
+        if is_kept {
+            frame.comment = std::mem::take(&mut acts);
+        }
+        is_kept
+    });
+    join(&mut acts, last);
+    if let Some(frame) = frames.last_mut() {
+        join(&mut frame.comment, &acts);
+    }
 }
 
 /// Frames of one capture file, in the order of the file.
@@ -54,11 +81,17 @@ impl Recording {
         let unread = |error: std::io::Error| format!("{name}: cannot be read: {error}");
         let input = File::open(file).map_err(unread)?;
         let (mut frames, mut all, mut is_stream) = (Vec::new(), 0_usize, false);
+        let mut acts = String::new();
         let ended = read(BufReader::new(input), |item| {
             if let Item::Packet(packet) = item {
                 all += 1;
                 is_stream |= packet.at.is_none();
-                frames.extend(frame(&packet));
+                // A packet without an intact frame may have an act of the operator, too.
+                join(&mut acts, packet.comment);
+                if let Some(frame) = frame(&packet) {
+                    let comment = std::mem::take(&mut acts);
+                    frames.push(Frame { comment, ..frame });
+                }
                 // A long file without times is not read to its end.
                 return if is_stream { Err(()) } else { Ok(()) };
             }
@@ -82,7 +115,7 @@ impl Recording {
                 }
             });
         };
-        frames.retain(|it| it.header.network == network);
+        retain(&mut frames, &acts, |it| it.header.network == network);
         let mission = most(frames.iter().filter_map(|it| loaded(it.message.as_ref()?)));
         Ok(Self {
             name,
@@ -115,7 +148,7 @@ fn frame(packet: &Packet<'_>) -> Option<Frame> {
         wire: packet.wire.to_vec(),
         header,
         message: Message::decode(body).ok().filter(|_| !handshake),
-        comment: packet.comment.to_owned(),
+        comment: String::new(),
     })
 }
 

@@ -144,6 +144,40 @@ fn a_relay_that_the_operator_cleared_is_gone_until_it_reports_again() {
     assert!((acts[2].time_s - 60.0).abs() < 1.0);
 }
 
+/// Checks that no act is lost or moved far, whatever copies of its frame there are.
+#[test]
+fn acts_of_the_operator_stay_at_their_time_and_are_all_kept() {
+    let seconds = || (0..100).map(f64::from);
+    let mut station = recording(1, seconds());
+    let mut other = recording(1, seconds().map(|at| at + 0.01));
+    other.frames[30].at += 0.02;
+    // A repeated frame of second 10 has an act, as the last frame of all has.
+    let mut repeated = station.frames[10].clone();
+    repeated.at = 60.5;
+    "operator: clear-lost 3 by one".clone_into(&mut repeated.comment);
+    station.frames.insert(61, repeated);
+    let mut late = station.frames[10].clone();
+    late.at = 99.5;
+    "operator: clear-lost 4 by one".clone_into(&mut late.comment);
+    station.frames.push(late);
+    // Both stations have one at the same frame.
+    "operator: upload 1 by one".clone_into(&mut station.frames[30].comment);
+    "operator: upload 2 by other".clone_into(&mut other.frames[30].comment);
+    let merged = clocks::merge(vec![station, other]).unwrap();
+    assert_eq!(merged.frames.len(), 100);
+    let acts = merged.frames.iter().filter(|it| !it.comment.is_empty());
+    let acts: Vec<(f64, &str)> = acts.map(|it| (it.at.round(), &it.comment[..])).collect();
+    assert_eq!(
+        acts,
+        [
+            (30.0, "operator: upload 1 by one"),
+            (31.0, "operator: upload 2 by other"),
+            (61.0, "operator: clear-lost 3 by one"),
+            (99.0, "operator: clear-lost 4 by one"),
+        ]
+    );
+}
+
 #[test]
 fn a_near_pass_between_two_snapshots_is_found() {
     let times = [0.0, 10.0, 10.25, 10.5, 20.0];

@@ -150,6 +150,41 @@ fn sender(wire: &[u8]) -> u16 {
 
 const EPOCH: f64 = 1.8e9;
 
+/// Checks that an act of the operator on a damaged packet is at the next frame, and one after all frames at the last.
+#[test]
+fn an_act_on_a_damaged_packet_is_kept() {
+    let flown = fly(2, false, 10, None);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("station.pcapng");
+    let mut capture = Capture::new(std::fs::File::create(&path).unwrap(), "", "").unwrap();
+    let port = capture.interface("", "").unwrap();
+    let mut put = |number: usize, is_damaged: bool, comment: &str| {
+        let mut bytes = flown.frames[number].bytes.clone();
+        bytes[9] ^= if is_damaged { 0x55 } else { 0 };
+        let frame = Frame {
+            at: Duration::from_secs(number as u64),
+            bytes: &bytes,
+            len: bytes.len(),
+            direction: Direction::In,
+            comment,
+        };
+        capture.frame(port, &frame).unwrap();
+    };
+    put(0, false, "");
+    put(1, true, "operator: one");
+    put(2, true, "");
+    put(3, false, "operator: two");
+    put(4, false, "");
+    put(5, true, "operator: three");
+    capture.finish().unwrap();
+    let read = Recording::load(&path).unwrap().frames;
+    let read: Vec<&str> = read.iter().map(|it| &it.comment[..]).collect();
+    assert_eq!(
+        read,
+        ["", "operator: one; operator: two", "operator: three"]
+    );
+}
+
 #[test]
 fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
     let flown = fly(3, false, 150, None);

@@ -1,5 +1,7 @@
 //! Snapshot of a chain from the reports of its relays.
 
+use std::collections::BTreeMap;
+
 use uav_relay::flight::autopilot::state::State;
 use uav_relay::flight::axis::Axis;
 use uav_relay::{
@@ -14,6 +16,9 @@ use crate::snapshot::{
 
 /// Age of a report from which its relay counts as silent.
 pub const SILENT_AFTER: uav_relay::Duration = uav_relay::Duration::from_millis(5_000);
+
+/// Largest difference between the node numbers of two neighbours.
+const REACH: u16 = 4;
 
 /// Converts a time to seconds.
 pub fn seconds(at: Instant) -> f64 {
@@ -44,18 +49,24 @@ impl Chain<'_> {
     ///
     /// A relay is lost if its report is old, and another relay has reported it as lost, by `alarms`. A relay is also lost
     /// while the alarm about its missing reports lasts, if it had neighbours, and another relay reports a neighbour
-    /// beyond it, or itself as the last relay before Tx or Rx, [`SILENT_AFTER`] later. The relays `cleared`, which have no report, are not part of the snapshot.
+    /// beyond it, or itself as the last relay before Tx or Rx and at most four numbers away, [`SILENT_AFTER`] later. The
+    /// relays `cleared`, which have no report, are not part of the snapshot.
+    ///
+    /// `changed` are the times of the first reports of the relays' present neighbours, by relay: not every report has
+    /// neighbours. Without an entry they are as old as the report.
     pub fn snapshot(
         &self,
         now: Instant,
         reports: &[Report],
         alarms: &Alarms,
         cleared: &[u16],
+        changed: &BTreeMap<u16, Instant>,
     ) -> Snapshot {
         let is_skipped = |report: &Report| {
-            let mut later = reports
-                .iter()
-                .filter(|by| by.at.since(report.at) >= SILENT_AFTER);
+            let mut later = reports.iter().filter(|by| {
+                let at = changed.get(&by.relay).unwrap_or(&by.at);
+                *at >= report.at && by.at.since(report.at) >= SILENT_AFTER
+            });
             let is_closed =
                 later.any(|by| has_beyond(by, report.relay) || self.is_end(by, report.relay));
             is_closed && report.neighbours != [None; 2] && alarms.lasts(Reason::Lost, report.relay)
@@ -111,7 +122,8 @@ impl Chain<'_> {
         }
     }
 
-    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`.
+    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`, which it could
+    /// receive.
     fn is_end(&self, by: &Report, number: u16) -> bool {
         let [before, after] = by.neighbours;
         let (toward, away) = if number < by.relay {
@@ -121,7 +133,8 @@ impl Chain<'_> {
         };
         // A relay without details has no neighbours in its report, nor has one outside of the chain.
         let has_others = away.is_some() || self.relays == 2 && by.agreed.is_some();
-        toward.is_none() && has_others && by.relay != number
+        let is_near = (1..=REACH).contains(&number.abs_diff(by.relay));
+        toward.is_none() && has_others && is_near
     }
 
     fn profile(&self, mission: &Mission, relay: u16) -> Profile {

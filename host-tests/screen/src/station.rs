@@ -11,7 +11,7 @@
 //! | drone not engaged any more, until it is engaged again | warning |
 //! | an agreed position, but no lease for [`SILENT_AFTER`] | warning |
 //! | version of the mission not the chain's newest, for [`SILENT_AFTER`] | warning |
-//! | a relay refuses another one for another mission or key, and no report of that one has come since | warning or critical, one for the refused relay |
+//! | a relay refuses another one for another mission or key, and that one does not report; or reports, but is refused for another mission for `LINGERS` more: a second node has its number | warning or critical, one for the refused relay |
 //! | engaged, and the autopilot flies to another target; or engaged, more than `NEAR_M` from its setpoint without a reason to wait, and no nearer for `STUCK_AFTER` | warning |
 //! | frames rejected by the station in the last `REJECTED_FOR` | notice |
 //!
@@ -46,6 +46,10 @@ const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 /// from the previous setpoint for 10 s.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
+/// Time from the return of a relay after which no relay refuses it any more for the mission that it had before. Relays
+/// report the refusal for up to two minutes after its last cause.
+const LINGERS: Duration = Duration::from_millis(150_000);
+
 /// Distance from a setpoint below which a drone has reached it, m.
 const NEAR_M: f32 = 5.0;
 
@@ -76,6 +80,8 @@ struct Known {
     /// Time when the drone came nearest to its setpoint, and the distance then, m. `None` while the relay does not move
     /// the drone, or the drone has arrived.
     nearest: Option<(Instant, f32)>,
+    /// Time of the first report of the present neighbours.
+    neighbours_at: Instant,
 }
 
 impl Known {
@@ -88,6 +94,7 @@ impl Known {
             unleased_at: None,
             longest_age: Duration::from_micros(0),
             nearest: None,
+            neighbours_at: report.at,
         }
     }
 
@@ -96,6 +103,9 @@ impl Known {
         let before = std::mem::replace(&mut self.report, report);
         let decayed = Duration::from_micros(self.longest_age.as_micros() * 7 / 8);
         self.longest_age = decayed.max(now.since(before.at));
+        if before.neighbours != report.neighbours {
+            self.neighbours_at = report.at;
+        }
         match report.control {
             Some(State::Engaged | State::Blind) => {
                 (self.was_engaged, self.is_released) = (true, false);
@@ -154,7 +164,18 @@ impl Known {
     }
 }
 
-/// State of a chain according to its relays' reports, with the history for alarms and log lines.
+/// Refusal of a relay for another mission or key.
+#[derive(Debug)]
+struct Refused {
+    /// Relays that refuse it.
+    by: Vec<u16>,
+    /// Time of the first report of the refusal.
+    since: Instant,
+    /// Time from which the refused relay has reported without a break; `None` while it does not report.
+    back_at: Option<Instant>,
+}
+
+/// View of a chain by the reports of its relays, with the history that alarms and log lines need.
 #[derive(Debug, Default)]
 pub struct StationView {
     alarms: Alarms,
@@ -163,9 +184,7 @@ pub struct StationView {
     ///
     /// The key of the outer map is the silent relay, the key of the inner map the neighbour.
     claims: BTreeMap<u16, BTreeMap<u16, Instant>>,
-    /// Relays that are refused for another mission or key: the relays that refuse them, and the time of the first such
-    /// report.
-    refused: BTreeMap<(Reason, u16), (Vec<u16>, Instant)>,
+    refused: BTreeMap<(Reason, u16), Refused>,
     /// Lost relays that an operator has cleared, and the times of the acts.
     cleared: BTreeMap<u16, Instant>,
     /// Log lines of the next snapshot.
@@ -189,11 +208,20 @@ impl StationView {
 
     /// Removes a lost relay and its alarm from the snapshots, until a report of its state after `now` arrives.
     ///
+    /// `reports` are reports that have arrived; those of the last snapshot are known.
+    ///
     /// # Errors
     /// The reason if the relay is not lost: it has reported within [`SILENT_AFTER`], or has no alarm that it is lost.
-    pub fn clear(&mut self, now: Instant, relay: u16) -> Result<(), String> {
-        let known = self.known.get(&relay);
-        let is_silent = known.is_some_and(|it| now.since(it.report.at) >= SILENT_AFTER);
+    pub fn clear(
+        &mut self,
+        now: Instant,
+        relay: u16,
+        reports: impl IntoIterator<Item = Report>,
+    ) -> Result<(), String> {
+        let known = self.known.get(&relay).map(|it| it.report);
+        let own = reports.into_iter().chain(known);
+        let newest = own.filter(|it| it.relay == relay).map(|it| it.at).max();
+        let is_silent = newest.is_some_and(|at| now.since(at) >= SILENT_AFTER);
         if !is_silent || !self.alarms.lasts(Reason::Lost, relay) {
             return Err(format!("relay {relay} is not lost"));
         }
@@ -230,10 +258,12 @@ impl StationView {
         self.alarms.settle(seconds(now), lasting);
         let reports: Vec<Report> = self.shown().map(|it| it.report).collect();
         let cleared: Vec<u16> = self.cleared.keys().copied().collect();
+        let changed = self.known.iter();
+        let changed = changed.map(|(number, it)| (*number, it.neighbours_at));
         Snapshot {
             name: Some(format!("Chain of {} relays", chain.relays)),
             log,
-            ..chain.snapshot(now, &reports, &self.alarms, &cleared)
+            ..chain.snapshot(now, &reports, &self.alarms, &cleared, &changed.collect())
         }
     }
 
@@ -316,7 +346,7 @@ impl StationView {
 
     /// Updates the relays that are refused, at the time `now`.
     fn follow_refusals(&mut self, now: Instant) {
-        let mut refused: BTreeMap<(Reason, u16), (Vec<u16>, Instant)> = BTreeMap::new();
+        let mut refused: BTreeMap<(Reason, u16), Refused> = BTreeMap::new();
         let reports = self.known.values().map(|it| it.report);
         for by in reports.filter(|by| now.since(by.at) < SILENT_AFTER.times(2)) {
             let refusals = [
@@ -327,11 +357,23 @@ impl StationView {
                 .into_iter()
                 .filter_map(|(reason, it)| Some((reason, it?)))
             {
-                let before = self.refused.get(&key).map(|it| it.1);
-                let (all, at) = refused.entry(key).or_insert((Vec::new(), by.at));
-                all.push(by.relay);
-                *at = before.unwrap_or_else(|| by.at.min(*at));
+                let before = self.refused.get(&key);
+                let it = refused.entry(key).or_insert_with(|| Refused {
+                    by: Vec::new(),
+                    since: by.at,
+                    back_at: before.and_then(|it| it.back_at),
+                });
+                it.by.push(by.relay);
+                it.since = before.map_or(by.at.min(it.since), |it| it.since);
             }
+        }
+        for ((_, number), it) in &mut refused {
+            let is_back = |known: &Known| {
+                let at = known.report.at;
+                at > it.since && now.since(at) < known.silent_after()
+            };
+            let is_back = self.known.get(number).is_some_and(is_back);
+            it.back_at = is_back.then(|| it.back_at.unwrap_or(now));
         }
         self.refused = refused;
     }
@@ -375,12 +417,13 @@ impl StationView {
             let note = format!(": {rejected} of {all} since its start");
             add(Reason::Rejected, 0, Vec::new(), note);
         }
-        for ((reason, number), (by, since)) in &self.refused {
+        for ((reason, number), it) in &self.refused {
             // Reports of a relay with another mission or key do not reach this station.
-            let is_back = |it: &Known| it.report.at > *since;
-            let is_listed = (1..=chain.relays).contains(number);
-            if is_listed && !self.known.get(number).is_some_and(is_back) {
-                add(*reason, *number, by.clone(), String::new());
+            let lasts = it
+                .back_at
+                .is_none_or(|back_at| *reason == Reason::Mission && now.since(back_at) >= LINGERS);
+            if lasts && (1..=chain.relays).contains(number) {
+                add(*reason, *number, it.by.clone(), String::new());
             }
         }
         for known in self.shown() {

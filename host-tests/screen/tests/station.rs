@@ -26,10 +26,10 @@ mod paper {
 
 const RELAYS: u16 = 5;
 
-/// Returns the report of a relay in a chain without faults.
-fn healthy(relay: u16) -> Report {
+/// Returns the report of a relay of a chain of `relays` relays without faults.
+fn healthy(relay: u16, relays: u16) -> Report {
     let place = Some(Placement::on_line(160.0 * f32::from(relay), 20.0));
-    let next = Some(relay + 1).filter(|it| *it <= RELAYS);
+    let next = Some(relay + 1).filter(|it| *it <= relays);
     Report {
         relay,
         at: Instant::ZERO,
@@ -56,6 +56,7 @@ struct Watched {
     view: StationView,
     relays: BTreeMap<u16, Report>,
     off: BTreeSet<u16>,
+    of: u16,
     mission: Mission,
     second: u64,
     frames: Frames,
@@ -65,11 +66,16 @@ struct Watched {
 
 impl Watched {
     fn new() -> Self {
+        Self::of(RELAYS)
+    }
+
+    fn of(of: u16) -> Self {
         Self {
             view: StationView::default(),
-            relays: (1..=RELAYS).map(|it| (it, healthy(it))).collect(),
+            relays: (1..=of).map(|it| (it, healthy(it, of))).collect(),
             off: BTreeSet::new(),
-            mission: paper::MISSION.with_relays(RELAYS).unwrap(),
+            of,
+            mission: paper::MISSION.with_relays(of).unwrap(),
             second: 0,
             frames: Frames::default(),
             last: Snapshot::default(),
@@ -96,7 +102,7 @@ impl Watched {
         let chain = Chain {
             mission: Some(&self.mission),
             end: Side::Upstream,
-            relays: RELAYS,
+            relays: self.of,
             profiles: &[],
             is_estimated: false,
             axis: None,
@@ -116,7 +122,7 @@ impl Watched {
             "off" => _ = self.off.insert(relay),
             "ok" => {
                 let Report { version, at, .. } = *report;
-                (*report, report.version, report.at) = (healthy(relay), version, at);
+                (*report, report.version, report.at) = (healthy(relay, self.of), version, at);
             }
             "noquorum" => report.phase = Phase::NoQuorum,
             "infeasible" => report.phase = Phase::Infeasible,
@@ -264,7 +270,7 @@ fn the_snapshot_and_the_log_contain_what_is_known_and_nothing_else() {
         Report {
             relay: 9,
             at: Instant::from_millis(900),
-            ..healthy(1)
+            ..healthy(1, RELAYS)
         },
     );
     silent.changes("2:noquorum");
@@ -303,7 +309,7 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
     watched.second();
     let clear = |watched: &mut Watched, relay| {
         let now = Instant::from_millis(1_000 * watched.second);
-        watched.view.clear(now, relay)
+        watched.view.clear(now, relay, [])
     };
     for relay in [0, 3, 9] {
         assert!(clear(&mut watched, relay).is_err(), "{relay} is not lost");
@@ -315,7 +321,17 @@ fn a_lost_relay_that_is_cleared_is_gone_until_it_reports_again() {
     assert!(watched.lasting().contains("relay 3 lost"));
     assert!(clear(&mut watched, 3).is_err());
     (0..4).for_each(|_| watched.second());
-    assert_eq!(clear(&mut watched, 3), Ok(()));
+    // A report that has arrived since the last snapshot counts, too.
+    let now = Instant::from_millis(1_000 * watched.second);
+    let at = Instant::from_millis(1_000 * watched.second - 300);
+    for (relay, is_refused) in [(3, true), (4, false)] {
+        let report = Report {
+            at,
+            ..healthy(relay, RELAYS)
+        };
+        let reply = watched.view.clear(now, 3, [report]);
+        assert_eq!(reply.is_err(), is_refused);
+    }
     let late = watched.relays.get(&3).copied().unwrap();
     for _ in 0..20 {
         watched.second();
@@ -375,4 +391,84 @@ fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() 
         watched.second();
         assert_eq!(watched.condition(lost), Some(Condition::Normal));
     }
+}
+
+/// Checks that details from before a relay's last report do not make it lost: not every report has them.
+#[test]
+fn neighbours_from_before_the_loss_do_not_make_a_relay_lost() {
+    let mut watched = Watched::new();
+    watched.changes("4:nonext 5:off");
+    watched.second();
+    watched.changes("5:ok");
+    watched.second();
+    watched.changes("5:off");
+    (0..20).for_each(|_| watched.second());
+    assert!(watched.lasting().contains("relay 5"));
+    assert_eq!(watched.condition(5), Some(Condition::Normal));
+    // Newer ones do.
+    watched.changes("4:ok");
+    watched.second();
+    watched.changes("4:nonext");
+    watched.second();
+    assert_eq!(watched.condition(5), Some(Condition::Lost));
+}
+
+#[test]
+fn the_last_relay_before_tx_or_rx_is_taken_at_its_word_for_four_numbers() {
+    let mut watched = Watched::of(8);
+    watched.second();
+    watched.changes("45678:off");
+    (0..2).for_each(|_| watched.second());
+    watched.changes("3:nonext");
+    (0..30).for_each(|_| watched.second());
+    let lost: Vec<_> = (1..=8)
+        .filter(|it| watched.condition(*it) == Some(Condition::Lost))
+        .collect();
+    assert_eq!(lost, [4, 5, 6, 7]);
+}
+
+/// Checks both relays of a chain of two: the other one has no neighbour on either side then.
+#[test]
+fn one_of_two_relays_is_lost_once_the_other_one_is_alone() {
+    for (lost, change, hops) in [(1, "2:noback", "Tx-2 2-Rx "), (2, "1:nonext", "Tx-1 1-Rx ")] {
+        let mut watched = Watched::of(2);
+        watched.second();
+        watched.changes(&format!("{lost}:off"));
+        (0..12).for_each(|_| watched.second());
+        // A report without details has neither neighbours nor an agreement.
+        let other = 3 - lost;
+        watched.changes(&format!("{other}:brief"));
+        watched.second();
+        assert_eq!(watched.condition(lost), Some(Condition::Normal));
+        watched.changes(&format!("{other}:ok {change}"));
+        watched.second();
+        assert_eq!(watched.condition(lost), Some(Condition::Lost));
+        assert_eq!(watched.hops(), hops);
+    }
+}
+
+/// Checks that the alarm about another mission is there again when the relay, back in between, does not report, and
+/// when it reports, but its number is refused for longer than the neighbours remember.
+#[test]
+fn the_alarm_of_another_mission_begins_again() {
+    let alarm = "Warning relay 2 has another mission: reported by relays 1 and 3";
+    let mut watched = Watched::new();
+    watched.second();
+    watched.changes("2:off 13:mission2");
+    (0..2).for_each(|_| watched.second());
+    assert!(watched.lasting().contains(alarm), "{}", watched.lasting());
+    watched.changes("2:ok");
+    (0..50).for_each(|_| watched.second());
+    assert_eq!(watched.lasting(), ".");
+    watched.changes("2:off");
+    (0..12).for_each(|_| watched.second());
+    assert!(watched.lasting().contains(alarm), "{}", watched.lasting());
+    watched.changes("2:ok");
+    (0..149).for_each(|_| watched.second());
+    assert_eq!(watched.lasting(), ".");
+    (0..3).for_each(|_| watched.second());
+    assert!(watched.lasting().contains(alarm), "{}", watched.lasting());
+    watched.changes("13:ok");
+    watched.second();
+    assert_eq!(watched.lasting(), ".");
 }

@@ -32,6 +32,8 @@ const alarms = {
 
   take(all) {
     this.all = all;
+    // The text about a refusal is out of date without the alarm.
+    if (!all.some(({ lost, cleared_s: cleared }) => lost === desk.refused && cleared === null)) say("clear-state", "");
     byId("no-alarms").textContent = "No alarm.";
     this.show();
   },

@@ -10,8 +10,8 @@ const DELAY = 300;
 /** Time in which a task has to be answered, ms. A request that the browser or a tunnel holds back is given up. */
 const ANSWER = 4000;
 
-/** `mine` is the number of the preview of the values in the form, or null; `turn` counts edits; `held` is the timer of the button. */
-const desk = { token: null, state: {}, mine: null, turn: 0, held: 0, note: "" };
+/** `mine` is the number of the preview of the values in the form, or null; `turn` counts edits; `held` is the timer of the button; `refused` is the relay that could not be cleared. */
+const desk = { token: null, state: {}, mine: null, turn: 0, held: 0, refused: 0, note: "" };
 
 const metres = (value) => number(value, 1);
 
@@ -69,6 +69,7 @@ async function clear(relay) {
     await post("/clear", { relay, time_s: received.last.time_s });
   } catch (error) {
     text = `Relay ${relay} is not cleared. ${failure(error)}`;
+    desk.refused = relay;
   }
   say("clear-state", text);
 }

@@ -345,11 +345,29 @@ fn a_lost_relay_is_cleared_from_the_page_until_it_reports_again() {
     let relay = chain.relay(2, &signed);
     chain.relays.push(relay);
     shows(&|it| numbers(it) == [1, 2] && it["relays"][1]["age_s"].as_f64().unwrap() < 5.0);
+    // Lost again, it is cleared at the socket.
+    chain.relays.pop().unwrap().stopped();
+    let begun = Instant::now();
+    loop {
+        let told = answer(&socket, "clear-lost 2\n", false);
+        if told.contains("\"done\":true") {
+            break;
+        }
+        assert!(told.contains("relay 2 is not lost"), "{told}");
+        assert!(begun.elapsed() < LIMIT, "{told}");
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    assert!(begun.elapsed() > Duration::from_secs(4));
+    shows(&|it| numbers(it) == [1] && lasting(it) == 0);
+    // The acts are in the capture with the frames that follow.
+    std::thread::sleep(Duration::from_secs(2));
     station.stopped();
     let capture = std::fs::read(chain.files.path("ground.pcapng")).unwrap();
-    let act = b"operator: clear-lost 2 by the page at 127.0.0.1";
-    let acts = capture.windows(act.len()).filter(|it| it == act).count();
-    assert_eq!(acts, 1);
+    for by in ["the page at 127.0.0.1", "user "] {
+        let act = format!("operator: clear-lost 2 by {by}");
+        let acts = capture.windows(act.len());
+        assert_eq!(acts.filter(|it| *it == act.as_bytes()).count(), 1, "{act}");
+    }
 }
 
 #[test]

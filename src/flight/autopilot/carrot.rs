@@ -316,6 +316,8 @@ const AGAIN: Duration = Duration::from_millis(1_000);
 /// Number of consecutive reports of another target after which the sent target counts as refused. An ArduCopter
 /// reports its target twice a second.
 const REFUSED_AFTER: u8 = 6;
+/// Time after the autopilot's last report of its target from which it is unknown which target it has, s.
+const UNKNOWN_AFTER_S: u32 = 10;
 /// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
 
@@ -341,6 +343,8 @@ pub(super) struct Target {
     since: Instant,
     /// Number of consecutive reports in which the autopilot names another target.
     other_targets: u8,
+    /// Time of the last of these reports, s.
+    compared_s: u32,
     /// True once the autopilot has reported any target position in POSITION_TARGET_GLOBAL_INT.
     is_reported: bool,
 }
@@ -355,6 +359,7 @@ impl Target {
             is_accepted: false,
             since: now,
             other_targets: 0,
+            compared_s: 0,
             is_reported: false,
         }
     }
@@ -404,12 +409,14 @@ impl Target {
         }
         let before = self.other_targets;
         self.other_targets = before.saturating_add(1);
-        before < REFUSED_AFTER && self.is_refused()
+        self.compared_s = whole_s(now);
+        before < REFUSED_AFTER && self.is_refused(now)
     }
 
-    /// Returns true while the autopilot reports another target.
-    pub(super) const fn is_refused(self) -> bool {
+    /// Returns true while the autopilot reports another target; false once it has reported none for some seconds.
+    pub(super) const fn is_refused(self, now: Instant) -> bool {
         self.other_targets >= REFUSED_AFTER
+            && whole_s(now).wrapping_sub(self.compared_s) < UNKNOWN_AFTER_S
     }
 
     /// Schedules the next target after the drone's own position was sent as the target to a waiting PX4. A PX4
@@ -436,6 +443,12 @@ impl Target {
         }
         is_sent
     }
+}
+
+/// Converts a time to seconds of 2^20 microseconds.
+#[expect(clippy::cast_possible_truncation, reason = "wraps after a century")]
+const fn whole_s(now: Instant) -> u32 {
+    (now.as_micros() >> 20) as u32
 }
 
 #[cfg(test)]
@@ -611,6 +624,38 @@ mod tests {
         assert_eq!(other_targets(0, 0.0), 0);
         assert_eq!(other_targets(9, 0.0), 0);
         assert_eq!(other_targets(0, 20.0), 1, "reported once");
+    }
+
+    /// Checks that a refusal ends with the autopilot's reports of its target, and is there again with the next one.
+    #[test]
+    fn a_refusal_is_unknown_without_reports_of_the_target() {
+        let site = |lat_e7| Geodetic {
+            lat_e7,
+            lon_e7: 85_400_000,
+            amsl_mm: 420_000,
+        };
+        let sites = Sites {
+            tx: site(474_000_000),
+            rx: site(474_090_000),
+        };
+        let axis = Axis::between(sites).unwrap();
+        let mut target = Target::at(Placement::on_line(100.0, 20.0), Instant::ZERO);
+        let other = axis.point(Placement::on_line(200.0, 20.0)).unwrap();
+        let at = |seconds: u64| Instant::from_millis(1_000 * seconds);
+        for second in 3..9 {
+            let differs = target.compare(at(second), &axis, other.lat_e7, other.lon_e7);
+            assert_eq!(
+                (differs, target.is_refused(at(second))),
+                (second == 8, second == 8)
+            );
+        }
+        // It refuses a new setpoint, too.
+        target.renew(at(9));
+        assert!(target.is_refused(at(17)));
+        assert!(!target.is_refused(at(20)));
+        assert!(!target.is_refused(at(2_000)));
+        let differs = target.compare(at(2_001), &axis, other.lat_e7, other.lon_e7);
+        assert_eq!((differs, target.is_refused(at(2_002))), (false, true));
     }
 
     #[test]

@@ -888,7 +888,11 @@ impl Autopilot {
         self.handle_timeout(now);
         let mut is_news = relay.control(now, self.is_flown());
         #[cfg(feature = "telemetry")]
-        relay.report_control(self.state(), self.target.is_some_and(Target::is_refused));
+        {
+            let time = self.clock.advance(now);
+            let refuses = self.target.is_some_and(|it| it.is_refused(time));
+            relay.report_control(self.state(), refuses);
+        }
         let position = self.poll_position();
         if let Some(Position { at, place, .. }) = position {
             relay.handle_position(now, place, at);

@@ -118,7 +118,10 @@ impl Entry {
     }
 
     /// Returns the control state of the drone, from 1; 0 without an autopilot.
-    pub(crate) const fn control(&self) -> u16 {
+    ///
+    /// From 3 the drone is in the air: standby, engaged, blind, and engaged with a refused setpoint.
+    #[doc(hidden)]
+    pub const fn control(&self) -> u16 {
         self.state.number() / 4096 % 7
     }
 }

@@ -78,7 +78,7 @@ impl LiveView {
         let mut snapshot = Snapshot {
             name: Some(format!("Simulated chain of {} relays", reports.len())),
             log,
-            ..state.snapshot(now, &reports, &self.alarms, &[])
+            ..state.snapshot(now, &reports, &self.alarms, &[], &BTreeMap::new())
         };
         for relay in &mut snapshot.relays {
             if passive.contains(&relay.number) {

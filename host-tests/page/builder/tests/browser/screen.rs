@@ -519,6 +519,17 @@ fn a_lost_relay_is_cleared_by_a_button_that_is_held() {
             task.reply(Err("relay 3 is not lost".to_owned()));
             browser
                 .until("byId('clear-state').textContent.includes('Refused: relay 3 is not lost')");
+            // The text lasts as long as the alarm.
+            thread::sleep(Duration::from_millis(600));
+            assert!(
+                browser
+                    .text("byId('clear-state').textContent")
+                    .contains("Refused")
+            );
+            is_cleared.store(true, Ordering::Relaxed);
+            browser.until("byId('clear-state').textContent === ''");
+            is_cleared.store(false, Ordering::Relaxed);
+            browser.until("document.querySelector('[data-clear]') !== null");
         } else {
             is_cleared.store(true, Ordering::Relaxed);
             task.reply(Ok("{\"relay\":3}".to_owned()));
