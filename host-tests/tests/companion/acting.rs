@@ -3,6 +3,8 @@
 use std::io::Read as _;
 use std::time::{Duration, Instant};
 
+use chacha20::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 
 use crate::chain::{Chain, Place, simulated};
@@ -210,6 +212,73 @@ fn the_page_uploads_what_it_has_shown_once_and_only_to_the_same_chain() {
     for relay in &mut chain.relays {
         assert!(!relay.has_printed("uploaded: version 3"));
     }
+}
+
+/// Checks that random previews equal, to the bit, the setpoints that the relays then have.
+///
+/// `COUNT=200 cargo test --test companion acting::random_previews -- --nocapture` uploads 200 missions.
+#[test]
+fn random_previews_are_flown_as_they_were_shown() {
+    let number = |name, default| {
+        std::env::var(name).map_or(default, |it: String| it.parse::<u64>().unwrap())
+    };
+    let (count, seed) = (number("COUNT", 3), number("SEED", 1));
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (mut chain, station, page) = chain_with_page();
+    let (mut flown, mut refused) = (0, 0);
+    while flown < count {
+        let mut body = json!({ "interferer": format!(
+            "{},{:.1},{:.1}",
+            rng.random_range(20..200),
+            rng.random_range(0.0..1_000.0),
+            rng.random_range(150.0..600.0) * [1.0, -1.0][rng.random_range(0..2)],
+        ) });
+        if rng.random_bool(0.5) {
+            body["receiver"] = json!(format!("{:.1},0", rng.random_range(700.0..1_010.0)));
+        }
+        if rng.random_bool(0.5) {
+            body["tx-power"] = json!(format!("{:.2}", rng.random_range(0.5..4.0)));
+        }
+        if rng.random_bool(0.3) {
+            body["uav-power"] = json!(format!("{:.2}", rng.random_range(0.5..4.0)));
+        }
+        if rng.random_bool(0.1) {
+            body["altitude"] = json!("50");
+        }
+        let (status, answer) = page.post("/preview", &body);
+        assert_eq!(status, 200, "{answer}");
+        let number = serde_json::from_str::<Value>(&answer).unwrap()["preview"].take();
+        let begun = Instant::now();
+        let state = snapshots(&page.address)
+            .map(|mut it| it["desk"].take())
+            .find(|it| {
+                assert!(begun.elapsed() < LIMIT, "{it:#}");
+                it["number"] == number && (it["stage"] == "ready" || it["stage"] == "failed")
+            });
+        let state = state.unwrap();
+        if state["stage"] == "failed" {
+            // The limit is named, and the relay that would be farthest outside, if its position is beyond a limit. Rx
+            // beyond the line of the loaded mission is refused by itself.
+            let why = state["fault"].as_str().unwrap();
+            let names = body["altitude"].is_null() || why.contains("farthest outside is relay ");
+            assert!(why.contains("must be within") && names, "{body}: {why}");
+            refused += 1;
+            continue;
+        }
+        assert!(body["altitude"].is_null(), "{body}");
+        let moves = state["preview"]["moves"].as_array().unwrap();
+        let request = json!({ "preview": number, "digest": state["digest"] });
+        assert_eq!(page.post("/upload", &request).0, 200);
+        assert_eq!(page.until("flown")["number"], number);
+        for (relay, moved) in chain.relays.iter_mut().zip(moves) {
+            let to = ["x_m", "y_m", "h_m"].map(|part| f32_bits(&moved["to"][part]));
+            // A setpoint that stays has no new line.
+            while moved["metres"] != 0.0 && crate::process::bits(&relay.line("setpoint: ")) != to {}
+        }
+        flown += 1;
+    }
+    println!("{flown} uploads flown as shown, {refused} refused");
+    station.stopped();
 }
 
 /// Checks that a lost relay is cleared at the station only, and is back at its next report. The capture has the act.

@@ -33,7 +33,7 @@ impl ConsecutiveCounts {
     }
 
     /// Returns the distance of the nearest node with `most` events in a row; 0 for none.
-    pub(super) fn nearest(&self, most: u8) -> u16 {
+    pub(super) fn nearest(self, most: u8) -> u16 {
         let mut nodes = (1..).zip(self.0);
         nodes
             .find_map(|(distance, times)| (times >= most).then_some(distance))
