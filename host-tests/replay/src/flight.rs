@@ -363,7 +363,7 @@ impl<'a> Recorder<'a> {
                 _ => None,
             };
             // The relay may not be lost in the captures of all nodes.
-            if !cleared.is_some_and(|relay| self.view.clear(instant(now), relay, []).is_ok()) {
+            if cleared.is_none_or(|relay| self.view.clear(instant(now), relay, []).is_err()) {
                 flight.log.push(LogLine {
                     time_s: frame.at - flight.begin,
                     text: format!("operator: {act}"),

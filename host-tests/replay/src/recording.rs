@@ -25,8 +25,8 @@ pub struct Frame {
     pub header: Header,
     /// Message of the frame; `None` for a handshake, and for a message that no relay accepts.
     pub message: Option<Message>,
-    /// Comment on the frame: acts of the operator at the ground station, and those on packets that are left out before it.
-    /// Empty without a comment.
+    /// Comment on the frame, and on packets left out before it: acts of the operator at the station. Empty without a
+    /// comment.
     pub comment: String,
 }
 

@@ -150,7 +150,7 @@ fn sender(wire: &[u8]) -> u16 {
 
 const EPOCH: f64 = 1.8e9;
 
-/// Checks that an act of the operator on a damaged packet is at the next frame, and one after all frames at the last.
+/// Checks that an act on a damaged packet is at the next frame, and one after all frames at the last.
 #[test]
 fn an_act_on_a_damaged_packet_is_kept() {
     let flown = fly(2, false, 10, None);

@@ -122,8 +122,9 @@ impl Chain<'_> {
         }
     }
 
-    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`, which it could
-    /// receive.
+    /// Returns true if relay `by` reports that no relay is left on the side of the relay `number`.
+    ///
+    /// It could only receive a relay at most [`REACH`] numbers away.
     fn is_end(&self, by: &Report, number: u16) -> bool {
         let [before, after] = by.neighbours;
         let (toward, away) = if number < by.relay {

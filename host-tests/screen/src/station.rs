@@ -46,8 +46,9 @@ const REJECTED_FOR: Duration = Duration::from_millis(30_000);
 /// from the previous setpoint for 10 s.
 const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 
-/// Time from the return of a relay after which no relay refuses it any more for the mission that it had before. Relays
-/// report the refusal for up to two minutes after its last cause.
+/// Time after a relay's return from which no relay refuses it any more for its earlier mission.
+///
+/// Relays report the refusal for up to two minutes after its last cause.
 const LINGERS: Duration = Duration::from_millis(150_000);
 
 /// Distance from a setpoint below which a drone has reached it, m.

@@ -393,7 +393,7 @@ fn a_silent_relay_next_to_tx_or_rx_is_lost_once_its_neighbour_is_the_last_one() 
     }
 }
 
-/// Checks that details from before a relay's last report do not make it lost: not every report has them.
+/// Checks that neighbours reported before a relay's last report do not make it lost.
 #[test]
 fn neighbours_from_before_the_loss_do_not_make_a_relay_lost() {
     let mut watched = Watched::new();
@@ -447,8 +447,9 @@ fn one_of_two_relays_is_lost_once_the_other_one_is_alone() {
     }
 }
 
-/// Checks that the alarm about another mission is there again when the relay, back in between, does not report, and
-/// when it reports, but its number is refused for longer than the neighbours remember.
+/// Checks that the alarm of another mission begins again after the relay was back.
+///
+/// It begins when the relay does not report, and when its number is refused for longer than the neighbours remember.
 #[test]
 fn the_alarm_of_another_mission_begins_again() {
     let alarm = "Warning relay 2 has another mission: reported by relays 1 and 3";

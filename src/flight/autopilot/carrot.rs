@@ -316,7 +316,7 @@ const AGAIN: Duration = Duration::from_millis(1_000);
 /// Number of consecutive reports of another target after which the sent target counts as refused. An ArduCopter
 /// reports its target twice a second.
 const REFUSED_AFTER: u8 = 6;
-/// Time after the autopilot's last report of its target from which it is unknown which target it has, s.
+/// Age of the autopilot's last report of its target from which its target is unknown, s.
 const UNKNOWN_AFTER_S: u32 = 10;
 /// Minimum time for which a target must have been sent before it can count as refused.
 const SENT_FOR: Duration = Duration::from_millis(3_000);
@@ -413,7 +413,7 @@ impl Target {
         before < REFUSED_AFTER && self.is_refused(now)
     }
 
-    /// Returns true while the autopilot reports another target; false once it has reported none for some seconds.
+    /// Returns true while the autopilot reports another target. After some seconds without a report it is unknown.
     pub(super) const fn is_refused(self, now: Instant) -> bool {
         self.other_targets >= REFUSED_AFTER
             && whole_s(now).wrapping_sub(self.compared_s) < UNKNOWN_AFTER_S
@@ -626,7 +626,7 @@ mod tests {
         assert_eq!(other_targets(0, 20.0), 1, "reported once");
     }
 
-    /// Checks that a refusal ends with the autopilot's reports of its target, and is there again with the next one.
+    /// Checks that a refusal ends with the autopilot's reports of its target, until the next one.
     #[test]
     fn a_refusal_is_unknown_without_reports_of_the_target() {
         let site = |lat_e7| Geodetic {
