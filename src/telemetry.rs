@@ -40,7 +40,7 @@ pub struct Report {
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node whose messages the relay has refused for another mission; `None` for none.
+    /// Number of the nearest node that the relay refuses for another mission; `None` for none.
     pub other_mission: Option<u16>,
     /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
     pub other_key: Option<u16>,
@@ -72,7 +72,7 @@ const CONTROLS: [State; 6] = [
     State::Engaged,
 ];
 
-/// Number of the control state of a drone that the relay controls, but whose autopilot flies to another target.
+/// Control state of a drone that the relay controls, but whose autopilot flies to another target.
 pub(crate) const REFUSED: u16 = 6;
 
 /// Hold reasons in the order of their numbers in a report, from 1.
@@ -86,8 +86,9 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the number of the node that the relay of this entry refuses, for another mission (`first` 1) or another key
-/// (`first` 9). `None` for none.
+/// Returns the number of the node that the relay of this entry refuses; `None` for none.
+///
+/// `first` is 1 for refusals because of another mission, and 9 for refusals because of another key.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),

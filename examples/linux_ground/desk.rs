@@ -1,4 +1,4 @@
-//! Tasks of the page and of the status socket: previews and uploads, with their state for the page, and lost relays that are cleared.
+//! Tasks of the page and of the status socket: previews, uploads, and the clearing of lost relays.
 //!
 //! | request | answer |
 //! | --- | --- |
@@ -122,7 +122,9 @@ impl Desk {
         }
     }
 
-    /// Handles a command of the status socket: `preview NAME=VALUE ...`, `upload NUMBER DIGEST` or `clear-lost NUMBER`.
+    /// Handles a command of the status socket.
+    ///
+    /// Commands: `preview NAME=VALUE ...`, `upload NUMBER DIGEST` and `clear-lost NUMBER`.
     pub(crate) fn command(
         &mut self,
         now: Instant,

@@ -207,7 +207,7 @@ impl StationView {
         self.version.map(|(version, _)| version)
     }
 
-    /// Removes a lost relay and its alarm from the snapshots, until a report of its state after `now` arrives.
+    /// Removes a lost relay and its alarm from the snapshots, until a report newer than `now` arrives.
     ///
     /// `reports` are reports that have arrived; those of the last snapshot are known.
     ///

@@ -148,8 +148,9 @@ fn begins_alarm(before: State, now: State) -> bool {
     before != now && (matches!(now, State::Silent | State::Blind) || before == State::Engaged)
 }
 
-/// Checks that eight drones that lose their positions at once, as by a jammer, are known in time although their reports
-/// collide.
+/// Checks that the station soon knows that eight drones have lost their positions at the same time.
+///
+/// A jammer is a possible cause. The reports of the relays collide.
 #[test]
 fn alarms_of_all_relays_at_once_are_known_in_time() {
     let (mut delays_s, mut lasts_s, mut most) = (Vec::new(), Vec::new(), 0.0_f64);

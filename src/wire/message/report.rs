@@ -18,7 +18,10 @@ const UNKNOWN: i32 = -(1 << 23);
 /// Number of values of a relay's combined state: see [`Entry::state`].
 const STATES: u16 = 57_344;
 
-/// Number of values of [`Entry::refusal`]: none, and for another mission and another key four toward Tx, four toward Rx.
+/// Number of values of [`Entry::refusal`].
+///
+/// One value for no refusal. Eight values for another mission and eight for another key: four nodes toward Tx and four
+/// toward Rx.
 const REFUSALS: u16 = 17;
 
 /// Upper 16 bits of the largest finite f32.
@@ -102,9 +105,10 @@ impl Entry {
         self.relay.number() - MAX_RELAYS * self.refusal()
     }
 
-    /// Returns the direction and distance of the nearest node that the relay refuses for another mission; 0 for none.
+    /// Returns direction and distance of the nearest node that the relay refuses; 0 for none.
     ///
-    /// 1 to 4: so many numbers toward Tx; 5 to 8: 1 to 4 numbers toward Rx. 9 to 16: the same for another key.
+    /// 1 to 4: another mission, at a node that many numbers toward Tx. 5 to 8: another mission, 1 to 4 numbers toward
+    /// Rx. 9 to 16: the same for another key.
     pub const fn refusal(&self) -> u16 {
         self.relay.number().saturating_sub(1) / MAX_RELAYS
     }

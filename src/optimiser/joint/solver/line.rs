@@ -1,4 +1,6 @@
-//! Algorithm 1 for a chain whose lateral offsets and altitudes are stored: the x of all relays for one target, in portions.
+//! Algorithm 1 for a chain with stored lateral offsets and altitudes.
+//!
+//! It computes the x of all relays for one target, in portions.
 //!
 //! The pass to Rx computes the farthest x of each relay, exactly as the relays compute it from their messages. With data in one
 //! direction this is enough, unless a relay has to stay short of its farthest x. Otherwise the pass back to Tx computes the x that each
@@ -13,7 +15,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Number of relays for which one call continues the algorithm: with data in one direction, and in both.
+/// Number of relays that one call computes: with data in one direction, and in both.
 const AT_ONCE: [u16; 2] = [20, 2];
 
 /// Memory of a relay during Algorithm 1: its x, and the upper limit of its x, m.

@@ -460,7 +460,7 @@ fn only_a_preview_of_this_page_and_a_button_held_for_a_second_upload() {
     assert!(errors.iter().all(|it| it.contains("409")), "{errors:?}");
 }
 
-/// Checks that the button of a lost relay's alarm, held for 1 s, sends one request, and that a refusal is shown.
+/// Checks that the button of a lost relay's alarm sends one request after 1 s, and shows a refusal.
 #[test]
 fn a_lost_relay_is_cleared_by_a_button_that_is_held() {
     let (screen, posts) = Screen::start_acting("127.0.0.1:0".parse().unwrap(), None, None).unwrap();
