@@ -246,7 +246,7 @@ fn relays_fly_over_the_terrain_by_themselves() {
         losses.push(flight.loss_db.unwrap());
         warned += flight.warnings().count();
         for relay in &flight.relays {
-            let part = format!("relay {} has no room to drift: ", relay.index);
+            let part = format!("relay {} has no room: ", relay.index);
             let is_warned = flight.warnings().any(|line| line.starts_with(&part));
             assert_eq!(is_warned, relay.room_m.is_none(), "seed {seed}: {relay:?}");
             confined += u32::from(is_warned);

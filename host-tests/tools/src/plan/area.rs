@@ -293,7 +293,7 @@ pub fn problem(
                 let level = keeps.contains(&true) && (from[2] - to[2]).abs() > ROUNDING_M;
                 let level = level.then(|| format!(" from the altitude {altitude_m:.1} m"));
                 lines.push(format!(
-                    "the way between relay {index} and relay {} crosses {range} for {crossing_m:.1} m{}, and relays that close a gap fly there{ACCEPTS}",
+                    "the line from relay {index} to relay {} crosses {range} for {crossing_m:.1} m{}; a relay that closes a gap would fly through it{ACCEPTS}",
                     index + 1,
                     level.unwrap_or_default()
                 ));

@@ -41,7 +41,7 @@ const SLACK: f64 = 0.0023;
 const GAIN: f64 = 1e-4;
 
 /// Explanation of the rooms for the user.
-pub const ROOM: &str = "room: while every relay is in its room, no hop becomes blocked, no clear hop becomes grazing, and no relay is in a no-fly area; none: that does not hold within the position error";
+pub const ROOM: &str = "room: range of x in which a relay may drift; while all relays are in their rooms, no hop becomes blocked, no clear hop becomes grazing (ground in the first Fresnel zone), and no relay is in a no-fly area; none: a drift by the position error is too much";
 
 /// Altitudes of the relays, the positions that they choose with them, and the rank of the chain.
 struct Trial {
