@@ -905,7 +905,7 @@ fn no_relay_is_planned_in_a_no_fly_area() {
     let text = String::from_utf8_lossy(&out.stderr);
     assert!(
         out.status.success()
-            && text.contains("warning: the way between relay ")
+            && text.contains("warning: the line from relay ")
             && text.trim_end().ends_with("accepted by --allow-crossing"),
         "{text}"
     );
