@@ -177,22 +177,36 @@ mod tests {
             let entry = Entry::new(2, 0, state, Coarse::of(None));
             Report::of(&entry, None, Instant::ZERO)
         };
-        for (holds_lease, is_duplicated) in [(false, false), (true, false), (false, true)] {
-            let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * 4;
-            let flags = 2048 * u16::from(holds_lease) + 28_672 * u16::from(is_duplicated);
-            let report = report(rest + flags);
-            assert_eq!(
-                (report.holds_lease, report.is_duplicated, report.phase),
-                (holds_lease, is_duplicated, Phase::Holding)
-            );
-            assert_eq!(report.silent, [false, true]);
-            assert_eq!(
-                (report.hold_reasons, report.control),
-                (
-                    [Some(HoldReason::Order), Some(HoldReason::Halted)],
-                    Some(State::Engaged)
-                )
-            );
+        let controls = [
+            (None, false),
+            (Some(State::Silent), false),
+            (Some(State::Grounded), false),
+            (Some(State::Standby), false),
+            (Some(State::Engaged), false),
+            (Some(State::Blind), false),
+            (Some(State::Engaged), true),
+        ];
+        for (number, (control, refuses_setpoint)) in (0..).zip(controls) {
+            for (holds_lease, is_duplicated) in
+                [(false, false), (true, false), (false, true), (true, true)]
+            {
+                let rest = 4 + 8 * 2 + 64 * 7 + 1024 + 4096 * number;
+                let flags = 2048 * u16::from(holds_lease) + 28_672 * u16::from(is_duplicated);
+                let report = report(rest + flags);
+                assert_eq!(
+                    (report.holds_lease, report.is_duplicated, report.phase),
+                    (holds_lease, is_duplicated, Phase::Holding)
+                );
+                assert_eq!(report.silent, [false, true]);
+                assert_eq!(
+                    report.hold_reasons,
+                    [Some(HoldReason::Order), Some(HoldReason::Halted)]
+                );
+                assert_eq!(
+                    (report.control, report.refuses_setpoint),
+                    (control, refuses_setpoint)
+                );
+            }
         }
     }
 }

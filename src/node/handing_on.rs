@@ -20,7 +20,7 @@ use crate::wire::message::Message;
 pub(crate) const PATIENCE: Duration = Duration::from_micros(0);
 pub(crate) const FIRST_PATIENCE: Duration = PATIENCE;
 
-pub(crate) type Own = ([u16; 2], [Option<Placement>; 2]);
+pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 /// Telemetry message to be forwarded to the other neighbour, with that neighbour's side. `None` if there is none.
 #[derive(Clone, Debug, Default)]

@@ -128,7 +128,9 @@ struct Stored {
 /// Order in which stored entries (relays' states) are sent: the last rank first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Rank {
-    /// The entry was sent already.
+    /// The entry was sent with its details. They are not sent again, even if a copy with them arrives by another way.
+    Detailed,
+    /// The entry was sent without details.
     Sent,
     New,
     /// The entry was not sent yet, and begins an alarm.
@@ -174,8 +176,8 @@ struct Watched {
 }
 
 /// State that this relay reports about itself. The values are the number of the state in an entry (without the control
-/// state) and its [refusal](Entry::refusal), the setpoint, and the agreed position.
-pub(crate) type Own = ([u16; 2], [Option<Placement>; 2]);
+/// state), its [refusals](Entry::refusal) toward Tx and toward Rx, the setpoint, and the agreed position.
+pub(crate) type Own = ([u16; 3], [Option<Placement>; 2]);
 
 impl Reporting {
     pub(crate) fn handle_position(&mut self, at: Instant, place: Placement) {
@@ -193,24 +195,31 @@ impl Reporting {
         if before == control {
             return;
         }
-        self.schedule(member, begins_alarm(before, control), control == ENGAGED);
+        self.schedule(member, begins_alarm(before, control));
     }
 
     /// Records that a node was refused for another mission. The report about it is sent ahead of its turn.
     pub(crate) fn handle_refusal(&mut self, member: &Member) {
-        self.schedule(member, true, false);
+        self.schedule(member, true);
     }
 
-    /// Schedules this relay's entry for a change, which begins an alarm or ends all of them.
-    fn schedule(&mut self, member: &Member, begins: bool, ends: bool) {
+    /// Schedules this relay's entry for a change. `begins` is true if the change begins an alarm.
+    fn schedule(&mut self, member: &Member, begins: bool) {
+        let is_spread = begins && matches!(member.settings.wiring, Wiring::Shared);
         let sides = [Side::Upstream, Side::Downstream];
         for (watched, side) in self.watched.iter_mut().zip(sides) {
-            // If all drones have the same fault, the relays farther from the station report first.
-            let behind = member.all.saturating_sub(from_end(member, side)) % 8;
-            let turn = self.checked + SPREAD.times(behind.into());
-            let from = turn.max(self.reported + STEP);
+            let mut from = self.checked;
+            if watched.is_alarmed {
+                // Further changes do not delay the alarm.
+                from = watched.own_from;
+            } else if is_spread {
+                // If all drones have the same fault, the relays farther from the station report first.
+                let behind = member.all.saturating_sub(from_end(member, side)) % 8;
+                from = from + SPREAD.times(behind.into());
+            }
+            from = from.max(self.reported + STEP);
             (watched.due, watched.own_from) = (watched.due.min(from), from);
-            watched.is_alarmed = begins || watched.is_alarmed && !ends;
+            watched.is_alarmed |= begins;
         }
     }
 
@@ -507,16 +516,15 @@ impl Reporting {
                 let [was, is] = [old.entry, entry].map(|entry| entry.control());
                 let is_refusal = old.entry.refusal() == 0 && entry.refusal() > 0;
                 let begins = begins_alarm(was, is) || is_refusal;
-                if begins {
-                    stored.rank = Rank::Alarm;
-                } else if was == is {
-                    stored.rank = stored.rank.max(old.rank);
-                }
+                stored.rank = if begins {
+                    Rank::Alarm
+                } else {
+                    Rank::New.max(old.rank)
+                };
                 stored.detail = detail.or(old.detail);
                 *old = stored;
                 return begins;
-            } else if old.detail.is_none() && old.rank > Rank::Sent {
-                // Details that were sent do not come back by another way.
+            } else if old.detail.is_none() && old.rank > Rank::Detailed {
                 old.detail = detail;
             }
         } else if let Err(stored) = self.stored.push(stored) {
@@ -552,14 +560,22 @@ impl Reporting {
             (watched, &mut self.reported)
         };
         let mut report = Reports::new(watched.number, member.digest);
-        let is_due = now >= watched.own_from;
+        // An alarm of this relay is part of a report about others, even before its turn.
+        let is_due = now >= watched.own_from || watched.is_alarmed && now >= *reported + STEP;
         if is_due {
             let at = Coarse::of(position.map(|(_, place)| place));
             // A position from before the last entry would not count as newer than that entry.
             let state_at = position.map_or(now, |(at, _)| at);
             *reported = state_at.max(*reported + STEP).min(now);
             let age = age(now, *reported);
-            let [state, refusal] = own.0;
+            let [state, before, after] = own.0;
+            // An entry has room for one node.
+            let is_turn = after == 0 || watched.count.is_multiple_of(2);
+            let refusal = if before != 0 && is_turn {
+                before
+            } else {
+                after
+            };
             let relay = member.node + MAX_RELAYS * refusal;
             let entry = Entry::new(relay, age, state + 4096 * control, at);
             _ = report.entries.push(entry);
@@ -569,7 +585,7 @@ impl Reporting {
             age < OLDEST && (stored.rank > Rank::Sent || age < period.times(3))
         });
         let (mut is_left, mut stores_alarm) = (false, false);
-        for rank in [Rank::Alarm, Rank::New, Rank::Sent] {
+        for rank in [Rank::Alarm, Rank::New, Rank::Sent, Rank::Detailed] {
             for stored in &mut self.stored {
                 let is_toward = (stored.entry.relay() > member.node) == (side == Side::Upstream);
                 if stored.rank != rank || !is_toward || now < stored.from {
@@ -581,16 +597,18 @@ impl Reporting {
                     stores_alarm |= rank == Rank::Alarm;
                     continue;
                 }
+                stored.rank = stored.rank.min(Rank::Sent);
                 if report.detail.is_none() && stored.detail.is_some() {
+                    stored.rank = Rank::Detailed;
                     report.detail = stored.detail.take();
                     if let [first, .., last] = report.entries.as_mut_slice() {
                         core::mem::swap(first, last);
                     }
                 }
-                stored.rank = Rank::Sent;
                 stored.from = now + period;
             }
         }
+        let changed_from = self.reported + STEP;
         let watched = self.at(side);
         if is_due && watched.count.is_multiple_of(8) && report.detail.is_none() {
             let distance = |node: u16| u8::try_from(node.abs_diff(member.node)).unwrap_or(0);
@@ -628,6 +646,10 @@ impl Reporting {
                         .times((5 * u32::from(member.node) + 3 * u32::from(watched.count)) & 7)
             }
         };
+        if !is_due && watched.own_from <= changed_from {
+            // This relay's state has changed, and is not yet in a report.
+            watched.due = watched.due.min(watched.own_from);
+        }
         watched.is_fed = false;
         (entries > 0).then_some(report)
     }

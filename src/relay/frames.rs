@@ -117,7 +117,7 @@ fn receive_signed(
         }
         Checked::Unproven => node.on_handshake(side, sender),
         // While the two nodes do not know each other's nonces, the tag of any other frame is wrong, too.
-        Checked::Forged if frame.handshake => node.on_forged(side, sender),
+        Checked::Forged if frame.handshake => node.on_forged(now, side, sender),
         Checked::WentBack => node.on_epoch_went_back(side, sender),
         Checked::Unsigned | Checked::Forged | Checked::Replayed => {}
     }

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | a relay has not reported yet | notice |
 //! | a neighbour reports a relay as silent, or a relay that has reported is silent for [`SILENT_AFTER`], or for one and a half times as long as it recently was, up to 10 s | critical, one for the relay |
-//! | the same without a neighbour's report, within 10 s of the last report of a relay nearer to the station that is silent, too | none yet: the reports may have to find another way |
+//! | the same without a neighbour's report, within 10 s of the last report of a relay nearer to the station that is silent, too, or within 5 s of its return | none yet: the reports may have to find another way |
 //! | no frame from a chain that has reported, for [`SILENT_AFTER`] | critical; it replaces the alarms about single relays |
 //! | no quorum, no feasible positions, two nodes with a relay's number | critical |
 //! | autopilot without a position, or its link lost after it was there | critical |
@@ -51,6 +51,9 @@ const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 /// Relays report the refusal for up to two minutes after its last cause.
 const LINGERS: Duration = Duration::from_millis(150_000);
 
+/// Time for which a relay's report of one refused relay holds while its reports name another one, on its other side.
+const TURNS: Duration = Duration::from_millis(20_000);
+
 /// Distance from a setpoint below which a drone has reached it, m.
 const NEAR_M: f32 = 5.0;
 
@@ -83,6 +86,9 @@ struct Known {
     nearest: Option<(Instant, f32)>,
     /// Time of the first report of the present neighbours.
     neighbours_at: Instant,
+    /// Time of the first report after a silence in which reports of relays behind this one may have been lost; `None`
+    /// before.
+    returned_at: Option<Instant>,
 }
 
 impl Known {
@@ -96,6 +102,7 @@ impl Known {
             longest_age: Duration::from_micros(0),
             nearest: None,
             neighbours_at: report.at,
+            returned_at: None,
         }
     }
 
@@ -103,7 +110,11 @@ impl Known {
     fn take(&mut self, now: Instant, report: Report) {
         let before = std::mem::replace(&mut self.report, report);
         let decayed = Duration::from_micros(self.longest_age.as_micros() * 7 / 8);
-        self.longest_age = decayed.max(now.since(before.at));
+        let age = now.since(before.at);
+        self.longest_age = decayed.max(age);
+        if age >= UNSURE_AFTER {
+            self.returned_at = Some(now);
+        }
         if before.neighbours != report.neighbours {
             self.neighbours_at = report.at;
         }
@@ -168,8 +179,8 @@ impl Known {
 /// Refusal of a relay for another mission or key.
 #[derive(Debug)]
 struct Refused {
-    /// Relays that refuse it.
-    by: Vec<u16>,
+    /// Relays that refuse it, and the times of their last reports of the refusal.
+    by: BTreeMap<u16, Instant>,
     /// Time of the first report of the refusal.
     since: Instant,
     /// Time from which the refused relay has reported without a break; `None` while it does not report.
@@ -354,18 +365,28 @@ impl StationView {
                 (Reason::Mission, by.other_mission),
                 (Reason::Key, by.other_key),
             ];
-            for key in refusals
+            let named = refusals
                 .into_iter()
-                .filter_map(|(reason, it)| Some((reason, it?)))
-            {
-                let before = self.refused.get(&key);
-                let it = refused.entry(key).or_insert_with(|| Refused {
-                    by: Vec::new(),
-                    since: by.at,
-                    back_at: before.and_then(|it| it.back_at),
+                .filter_map(|(reason, it)| Some((reason, it?)));
+            for (reason, newest) in named {
+                let is_toward_tx = |number: u16| number < by.relay;
+                // Of a relay toward Tx and one toward Rx, each report has one.
+                let other = self.refused.iter().filter_map(|((of, number), it)| {
+                    let at = *it.by.get(&by.relay)?;
+                    let is_other = is_toward_tx(*number) != is_toward_tx(newest);
+                    (*of == reason && is_other && by.at.since(at) < TURNS).then_some((*number, at))
                 });
-                it.by.push(by.relay);
-                it.since = before.map_or(by.at.min(it.since), |it| it.since);
+                for (number, at) in other.chain([(newest, by.at)]) {
+                    let key = (reason, number);
+                    let before = self.refused.get(&key);
+                    let it = refused.entry(key).or_insert_with(|| Refused {
+                        by: BTreeMap::new(),
+                        since: at,
+                        back_at: before.and_then(|it| it.back_at),
+                    });
+                    it.by.insert(by.relay, at);
+                    it.since = before.map_or(at.min(it.since), |it| it.since);
+                }
             }
         }
         for ((_, number), it) in &mut refused {
@@ -424,7 +445,12 @@ impl StationView {
                 .back_at
                 .is_none_or(|back_at| *reason == Reason::Mission && now.since(back_at) >= LINGERS);
             if lasts && (1..=chain.relays).contains(number) {
-                add(*reason, *number, it.by.clone(), String::new());
+                add(
+                    *reason,
+                    *number,
+                    it.by.keys().copied().collect(),
+                    String::new(),
+                );
             }
         }
         for known in self.shown() {
@@ -484,17 +510,20 @@ impl StationView {
         all
     }
 
-    /// Returns true if reports of relay `number` may be missing because a nearer relay is silent.
+    /// Returns true if reports of relay `number` may be missing because a nearer relay is or was silent.
     ///
     /// The nearer relay, on the way to the station, has been silent for a short time only: the chain has not closed the
-    /// gap yet.
+    /// gap yet. Or it has just returned: reports that went through it are on their way again.
     fn may_be_behind(&self, now: Instant, end: Side, number: u16) -> bool {
-        let all = self.known.values().map(|it| &it.report);
-        let mut nearer = all.filter(|it| match end {
-            Side::Upstream => it.relay < number,
-            Side::Downstream => it.relay > number,
+        let mut nearer = self.known.values().filter(|it| match end {
+            Side::Upstream => it.report.relay < number,
+            Side::Downstream => it.report.relay > number,
         });
-        nearer.any(|it| (UNSURE_AFTER..CLOSED_AFTER).contains(&now.since(it.at)))
+        nearer.any(|it| {
+            let is_back = |at| now.since(at) < SILENT_AFTER;
+            (UNSURE_AFTER..CLOSED_AFTER).contains(&now.since(it.report.at))
+                || it.returned_at.is_some_and(is_back)
+        })
     }
 
     /// Describes which relays do not receive a neighbour now, for an alarm about relays without reports.

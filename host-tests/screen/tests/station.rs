@@ -150,6 +150,7 @@ impl Watched {
             "refuses" => report.refuses_setpoint = true,
             "key2" => report.other_key = Some(2),
             "mission2" => report.other_mission = Some(2),
+            "mission4" => report.other_mission = Some(4),
             "deafback" => report.silent[0] = true,
             other => panic!("{other}"),
         }

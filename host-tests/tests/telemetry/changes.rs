@@ -10,12 +10,14 @@ use uav_relay_sim::simulator::setup::UploadSpec;
 
 use crate::{Figures, RATE, quantile, s, seconds, setup};
 
-const STATES: [State; 5] = [
-    State::Silent,
-    State::Grounded,
-    State::Standby,
-    State::Engaged,
-    State::Blind,
+/// Control states, each with true if the autopilot flies to another target.
+const STATES: [(State, bool); 6] = [
+    (State::Silent, false),
+    (State::Grounded, false),
+    (State::Standby, false),
+    (State::Engaged, false),
+    (State::Blind, false),
+    (State::Engaged, true),
 ];
 
 const fn ms(millis: u64) -> Duration {
@@ -102,9 +104,9 @@ fn the_last_state_reaches_the_station() {
                 let relay = rng.random_range(1..=relays);
                 let (control, position) = &mut last[usize::from(relay) - 1];
                 if rng.random_bool(0.5) {
-                    let state = STATES[rng.random_range(0..5)];
-                    *control = Some(state);
-                    chain.input(now, relay, |it| it.report_control(state, false));
+                    let (state, refuses) = STATES[rng.random_range(0..6)];
+                    *control = Some((state, refuses));
+                    chain.input(now, relay, |it| it.report_control(state, refuses));
                 } else {
                     let at = Instant::from_micros(now.as_micros() - rng.random_range(0..300_000));
                     let given = place(&mut rng);
@@ -127,8 +129,9 @@ fn the_last_state_reaches_the_station() {
                 let what = format!(
                     "seed {seed}, round {round}, {relays} relays, {access:?}, loss {loss}, relay {relay}: {report:?}"
                 );
-                if control.is_some() {
-                    assert_eq!(report.control, *control, "{what}");
+                if let Some((state, refuses)) = *control {
+                    let known = (report.control, report.refuses_setpoint);
+                    assert_eq!(known, (Some(state), refuses), "{what}");
                 }
                 // A position is sent for 2 s, which may be too short if frames are lost.
                 let is_late = position.is_some_and(|(at, _)| at + ms(500) >= silence);
@@ -143,9 +146,11 @@ fn the_last_state_reaches_the_station() {
     }
 }
 
-/// Returns true if the change of the control state is an alarm on the station's page.
-fn begins_alarm(before: State, now: State) -> bool {
-    before != now && (matches!(now, State::Silent | State::Blind) || before == State::Engaged)
+/// Returns true if the change of the control state is an alarm on the station's page. Each state is one of [`STATES`].
+fn begins_alarm(before: (State, bool), now: (State, bool)) -> bool {
+    let is_fault = matches!(now.0, State::Silent | State::Blind) || now.1;
+    let is_released = before.0 == State::Engaged && now.0 != State::Engaged;
+    before != now && (is_fault || is_released)
 }
 
 /// Checks that the station soon knows that eight drones have lost their positions at the same time.
@@ -235,7 +240,7 @@ fn alarms_are_known_in_time() {
         }
         now = span[0];
         chain.advance(now);
-        let mut states = [State::Engaged; 8];
+        let mut states = [(State::Engaged, false); 8];
         // Time of a change that the station does not know yet.
         let mut begun = [None; 8];
         let mut next = now;
@@ -247,9 +252,11 @@ fn alarms_are_known_in_time() {
                 // Two changes of one relay may follow each other closely, as a pilot's and a silent autopilot's.
                 next = next + ms([100, 400, 2_000, 4_000, 8_000][rng.random_range(0..5)]);
                 let index = [rng.random_range(0..8), 7][rng.random_range(0..2)];
-                let state = STATES[rng.random_range(0..5)];
+                let state = STATES[rng.random_range(0..6)];
                 let before = core::mem::replace(&mut states[index], state);
-                chain.input(now, index as u16 + 1, |it| it.report_control(state, false));
+                chain.input(now, index as u16 + 1, |it| {
+                    it.report_control(state.0, state.1);
+                });
                 if before != state {
                     begun[index] = begins_alarm(before, state).then_some(now);
                 }
@@ -257,8 +264,9 @@ fn alarms_are_known_in_time() {
             for index in 0..8 {
                 let report = report(&chain, index as u16 + 1).unwrap();
                 ages_s.push(seconds(now.since(report.at)));
-                if let Some(since) = begun[index].filter(|_| report.control == Some(states[index]))
-                {
+                let (state, refuses) = states[index];
+                let is_known = report.control == Some(state) && report.refuses_setpoint == refuses;
+                if let Some(since) = begun[index].filter(|_| is_known) {
                     begun[index] = None;
                     delays_s.push(seconds(now.since(since)));
                 }
@@ -276,4 +284,75 @@ fn alarms_are_known_in_time() {
     assert!(most <= 0.1 * RATE, "{most}");
     assert!(delays_s.len() > 100 && delay_s[2] <= 0.6, "{delay_s:?}");
     assert!(age_s[1] <= 2.0, "{age_s:?}");
+}
+
+/// Checks that the time without a lease after the loss of both end relays at once, some 15 s, is no longer if the others
+/// report alarms meanwhile: all at the same time, or spread as the relays spread them.
+#[test]
+fn alarms_beside_the_loss_of_both_ends_delay_no_lease() {
+    let span = [s(60), s(120)];
+    let variants = [
+        "not watched",
+        "no alarms",
+        "spread alarms",
+        "alarms at once",
+    ];
+    let longest_s = variants.map(|variant| {
+        let runs = (1..=20).map(|seed| {
+            let mut setup = setup(8, Some(Access::Csma), s(1), span[1]);
+            setup.seed = seed;
+            setup.record = false;
+            setup.kills = vec![(1, span[0]), (8, span[0])];
+            if variant == "not watched" {
+                setup.watches = vec![(Side::Upstream, s(1_000))];
+            }
+            let mut chain = Chain::new(setup).unwrap();
+            chain.advance(s(50));
+            for relay in 1..=8 {
+                chain.input(s(50), relay, |it| it.report_control(State::Engaged, false));
+            }
+            chain.advance(span[0]);
+            let (mut now, mut since, mut longest_s) = (span[0], [span[0]; 8], 0.0_f64);
+            let mut state = State::Engaged;
+            while now < span[1] {
+                let step = now.since(span[0]).as_micros() / 1_000 % 5_000;
+                for relay in 2..=7_u16 {
+                    // A relay waits for 30 ms for each relay behind it.
+                    let turn = match variant {
+                        "spread alarms" => 0,
+                        "alarms at once" => 30 * (u64::from(relay) - 1),
+                        _ => continue,
+                    };
+                    if step == turn {
+                        if relay == 2 {
+                            state = [State::Blind, State::Engaged][usize::from(state == State::Blind)];
+                        }
+                        chain.input(now, relay, |it| it.report_control(state, false));
+                    }
+                }
+                now = now + ms(10);
+                chain.advance(now);
+                for relay in chain.live(now).filter(|it| it.is_on) {
+                    let since = &mut since[usize::from(relay.report.relay) - 1];
+                    if relay.report.holds_lease || relay.report.agreed.is_none() {
+                        *since = now;
+                    }
+                    longest_s = longest_s.max(seconds(now.since(*since)));
+                }
+            }
+            longest_s
+        });
+        let runs: Vec<f64> = runs.collect();
+        let expired = runs.iter().filter(|it| **it >= 5.0).count();
+        println!(
+            "relays 1 and 8 lost, {variant}: longest time without a lease (50 %, 95 %, most) {:.1?} s; {expired} of 20 runs with 5 s or more",
+            [0.5, 0.95, 1.0].map(|share| quantile(&runs, share))
+        );
+        (quantile(&runs, 1.0), expired)
+    });
+    let [_, (quiet_s, quiet), (spread_s, spread), _] = longest_s;
+    assert!(
+        spread <= quiet + 1 && spread_s <= quiet_s + 2.0,
+        "{longest_s:?}"
+    );
 }

@@ -140,9 +140,10 @@ impl Node {
     pub(super) fn refuse_mission(&mut self, now: Instant, side: Side, from: u16) {
         bump(&mut self.telemetry.stats.mission);
         let distance = from.abs_diff(self.member.node);
+        let before = self.refusals(now);
         let neighbour = self.layers.neighbours.at_mut(side);
         if neighbour.should_report_mismatch(distance, now) {
-            self.reporting.handle_refusal(&self.member);
+            self.report_refusal(now, before);
             self.raise_node_event(NodeEvent::Mission, side, from);
         }
     }
@@ -257,15 +258,13 @@ impl Node {
 
     /// Handles a handshake that bears the number of node `from` at `side`, but is signed with another key. If several
     /// such handshakes are received in a row, the node is reported to the firmware.
-    pub(crate) fn on_forged(&mut self, side: Side, from: u16) {
+    pub(crate) fn on_forged(&mut self, now: Instant, side: Side, from: u16) {
         let distance = from.abs_diff(self.member.node);
-        if self
-            .layers
-            .neighbours
-            .at_mut(side)
-            .should_report_forged(distance)
-        {
-            self.reporting.handle_refusal(&self.member);
+        let before = self.refusals(now);
+        let neighbour = self.layers.neighbours.at_mut(side);
+        let is_news = neighbour.should_report_forged(distance, now);
+        self.report_refusal(now, before);
+        if is_news {
             self.raise_node_event(NodeEvent::Key, side, from);
         }
     }

@@ -2,6 +2,7 @@
 
 use super::Node;
 use crate::features::{AUTH, TELEMETRY};
+use crate::node::context::Member;
 use crate::node::reports::{FIRST_PATIENCE, Own, PATIENCE};
 use crate::node::round::state::Phase;
 use crate::side::Side;
@@ -80,15 +81,370 @@ impl Node {
         let is_duplicated = u16::from(self.duplicate.is_observed(now, &self.member.settings));
         let flags = 512 * (c + 2 * d + 4 * holds_lease) + 28_672 * is_duplicated;
         let state = self.phase() as u16 + 8 * a + 64 * b + flags;
-        let [before, after] = sides.map(|side| self.layers.neighbours.at(side).refused(now));
-        let mut refusals = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
+        let [before, after] = self.refusals(now);
+        (
+            [state, before, after],
+            [self.setpoint(), self.agreed_place()],
+        )
+    }
+
+    /// Returns the [refusals](crate::wire::message::Entry::refusal) of the nearest refused relay toward Tx and toward
+    /// Rx; 0 for none. Tx and Rx do not count: ground stations have no place in the chain.
+    pub(super) fn refusals(&self, now: Instant) -> [u16; 2] {
+        let Member { node, all, .. } = self.member;
+        let neighbours = &self.layers.neighbours;
+        let before = neighbours.at(Side::Upstream).refused(now, node);
+        let end = all.saturating_add(1).saturating_sub(node);
+        let after = neighbours.at(Side::Downstream).refused(now, end);
+        let mut kinds = before.into_iter().zip(after).zip([0, 2 * CANDIDATES]);
         // A mission is refused by its signed digest; the other key may be a forger's.
-        let refusal = refusals.find_map(|((before, after), kind)| match (before, after) {
-            (0, 0) => None,
-            (before, after) if after == 0 || before != 0 && before <= after => Some(kind + before),
-            (_, after) => Some(kind + CANDIDATES + after),
-        });
-        let refusal = refusal.unwrap_or(0);
-        ([state, refusal], [self.setpoint(), self.agreed_place()])
+        let kind = kinds.find(|(nodes, _)| *nodes != (0, 0));
+        kind.map_or([0; 2], |((before, after), first)| {
+            let numbered = |distance, first| if distance == 0 { 0 } else { first + distance };
+            [numbered(before, first), numbered(after, first + CANDIDATES)]
+        })
+    }
+
+    /// Sends a report ahead of its turn if this relay refuses a relay now. `before` are the refusals until now.
+    pub(super) fn report_refusal(&mut self, now: Instant, before: [u16; 2]) {
+        if before == [0; 2] && self.refusals(now) != [0; 2] {
+            self.reporting.handle_refusal(&self.member);
+        }
+    }
+}
+
+#[cfg(all(test, feature = "telemetry", feature = "upload"))]
+mod tests {
+    use super::*;
+    use crate::mission::Mission;
+    use crate::mission::tests::paper;
+    use crate::node::dispatch::tests::{NOW, relay_of};
+    use crate::settings::Wiring;
+    use crate::wire::message::{Coarse, Detail, Entry, Reports};
+
+    /// Control states, as in an entry.
+    const STANDBY: u16 = 3;
+    const ENGAGED: u16 = 4;
+    const BLIND: u16 = 5;
+
+    const fn ms(millis: u64) -> Duration {
+        Duration::from_millis(millis)
+    }
+
+    /// Returns a relay of a chain of 8, from which a station at Tx has requested reports. The relay has sent all that is
+    /// due at `NOW`.
+    fn watched(index: u16, wiring: Wiring) -> Node {
+        let mut node = relay_of(Mission::try_new(paper(8)).unwrap(), index, true);
+        node.member.settings.wiring = wiring;
+        let watch = Message::Watch {
+            number: 1,
+            mission: node.member.digest,
+        };
+        let from = if wiring == Wiring::Pair { index - 1 } else { 0 };
+        node.on_telemetry(NOW, Side::Upstream, from, &watch);
+        node.report_control(STANDBY);
+        while reported(&mut node, NOW).is_some() {}
+        node
+    }
+
+    /// Returns the next report toward Tx that is due at `now`, without the patience of an agreement.
+    fn reported(node: &mut Node, now: Instant) -> Option<Reports> {
+        let own = node.own(now);
+        let wait = Duration::from_micros(0);
+        loop {
+            let neighbours = &node.layers.neighbours;
+            let reporting = &mut node.reporting;
+            let (_, _, message) = reporting.poll(now, &node.member, neighbours, wait, own)?;
+            if let Message::Report(report) = message {
+                return Some(report);
+            }
+        }
+    }
+
+    /// Returns the first report in `span` from `now` on, and the time until then.
+    fn next(node: &mut Node, now: Instant, span: Duration) -> Option<(Duration, Reports)> {
+        (0..span.as_micros() / 10_000).find_map(|step| {
+            let after = ms(10 * step);
+            Some((after, reported(node, now + after)?))
+        })
+    }
+
+    fn relays(report: &Reports) -> heapless::Vec<u16, 4> {
+        report.entries.iter().map(Entry::relay).collect()
+    }
+
+    /// Returns an entry of a relay with this control state, and this number of a refused node.
+    fn entry(relay: u16, control: u16, refusal: u16) -> Entry {
+        Entry::new(
+            relay + 1_000 * refusal,
+            0,
+            4_096 * control,
+            Coarse::of(None),
+        )
+    }
+
+    /// Passes a report of relay `from` with these entries to the node.
+    fn receive(
+        node: &mut Node,
+        now: Instant,
+        from: u16,
+        entries: &[Entry],
+        detail: Option<Detail>,
+    ) {
+        let mut report = Reports::new(1, node.member.digest);
+        report.entries.extend_from_slice(entries).unwrap();
+        report.detail = detail;
+        node.on_telemetry(now, Side::Downstream, from, &Message::Report(report));
+    }
+
+    /// Passes a message of another mission of node `from` to the node.
+    fn foreign(node: &mut Node, now: Instant, from: u16) {
+        let mission = node.member.digest ^ 1;
+        let watch = Message::Watch { number: 1, mission };
+        let side = if from < node.member.node {
+            Side::Upstream
+        } else {
+            Side::Downstream
+        };
+        node.handle_message(now, side, from, &watch);
+    }
+
+    #[test]
+    fn an_ordinary_change_waits_for_no_further_period() {
+        let mut node = watched(1, Wiring::Shared);
+        // The time from one entry of the relay to the next.
+        let (_, report) = next(&mut node, NOW, ms(20_000)).unwrap();
+        assert_eq!(relays(&report), [1]);
+        let mut now = NOW + ms(20_000);
+        next(&mut node, now, ms(20_000)).unwrap();
+        let (period, _) = next(&mut node, now + ms(10), ms(20_000)).unwrap();
+        now = now + ms(10_000);
+        assert!(next(&mut node, now, ms(20_000)).is_some());
+        // The pilot gives the drone back, then another relay's report passes before the relay may report again.
+        node.reporting.handle_timeout(now + ms(100));
+        node.report_control(ENGAGED);
+        receive(&mut node, now + ms(110), 5, &[entry(5, ENGAGED, 0)], None);
+        let mut at = now + ms(110);
+        loop {
+            let (after, report) = next(&mut node, at, ms(20_000)).unwrap();
+            at = at + after;
+            if relays(&report).contains(&1) {
+                assert!(at.since(now) <= period, "{:?} {period:?}", at.since(now));
+                break;
+            }
+        }
+    }
+
+    #[test]
+    fn alarms_are_spread_on_a_shared_channel_only() {
+        for (index, wiring, spread) in [
+            (8, Wiring::Shared, 0),
+            (6, Wiring::Shared, 60),
+            (1, Wiring::Shared, 210),
+            (1, Wiring::Pair, 0),
+        ] {
+            let mut node = watched(index, wiring);
+            let now = NOW + ms(1_000);
+            node.reporting.handle_timeout(now);
+            node.report_control(BLIND);
+            let (after, report) = next(&mut node, now, ms(5_000)).unwrap();
+            assert_eq!((after, &relays(&report)[..]), (ms(spread), &[index][..]));
+        }
+    }
+
+    #[test]
+    fn further_changes_do_not_delay_an_alarm() {
+        let mut node = watched(1, Wiring::Shared);
+        let now = NOW + ms(1_000);
+        for (step, control) in (0..3).zip([BLIND, STANDBY, BLIND]) {
+            let now = now + ms(100 * step);
+            assert!(step == 0 || reported(&mut node, now).is_none());
+            node.reporting.handle_timeout(now);
+            node.report_control(control);
+        }
+        let (after, _) = next(&mut node, now + ms(200), ms(5_000)).unwrap();
+        assert_eq!(after, ms(10));
+    }
+
+    #[test]
+    fn one_report_has_the_own_alarm_and_a_stored_one() {
+        let mut node = watched(1, Wiring::Shared);
+        let now = NOW + ms(1_000);
+        receive(&mut node, now, 5, &[entry(5, ENGAGED, 0)], None);
+        while next(&mut node, now, ms(400)).is_some() {}
+        let now = now + ms(3_000);
+        while reported(&mut node, now).is_some() {}
+        let now = now + ms(600);
+        node.reporting.handle_timeout(now);
+        node.report_control(BLIND);
+        receive(&mut node, now, 5, &[entry(5, BLIND, 0)], None);
+        let (after, report) = next(&mut node, now, ms(5_000)).unwrap();
+        assert_eq!((after, &relays(&report)[..]), (ms(0), &[1, 5][..]));
+        assert_eq!(next(&mut node, now, ms(300)), None);
+    }
+
+    #[test]
+    fn the_alarm_of_a_refusal_outlasts_the_end_of_another_alarm() {
+        let mut node = watched(1, Wiring::Shared);
+        let now = NOW + ms(1_000);
+        node.reporting.handle_timeout(now);
+        foreign(&mut node, now, 2);
+        node.report_control(ENGAGED);
+        assert!(node.telemetry_waits() >= ms(6_000));
+        let sent = (0..30).find_map(|step| node.next_telemetry(now + ms(10 * step)));
+        let Some((_, _, Message::Report(report))) = sent else {
+            panic!("{sent:?}");
+        };
+        let entry = report.entries.first().unwrap();
+        assert_eq!((entry.refusal(), entry.control()), (5, ENGAGED));
+    }
+
+    #[test]
+    fn a_stored_refusal_comes_first_until_it_is_sent() {
+        let mut node = watched(1, Wiring::Shared);
+        let feed = |node: &mut Node, now, entries: &[Entry]| {
+            for entry in entries {
+                receive(node, now, 5, &[*entry], None);
+            }
+        };
+        let all = [5, 6, 7, 8].map(|relay| entry(relay, STANDBY, 0));
+        feed(&mut node, NOW, &all);
+        while next(&mut node, NOW, ms(3_000)).is_some_and(|(after, _)| after < ms(2_000)) {}
+        let now = NOW + ms(4_000);
+        feed(&mut node, now, &all[..3]);
+        feed(&mut node, now, &[entry(8, STANDBY, 1)]);
+        feed(&mut node, now + ms(500), &[entry(8, ENGAGED, 1)]);
+        let (_, report) = next(&mut node, now + ms(500), ms(3_000)).unwrap();
+        let stored = relays(&report).into_iter().find(|relay| *relay != 1);
+        assert_eq!(stored, Some(8), "{report:?}");
+    }
+
+    /// Checks that details that found no room in a report are taken from a later copy of the entry.
+    #[test]
+    fn details_that_were_not_sent_are_taken_from_a_copy() {
+        let mut node = watched(1, Wiring::Shared);
+        let detail = Some(Detail::new([Coarse::of(None); 2], [1, 1], 0.0, 7));
+        let now = NOW + ms(5_000);
+        let entries = [5, 6].map(|relay| entry(relay, ENGAGED, 0));
+        receive(&mut node, now, 5, &entries[..1], detail);
+        receive(&mut node, now, 6, &entries[1..], None);
+        let mut sent = 0;
+        for step in 0..40_u8 {
+            let now = now + ms(100 * u64::from(step));
+            if (1..12).contains(&step) {
+                // A copy by another way, which is as old as the entry.
+                let mut copied = entries[1];
+                copied.age = step;
+                receive(&mut node, now, 2, &[copied], detail);
+            }
+            while let Some(report) = reported(&mut node, now) {
+                sent += u8::from(report.detail.is_some() && relays(&report)[0] == 6);
+            }
+        }
+        assert_eq!(sent, 1);
+    }
+
+    #[test]
+    fn two_nodes_of_another_mission_are_refused_without_a_break() {
+        let mut node = watched(3, Wiring::Shared);
+        for second in 0..300 {
+            let now = NOW + ms(1_000 * second);
+            let from = if second % 2 == 0 { 1 } else { 2 };
+            foreign(&mut node, now, from);
+            assert_eq!(node.refusals(now)[0], if second == 0 { 2 } else { 1 });
+        }
+        let last = NOW + ms(299_000);
+        assert_eq!(node.refusals(last + ms(59_000)), [1, 0]);
+        assert_eq!(node.refusals(last + ms(120_000)), [0, 0]);
+    }
+
+    /// Checks that only the first refusal is reported ahead of its turn.
+    #[test]
+    fn a_refusal_is_an_alarm_once() {
+        let mut node = watched(3, Wiring::Shared);
+        let mut at: heapless::Vec<u64, 64> = heapless::Vec::new();
+        for tenth in 0..1_500 {
+            let now = NOW + ms(1_000 + 100 * tenth);
+            if tenth < 5 {
+                continue;
+            }
+            foreign(&mut node, now, 2);
+            while let Some((_, _, message)) = node.next_telemetry(now) {
+                if matches!(message, Message::Report(_)) {
+                    at.push(tenth).unwrap();
+                }
+            }
+        }
+        // All other reports wait for the first agreement.
+        let early = at.windows(2).filter(|pair| pair[1] - pair[0] < 60).count();
+        assert!(at[0] < 10 && early == 0, "{at:?}");
+    }
+
+    #[test]
+    fn refused_nodes_on_both_sides_take_turns_and_stations_are_none() {
+        let mut node = watched(2, Wiring::Shared);
+        for second in 0..100 {
+            foreign(&mut node, NOW + ms(1_000 * second), 0);
+            assert_eq!(node.refusals(NOW + ms(1_000 * second)), [0, 0]);
+        }
+        let mut named = [0_u16; 2];
+        for tenth in 0..600_u16 {
+            let now = NOW + ms(100_000 + 100 * u64::from(tenth));
+            for from in [1, 3] {
+                foreign(&mut node, now, from);
+            }
+            if tenth % 100 == 0 {
+                let watch = Message::Watch {
+                    number: tenth / 100 + 2,
+                    mission: node.member.digest,
+                };
+                node.on_telemetry(now, Side::Upstream, 0, &watch);
+            }
+            while let Some(report) = reported(&mut node, now) {
+                let entry = report.entries.iter().find(|it| it.relay() == 2);
+                match entry.map_or(0, Entry::refusal) {
+                    1 => named[0] += 1,
+                    5 => named[1] += 1,
+                    _ => {}
+                }
+            }
+        }
+        assert!(
+            named[0] > 5 && named[0].abs_diff(named[1]) <= named[0] / 4,
+            "{named:?}"
+        );
+        // Behind the last relay there is a station, too.
+        let mut last = watched(7, Wiring::Shared);
+        foreign(&mut last, NOW, 9);
+        assert_eq!(last.refusals(NOW), [0, 0]);
+        foreign(&mut last, NOW, 8);
+        assert_eq!(last.refusals(NOW), [0, 5]);
+    }
+
+    #[test]
+    fn another_key_is_forgotten_without_further_handshakes() {
+        let mut node = watched(3, Wiring::Shared);
+        let forge = |node: &mut Node, now, times| {
+            (0..times).for_each(|_| node.on_forged(now, Side::Upstream, 2));
+        };
+        forge(&mut node, NOW, 2);
+        assert_eq!(node.refusals(NOW), [0, 0]);
+        forge(&mut node, NOW, 1);
+        assert_eq!(node.refusals(NOW + ms(59_000)), [9, 0]);
+        assert_eq!(node.refusals(NOW + ms(120_000)), [0, 0]);
+        for minute in 1..5 {
+            let now = NOW + ms(60_000 * minute);
+            assert_eq!(node.refusals(now), [9, 0]);
+            forge(&mut node, now, 1);
+        }
+        node.on_key_match(Side::Upstream, 2);
+        assert_eq!(node.refusals(NOW + ms(240_000)), [0, 0]);
+        // Tx is a ground station.
+        (0..3).for_each(|_| node.on_forged(NOW + ms(240_000), Side::Upstream, 0));
+        assert_eq!(node.refusals(NOW + ms(240_000)), [0, 0]);
+        // A refused mission comes first.
+        forge(&mut node, NOW + ms(250_000), 3);
+        foreign(&mut node, NOW + ms(250_000), 4);
+        assert_eq!(node.refusals(NOW + ms(250_000)), [0, 5]);
     }
 }

@@ -5,7 +5,7 @@ use crate::time::{Duration, Instant};
 
 pub(crate) use crate::wire::CANDIDATES;
 
-/// Minimum interval between two reports to the firmware about the same node.
+/// Minimum interval between two reports to the firmware about the same refused node.
 const MINUTE: Duration = Duration::from_millis(60_000);
 
 /// Number of consecutive events of one kind at each of the four nearest nodes. An event is, for example, a handshake
@@ -32,12 +32,10 @@ impl ConsecutiveCounts {
         reached
     }
 
-    /// Returns the distance of the nearest node with `most` events in a row; 0 for none.
-    pub(super) fn nearest(self, most: u8) -> u16 {
-        let mut nodes = (1..).zip(self.0);
-        nodes
-            .find_map(|(distance, times)| (times >= most).then_some(distance))
-            .unwrap_or(0)
+    /// Returns true if the last `most` events of the node `distance` relays away were in a row.
+    pub(super) fn has(self, distance: u16, most: u8) -> bool {
+        let times = self.0.get(usize::from(distance).wrapping_sub(1));
+        times.is_some_and(|times| *times >= most)
     }
 }
 
@@ -49,39 +47,73 @@ pub(super) struct Hearing {
     before: u8,
 }
 
-/// Limits reports about nodes on one side to one a minute for each node.
+/// Nodes on one side that this relay has refused in the last one to two minutes.
+///
+/// The masks have the nodes with another mission in bits 0 to 3, and those with another key in bits 4 to 7; the nearest
+/// node first.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ReportLimiter {
+pub(super) struct Refusals {
     since: Instant,
-    nodes: u8,
+    now: u8,
+    before: u8,
 }
 
-impl ReportLimiter {
+impl Refusals {
     pub(super) const NONE: Self = Self {
         since: Instant::ZERO,
-        nodes: 0,
+        now: 0,
+        before: 0,
     };
 
-    /// Returns true if a report of the node `distance` relays away is allowed now. Marks the node as reported. One
-    /// report a minute is allowed for each node.
-    pub(super) fn should_report(&mut self, distance: u16, now: Instant) -> bool {
-        if now.since(self.since) >= MINUTE {
-            *self = Self {
-                since: now,
-                nodes: 0,
-            };
-        }
-        let new = mask(distance) & !self.nodes;
-        self.nodes |= new;
+    /// Records a message with another mission of the node `distance` relays away. Returns true at most once a minute
+    /// for each node.
+    pub(super) fn add_mission(&mut self, distance: u16, now: Instant) -> bool {
+        self.add(mask(distance), now)
+    }
+
+    /// Records a handshake of the node `distance` relays away, signed with another key.
+    pub(super) fn add_key(&mut self, distance: u16, now: Instant) {
+        self.add(mask(distance) << CANDIDATES, now);
+    }
+
+    /// Forgets the other key of the node `distance` relays away.
+    pub(super) fn remove_key(&mut self, distance: u16) {
+        let kept = !(mask(distance) << CANDIDATES);
+        self.now &= kept;
+        self.before &= kept;
+    }
+
+    /// Returns the distances of the nearest nodes with another mission and with another key; 0 for none.
+    ///
+    /// Only nodes nearer than `end` relays away count.
+    pub(super) fn nearest(mut self, now: Instant, end: u16) -> [u16; 2] {
+        self.age(now);
+        let nodes = self.now | self.before;
+        [nodes & 0x0F, nodes >> CANDIDATES].map(|nodes| {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+            let distance = nodes.trailing_zeros() as u16 + 1;
+            if nodes == 0 || distance >= end {
+                0
+            } else {
+                distance
+            }
+        })
+    }
+
+    fn add(&mut self, nodes: u8, now: Instant) -> bool {
+        self.age(now);
+        let new = nodes & !self.now;
+        self.now |= new;
         new != 0
     }
 
-    /// Returns the distance of the nearest node that was reported in the last two minutes; 0 for none.
-    pub(super) fn nearest(&self, now: Instant) -> u16 {
-        let is_old = self.nodes == 0 || now.since(self.since) >= MINUTE.times(2);
-        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
-        let distance = self.nodes.trailing_zeros() as u16 + 1;
-        if is_old { 0 } else { distance }
+    fn age(&mut self, now: Instant) {
+        let span = now.since(self.since);
+        if span >= MINUTE {
+            let is_old = span >= MINUTE.times(2);
+            self.before = if is_old { 0 } else { self.now };
+            (self.now, self.since) = (0, now);
+        }
     }
 }
 

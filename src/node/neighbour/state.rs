@@ -28,7 +28,7 @@
 
 use super::damping::Damping;
 use super::hearing::Hellos;
-use super::hearing::{CANDIDATES, ConsecutiveCounts, Hearing, ReportLimiter, mask};
+use super::hearing::{CANDIDATES, ConsecutiveCounts, Hearing, Refusals, mask};
 use super::liveness::{Liveness, patience, tick};
 use crate::node::context::Proposer;
 use crate::node::context::{first_pass, longest_lease};
@@ -86,8 +86,8 @@ pub(crate) struct Neighbour {
     /// Bit mask of the nodes reported as found since a neighbour was last linked or lost. The reports are events for
     /// the firmware. Bit 0 is the nearest node.
     reported_found: u8,
-    /// Limiter of reports about nodes on this side that have another mission.
-    pub(super) mismatches: ReportLimiter,
+    /// Nodes on this side that this relay has refused lately.
+    refusals: Refusals,
     /// Number of consecutive handshakes signed with another key, for each node on this side.
     pub(super) forged: ConsecutiveCounts,
     /// Interval between heartbeat requests to a silent neighbour.
@@ -124,7 +124,7 @@ impl Neighbour {
         hearing: Hearing::new(Instant::ZERO),
         not_received: ConsecutiveCounts::NONE,
         reported_found: 0,
-        mismatches: ReportLimiter::NONE,
+        refusals: Refusals::NONE,
         forged: ConsecutiveCounts::NONE,
         tick: Duration::from_micros(0),
         patience: Duration::from_micros(0),
@@ -718,25 +718,31 @@ impl Neighbour {
     ///
     /// The mismatch is reported at most once a minute for each node.
     pub(crate) fn should_report_mismatch(&mut self, distance: u16, now: Instant) -> bool {
-        self.mismatches.should_report(distance, now)
+        self.refusals.add_mission(distance, now)
     }
 
-    /// Returns the distances of the nearest node that was reported for another mission in the last two minutes, and of
-    /// the nearest node whose last handshakes were signed with another key; 0 for none.
-    pub(crate) fn refused(&self, now: Instant) -> [u16; 2] {
-        [self.mismatches.nearest(now), self.forged.nearest(FORGED)]
+    /// Returns the distances of the nearest nodes refused for another mission and for another key; 0 for none.
+    ///
+    /// A refusal counts for one to two minutes. Only nodes nearer than `end` relays away count.
+    pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
+        self.refusals.nearest(now, end)
     }
 
     /// Counts a handshake of the node `distance` relays away that is signed with another key. Returns true, once,
     /// when [`FORGED`] such handshakes were received in a row.
-    pub(crate) fn should_report_forged(&mut self, distance: u16) -> bool {
-        self.forged.count(distance, true, FORGED)
+    pub(crate) fn should_report_forged(&mut self, distance: u16, now: Instant) -> bool {
+        let is_news = self.forged.count(distance, true, FORGED);
+        if self.forged.has(distance, FORGED) {
+            self.refusals.add_key(distance, now);
+        }
+        is_news
     }
 
     /// Resets the count of handshakes with another key, because the node has used the right key now. The node is
     /// `distance` relays away.
     pub(crate) fn on_key_match(&mut self, distance: u16) {
         self.forged.count(distance, false, FORGED);
+        self.refusals.remove_key(distance);
     }
 }
 
