@@ -486,7 +486,7 @@ fn a_check_names_planted_faults_of_the_autopilot() {
         ],
         &[
             "MAVLink system 9 instead of 2: is this the right drone?",
-            "mode        OFFBOARD or GUIDED",
+            "mode        the mode is OFFBOARD or GUIDED",
             "position    the autopilot reports no position",
             "parameters  FENCE_ACTION is 1 instead of 4, SYSID_THISMAV is 9 instead of 2, FENCE_TYPE is not reported by the autopilot; see ",
         ],
