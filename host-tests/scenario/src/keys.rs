@@ -394,7 +394,7 @@ impl fmt::Display for Rule {
             LinkOrNumber(range) => write!(f, "\"los\", \"nlos\" or a number, {range}"),
             Rule::NumberOrTwo(range) => write!(
                 f,
-                "a number, {range}; or, if the key area is given, a list of the least and the greatest number"
+                "a number, {range}; with the key area also a list [LEAST, GREATEST]"
             ),
             Rule::Numbers(ranges) => write!(f, "a list of {}", listed(ranges)),
             Rule::Points(ranges, [least, most]) => {

@@ -51,7 +51,9 @@ const STUCK_AFTER: Duration = Duration::from_millis(15_000);
 /// Relays report the refusal for up to two minutes after its last cause.
 const LINGERS: Duration = Duration::from_millis(150_000);
 
-/// Time for which a relay's report of one refused relay holds while its reports name another one, on its other side.
+/// Time for which a report of a refused relay holds while later reports name another refused relay.
+///
+/// A relay names the refused relays on its two sides in turn.
 const TURNS: Duration = Duration::from_millis(20_000);
 
 /// Distance from a setpoint below which a drone has reached it, m.
@@ -86,8 +88,9 @@ struct Known {
     nearest: Option<(Instant, f32)>,
     /// Time of the first report of the present neighbours.
     neighbours_at: Instant,
-    /// Time of the first report after a silence in which reports of relays behind this one may have been lost; `None`
-    /// before.
+    /// Time of the first report after a silence; `None` before a silence.
+    ///
+    /// In this silence reports of relays behind this one were possibly lost.
     returned_at: Option<Instant>,
 }
 

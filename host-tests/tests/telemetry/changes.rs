@@ -286,8 +286,9 @@ fn alarms_are_known_in_time() {
     assert!(age_s[1] <= 2.0, "{age_s:?}");
 }
 
-/// Checks that the time without a lease after the loss of both end relays at once, some 15 s, is no longer if the others
-/// report alarms meanwhile: all at the same time, or spread as the relays spread them.
+/// Checks that alarms do not prolong the time without a lease after the loss of both end relays.
+///
+/// This time is some 15 s. The other relays report alarms in it: all at the same time, or spread as relays spread them.
 #[test]
 fn alarms_beside_the_loss_of_both_ends_delay_no_lease() {
     let span = [s(60), s(120)];

@@ -88,8 +88,9 @@ impl Node {
         )
     }
 
-    /// Returns the [refusals](crate::wire::message::Entry::refusal) of the nearest refused relay toward Tx and toward
-    /// Rx; 0 for none. Tx and Rx do not count: ground stations have no place in the chain.
+    /// Returns the refusals of the nearest refused relay toward Tx and toward Rx; 0 for none.
+    ///
+    /// The values are those of [`Entry::refusal`](crate::wire::message::Entry::refusal). Tx and Rx do not count: ground stations have no place in the chain.
     pub(super) fn refusals(&self, now: Instant) -> [u16; 2] {
         let Member { node, all, .. } = self.member;
         let neighbours = &self.layers.neighbours;
@@ -113,7 +114,8 @@ impl Node {
     }
 }
 
-#[cfg(all(test, feature = "telemetry", feature = "upload"))]
+#[cfg(test)]
+#[cfg(all(feature = "telemetry", feature = "upload"))]
 mod tests {
     use super::*;
     use crate::mission::Mission;

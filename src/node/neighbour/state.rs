@@ -721,7 +721,7 @@ impl Neighbour {
         self.refusals.add_mission(distance, now)
     }
 
-    /// Returns the distances of the nearest nodes refused for another mission and for another key; 0 for none.
+    /// Returns the distances of the nearest nodes with another mission and with another key; 0 for none.
     ///
     /// A refusal counts for one to two minutes. Only nodes nearer than `end` relays away count.
     pub(crate) fn refused(&self, now: Instant, end: u16) -> [u16; 2] {
