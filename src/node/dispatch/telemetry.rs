@@ -90,8 +90,12 @@ impl Node {
 
     /// Returns the refusals of the nearest refused relay toward Tx and toward Rx; 0 for none.
     ///
-    /// The values are those of [`Entry::refusal`](crate::wire::message::Entry::refusal). Tx and Rx do not count: ground stations have no place in the chain.
+    /// The values are those of [`Entry::refusal`](crate::wire::message::Entry::refusal). Tx and Rx do not count: ground
+    /// stations have no place in the chain. Without the cargo feature `telemetry` both values are 0.
     pub(super) fn refusals(&self, now: Instant) -> [u16; 2] {
+        if !TELEMETRY {
+            return [0; 2];
+        }
         let Member { node, all, .. } = self.member;
         let neighbours = &self.layers.neighbours;
         let before = neighbours.at(Side::Upstream).refused(now, node);

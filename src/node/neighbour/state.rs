@@ -30,6 +30,7 @@ use super::damping::Damping;
 use super::hearing::Hellos;
 use super::hearing::{CANDIDATES, ConsecutiveCounts, Hearing, Refusals, mask};
 use super::liveness::{Liveness, patience, tick};
+use crate::features::TELEMETRY;
 use crate::node::context::Proposer;
 use crate::node::context::{first_pass, longest_lease};
 use crate::settings::{Settings, Wiring};
@@ -732,7 +733,7 @@ impl Neighbour {
     /// when [`FORGED`] such handshakes were received in a row.
     pub(crate) fn should_report_forged(&mut self, distance: u16, now: Instant) -> bool {
         let is_news = self.forged.count(distance, true, FORGED);
-        if self.forged.has(distance, FORGED) {
+        if TELEMETRY && self.forged.has(distance, FORGED) {
             self.refusals.add_key(distance, now);
         }
         is_news

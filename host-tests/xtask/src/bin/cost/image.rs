@@ -121,8 +121,8 @@ const IMAGES: &[Image] = &[
         // - fitted slots: 5 KiB flash, 104 bytes RAM
         // - departures, spares, and motions that end together: 6 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM
-        // - states of refused setpoints and of nodes with another mission or key in reports: 0.5 KiB
-        [238 * 1024 + 768, 16_640, 7_168],
+        // - states of refused setpoints and of nodes with another mission or key in reports: 1 KiB
+        [239 * 1024 + 512, 16_640, 7_168],
     ),
 ];
 
