@@ -579,11 +579,8 @@ mod tests {
         }
     }
 
-    /// Returns how often, in 20 s, an autopilot's reports of a moving target count as another target.
-    ///
-    /// The autopilot reports twice a second. It reports the position that was sent `lag` times 100 ms earlier, moved
-    /// sideways by `aside_m`.
-    fn other_targets(lag: usize, aside_m: f32) -> usize {
+    /// Returns a line of 1 km toward north.
+    fn axis() -> Axis {
         let site = |lat_e7| Geodetic {
             lat_e7,
             lon_e7: 85_400_000,
@@ -593,7 +590,15 @@ mod tests {
             tx: site(474_000_000),
             rx: site(474_090_000),
         };
-        let axis = Axis::between(sites).unwrap();
+        Axis::between(sites).unwrap()
+    }
+
+    /// Returns how often, in 20 s, an autopilot's reports of a moving target count as another target.
+    ///
+    /// The autopilot reports twice a second. It reports the position that was sent `lag` times 100 ms earlier, moved
+    /// sideways by `aside_m`.
+    fn other_targets(lag: usize, aside_m: f32) -> usize {
+        let axis = axis();
         let to = Placement::on_line(900.0, 20.0);
         let mut target = Target::at(Placement::on_line(100.0, 20.0), Instant::ZERO);
         let mut sent: Vec<Placement, 256> = Vec::new();
@@ -629,16 +634,7 @@ mod tests {
     /// Checks that a refusal ends with the autopilot's reports of its target, until the next one.
     #[test]
     fn a_refusal_is_unknown_without_reports_of_the_target() {
-        let site = |lat_e7| Geodetic {
-            lat_e7,
-            lon_e7: 85_400_000,
-            amsl_mm: 420_000,
-        };
-        let sites = Sites {
-            tx: site(474_000_000),
-            rx: site(474_090_000),
-        };
-        let axis = Axis::between(sites).unwrap();
+        let axis = axis();
         let mut target = Target::at(Placement::on_line(100.0, 20.0), Instant::ZERO);
         let other = axis.point(Placement::on_line(200.0, 20.0)).unwrap();
         let at = |seconds: u64| Instant::from_millis(1_000 * seconds);

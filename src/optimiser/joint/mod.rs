@@ -22,6 +22,7 @@ mod chain;
 pub mod fitted;
 mod hop;
 mod interior;
+mod line;
 mod outlook;
 mod site;
 pub mod solver;

@@ -312,7 +312,7 @@ fn the_highest_ground_near_a_relay_is_that_of_the_surface() {
         let mut highest = 0.0_f64;
         for ring in 0..=30_u32 {
             for angle in 0..720_u32 {
-                let (sin, cos) = f64::from(angle).to_radians().sin_cos();
+                let (sin, cos) = (0.5 * f64::from(angle)).to_radians().sin_cos();
                 let r = radius * f64::from(ring) / 30.0;
                 highest = highest.max(surface(node.x_m + r * cos, node.y_m + r * sin));
             }

@@ -30,9 +30,9 @@ mod newton;
 
 use super::chain::{Chain, SeatOf};
 use super::hop::{Triple, minus};
+use super::line::Noted;
 use super::outlook::{upper_half, widened};
 use super::site::{Cell, Cells};
-use super::solver::Noted;
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
 use hop::{Derivatives, Levels, LogGains, add_scaled, dot};

@@ -13,9 +13,9 @@
 //! mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
-use super::line::Line;
 use crate::optimiser::joint::chain::{Chain, SeatOf};
 use crate::optimiser::joint::interior::Interior;
+use crate::optimiser::joint::line::Line;
 use crate::optimiser::joint::site::{Cell, Cells, Room};
 use crate::optimiser::joint::starts::Seek;
 use crate::optimiser::search::Infeasible;

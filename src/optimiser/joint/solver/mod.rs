@@ -18,7 +18,6 @@
 
 mod both;
 mod judge;
-mod line;
 mod passes;
 
 use crate::features::{ALTITUDE, REVERSE};
@@ -32,9 +31,8 @@ use crate::optimiser::search::Infeasible;
 use crate::place::{CrossSection, Placement};
 use core::task::Poll;
 
+use crate::optimiser::joint::line::Line;
 use both::Both;
-use line::Line;
-pub(super) use line::Noted;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {

@@ -10,7 +10,7 @@ use crate::optimiser::joint::chain::{
 };
 use crate::optimiser::joint::hop::{Triple, minus, triple};
 use crate::optimiser::joint::outlook::{Brief, Outlook};
-use crate::optimiser::joint::site::{Cell, Cells, Room, Site};
+use crate::optimiser::joint::site::{Cell, Room, Site};
 use crate::optimiser::joint::starts::Start;
 use crate::place::Placement;
 use core::task::Poll;
@@ -243,26 +243,5 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
             link.apart_m = 0.0;
         }
         link
-    }
-}
-
-impl<const RELAYS: usize> Cells<RELAYS> {
-    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
-    pub(super) fn least_step(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
-        if index <= 1 {
-            return 0.0;
-        }
-        let at = |index| self.get(index).place(chain.room(index));
-        let across = at(index).apart_squared(at(index - 1));
-        chain.mission.step_with_room(across)
-    }
-
-    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
-    pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
-        let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
-        let first = chain.distance_m() - steps.clone().sum::<f32>();
-        steps
-            .take(index.into())
-            .fold(first, |end_m, step| chain.end_after(end_m, step))
     }
 }

@@ -19,7 +19,7 @@ use core::task::Poll;
 const AT_ONCE: [u16; 2] = [20, 2];
 
 /// Memory of a relay during Algorithm 1: its x, and the upper limit of its x, m.
-pub(in crate::optimiser::joint) trait Noted {
+pub(super) trait Noted {
     fn lengths_m(&mut self) -> &mut [f32; 2];
 }
 
@@ -217,4 +217,25 @@ fn ending<const RELAYS: usize>(
         fixed_m: None,
     };
     link.ending(target, from_m, reach_m)
+}
+
+impl<const RELAYS: usize> Cells<RELAYS> {
+    /// Returns the minimum step along x, m, that keeps relay `index` separated from the relay before it.
+    pub(super) fn least_step(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
+        if index <= 1 {
+            return 0.0;
+        }
+        let at = |index| self.get(index).place(chain.room(index));
+        let across = at(index).apart_squared(at(index - 1));
+        chain.mission.step_with_room(across)
+    }
+
+    /// Returns the largest x of relay `index`, m, that leaves the relays after it their separation.
+    pub(super) fn end_m(&self, chain: &Chain<'_, impl SeatOf>, index: u16) -> f32 {
+        let steps = (1..=chain.relays()).map(|at| self.least_step(chain, at));
+        let first = chain.distance_m() - steps.clone().sum::<f32>();
+        steps
+            .take(index.into())
+            .fold(first, |end_m, step| chain.end_after(end_m, step))
+    }
 }
