@@ -60,7 +60,27 @@ pub fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
         Interference::Sources(sources) if sources.len() > 1 => {
             multi_interferer::plan(scenario, ask)
         }
-        Interference::Sources(_) => source::plan(scenario, ask),
+        Interference::Sources(_) => with_one_interferer(scenario, ask),
+    }
+}
+
+/// Returns the plan of `ask` for a scenario with one interferer.
+fn with_one_interferer(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
+    match ask.number {
+        Number::Of(1) if ask.free_altitude && ask.x_m.is_none() && scenario.has_fitted_slots() => {
+            altitude::best(scenario, 1, ask.tolerance)
+        }
+        Number::Of(1) if scenario.reverse > 0.0 => source::alone_both_ways(scenario, ask.tolerance),
+        Number::Of(1) => source::alone(scenario, ask),
+        Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
+        Number::Of(relays) if scenario.reverse > 0.0 => {
+            source::best_both_ways(scenario, relays, ask.tolerance)
+        }
+        Number::Of(relays) => source::best(scenario, relays, ask.tolerance),
+        Number::Meeting(target) if ask.free_altitude => {
+            altitude::fewest(scenario, target, ask.tolerance)
+        }
+        Number::Meeting(target) => source::level(scenario, target, ask.tolerance),
     }
 }
 

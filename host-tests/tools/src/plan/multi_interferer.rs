@@ -105,14 +105,15 @@ impl Planner<'_> {
             number: Number::Of(relays),
             ..*self.ask
         };
-        let by_one = match source::plan(&with_one(self.scenario, &self.hypothetical), &ask) {
-            Ok(plan) => {
-                let value = merit(self.radio.as_ref(), &scene, &plan.chain());
-                Some((plan, value))
-            }
-            Err(NoPlan::Unmet(..)) => None,
-            Err(wrong) => return Err(wrong),
-        };
+        let by_one =
+            match super::with_one_interferer(&with_one(self.scenario, &self.hypothetical), &ask) {
+                Ok(plan) => {
+                    let value = merit(self.radio.as_ref(), &scene, &plan.chain());
+                    Some((plan, value))
+                }
+                Err(NoPlan::Unmet(..)) => None,
+                Err(wrong) => return Err(wrong),
+            };
         let start = by_one.as_ref().map(|(plan, _)| plan);
         let by_all = self.by_all(&scene, start);
         Ok(Candidates {

@@ -11,7 +11,7 @@ use crate::single::{Found, aside, theorems, without_interferer};
 
 use super::bound::{Targets, excludes};
 use super::{
-    NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, altitude, fewest_of, is_free,
+    NoPlan, Number, Plan, PlanRequest, ProfiledMission, Theorem, Why, fewest_of, is_free,
     one_both_ways,
 };
 
@@ -39,7 +39,7 @@ pub(super) fn level(scenario: &Scenario, target: f64, tolerance: f64) -> Result<
 }
 
 /// Returns the best position of one relay for both directions, above the line at its altitude.
-fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> {
+pub(super) fn alone_both_ways(scenario: &Scenario, tolerance: f64) -> Result<Plan, NoPlan> {
     let briefed = ProfiledMission::new(scenario, 1, tolerance)?;
     let altitude_m = briefed.profile(1).altitude_m;
     let scene = Scene::new(scenario, 1).ok_or_else(nothing)?;
@@ -72,7 +72,11 @@ pub(super) fn is_excluded_both_ways(scenario: &Scenario, relays: u16, target: f6
 }
 
 /// Returns the best positions of Algorithm 1 for both directions, marked as proven if a proof is found.
-fn best_both_ways(scenario: &Scenario, relays: u16, tolerance: f64) -> Result<Plan, NoPlan> {
+pub(super) fn best_both_ways(
+    scenario: &Scenario,
+    relays: u16,
+    tolerance: f64,
+) -> Result<Plan, NoPlan> {
     let plan = best(scenario, relays, tolerance)?;
     let more = plan.sir() * (1.0 + 2.0 * tolerance);
     let proven = is_excluded_both_ways(scenario, relays, more);
@@ -272,25 +276,6 @@ fn own_profiles(scenario: &Scenario, mission: &Mission) -> Vec<(u16, Profile)> {
             (index, profile)
         })
         .collect()
-}
-
-pub(super) fn plan(scenario: &Scenario, ask: &PlanRequest) -> Result<Plan, NoPlan> {
-    match ask.number {
-        Number::Of(1) if ask.free_altitude && ask.x_m.is_none() && scenario.has_fitted_slots() => {
-            altitude::best(scenario, 1, ask.tolerance)
-        }
-        Number::Of(1) if scenario.reverse > 0.0 => alone_both_ways(scenario, ask.tolerance),
-        Number::Of(1) => alone(scenario, ask),
-        Number::Of(relays) if ask.free_altitude => altitude::best(scenario, relays, ask.tolerance),
-        Number::Of(relays) if scenario.reverse > 0.0 => {
-            best_both_ways(scenario, relays, ask.tolerance)
-        }
-        Number::Of(relays) => best(scenario, relays, ask.tolerance),
-        Number::Meeting(target) if ask.free_altitude => {
-            altitude::fewest(scenario, target, ask.tolerance)
-        }
-        Number::Meeting(target) => level(scenario, target, ask.tolerance),
-    }
 }
 
 // Plans in a field of interference.
