@@ -202,7 +202,7 @@ const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
         Departure::NeedsGuard => "refused: no guard",
         Departure::NeedsChannel => "refused: needs a shared radio",
-        Departure::NeedsQuorum => "refused: others would lack a quorum",
+        Departure::NeedsQuorum => "refused: the chain would be too small",
         Departure::WideGap => "refused: too many absent relays",
         Departure::Blocked => "refused: neighbours lack a link",
         _ => return None,

@@ -334,7 +334,7 @@ impl Uploading {
                     return self.decide(now, log, plan, ground, flown);
                 }
                 return failed(format!(
-                    "upload of version {version} refused: relay {} flies version {}, but its firmware is too old to report the values of that mission: give --from-loaded, and give as options all values of that mission that the new mission keeps",
+                    "upload of version {version} refused: relay {} flies version {}, but its firmware is too old to report the values of that mission: give --from-loaded, and repeat as options all values that the new mission takes over from the mission in flight",
                     flown.by, flown.version
                 ));
             }

@@ -68,7 +68,7 @@ pub fn run_all(
                 .map(|spec| (spec.end, spec.at))
                 .collect();
             println!(
-                "SEED={seed}: {what}; {uploads:?} kills {:?} boots {:?} {:?}",
+                "SEED={seed}: {what}; {uploads:?} kills {:?} boots {:?} wiring {:?}",
                 setup.kills, setup.boots, setup.settings.wiring
             );
             failed.push(seed);

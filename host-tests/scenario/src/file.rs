@@ -437,7 +437,7 @@ fn channel(file: &str, raw: &RawChannel) -> Result<ChannelSpec, ScenarioError> {
             "channel.excess_loss_los_db",
             los,
             format!(
-                "0 to {} dB (the default of excess_loss_nlos_db)",
+                "0 to {} dB (the upper limit is the default of excess_loss_nlos_db)",
                 number(nlos)
             ),
         ),

@@ -813,7 +813,7 @@ impl Model for Check {
         vec![
             Property::always(ONE_CHAIN, |_, chain| Self::is_one_chain(chain)),
             Property::always(
-                "no view is decided, or agreed on, with two different numbers of relays",
+                "no view that is decided or agreed on has two different numbers of relays",
                 |_, chain| Self::has_one_size(chain),
             ),
             Property::always(

@@ -21,7 +21,9 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
             .find(|table| table.head.first() == Some(&"offset"))
         else {
             // A message without a table has the layout of the previous one.
-            let before = messages.last().ok_or("the first message has no table")?;
+            let before = messages
+                .last()
+                .ok_or("FORMAT.md: the first message has no table")?;
             let fields = before.fields.clone();
             messages.push(Layout {
                 name: name.to_owned(),
@@ -37,9 +39,12 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
             fields,
         });
     }
-    let text = section(document, "\n### Handshake\n").ok_or("there is no handshake")?;
+    let text =
+        section(document, "\n### Handshake\n").ok_or("FORMAT.md: there is no section Handshake")?;
     let tables = tables(text);
-    let table = tables.first().ok_or("the handshake has no table")?;
+    let table = tables
+        .first()
+        .ok_or("FORMAT.md: the section Handshake has no table")?;
     let handshake = Layout {
         name: "Handshake".to_owned(),
         fields: fields(&rows(table)?, &[]).map_err(|error| format!("handshake: {error}"))?,

@@ -330,7 +330,7 @@ fn agree(options: &Options, method: &str, scenario: &Scenario) -> Result<(), Fai
         ));
         if uploads {
             command::print_line(
-                "note: an upload changes this interferer; all other values stay as they are",
+                "note: --upload changes the interferer that the relays use; all other values stay",
             );
         }
     }

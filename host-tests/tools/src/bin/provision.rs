@@ -492,8 +492,8 @@ impl<'a> Asked<'a> {
             "a new key"
         };
         Ok(format!(
-            "{}: {} folders of relays, and ground, with {made}, mission 0x{:04x}\n\
-             next: {FILL_IN} in each 70-uav-relay.rules, then on each computer: sudo sh install.sh; page.txt has the rest\n",
+            "{}: {} folders of relays and the folder ground, with {made}, mission 0x{:04x}\n\
+             next: replace {FILL_IN} in each 70-uav-relay.rules, then run on each computer: sudo sh install.sh; page.txt has the further steps\n",
             dir.display(),
             relays.len(),
             flight.mission().digest()

@@ -220,7 +220,7 @@ pub fn rounds_sheet() -> Result<Sheet, FigureError> {
         title: "SIR by round of Algorithm 2, fifty relays",
         says: vec![
             format!(
-                "After {most} rounds the SIR is {:.1} % higher than at first with the search from coarse to fine, and {:.1} % with the grid of 41 by 21. Algorithm 1 has made all hops equal, so a single relay can improve only by steps smaller than those of the coarse grid.",
+                "{most} rounds raise the SIR by {:.1} % with the search from coarse to fine, and by {:.1} % with the grid of 41 by 21. Algorithm 1 has made all hops equal, so a single relay can improve only by steps smaller than those of the coarse grid.",
                 gain(|row| row.sir_fine_linear),
                 gain(|row| row.sir_grid_linear),
             ),

@@ -157,7 +157,7 @@ pub fn places_sheet() -> Result<Sheet, FigureError> {
         ],
         taken: [
             taken(),
-            vec!["at the lowest altitude, with the same lateral range to both sides".to_owned()],
+            vec!["all at the lowest altitude; lateral range: as far to the left of the line as to the right".to_owned()],
         ]
         .concat(),
         chart: Chart {

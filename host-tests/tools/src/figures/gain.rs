@@ -96,8 +96,8 @@ pub fn sheet() -> Result<Sheet, FigureError> {
             format!(
                 "random: mean SIR of the worst hop over {DRAWS} chains with positions uniform in [0, D], in order (seed {SEED} + N)"
             ),
-            "blind (ignores the interferer): the chain whose weakest received signal is strongest; the paper only names this method. From N = 43 on every such chain has an outer relay \
-             straight above Rx, and all hops are shortened in proportion"
+            "blind (ignores the interferer): the chain whose weakest received signal is strongest; the paper only names this method. From N = 43 on the last relay of every such chain is \
+             straight above Rx, so all x are multiplied by the same factor below 1"
                 .to_owned(),
             "equal: relay k at k D / (N + 1); not in the paper".to_owned(),
             "Algorithm 1 with the arithmetic of the relays, within 1e-6 of its optimum instead of a step of 0.1"

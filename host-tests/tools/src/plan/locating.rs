@@ -279,7 +279,7 @@ impl fmt::Display for Locating {
         };
         writeln!(
             f,
-            "listening: if the interferer is in {:.1} % of the area, the relays locate it with an error below a tenth of its distance from the line; median of the error (standard deviation) {}, largest error {} at x = {x:.1} m, y = {y:.1} m",
+            "listening: in {:.1} % of the area the relays would locate the interferer with an error below a tenth of its distance from the line; standard deviation of the located position: median {}, largest {} at x = {x:.1} m, y = {y:.1} m",
             100.0 * self.located,
             metres(self.error_m),
             metres(self.worst_error_m)

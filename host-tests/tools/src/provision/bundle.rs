@@ -444,7 +444,7 @@ impl Bundle<'_> {
         if let Some([low, high]) = self.ground_m {
             _ = writeln!(
                 page,
-                "return to launch: {:.0} m above home, at least 10 m above the ground and the chain, if home is at most {ASIDE_M:.0} m beside the chain; ground with the least height above it: {low:.1} to {high:.1} m above the mean sea level",
+                "return to launch: {:.0} m above home, at least 10 m above the ground and the chain, if home is at most {ASIDE_M:.0} m beside the chain; lowest and highest ground on these ways home: {low:.1} and {high:.1} m above the mean sea level",
                 self.return_m(index)
             );
         }
