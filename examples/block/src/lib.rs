@@ -1,4 +1,4 @@
-//! Configuration block of a drone, written once and separately from the image: index, mission and keys.
+//! Configuration block of a drone: index, mission and keys. It is written once, separately from the firmware.
 //!
 //! The block has a flash sector of its own, which firmware updates do not touch: [`ADDRESS`] on an STM32F405. `cargo provision`
 //! writes it from a scenario. All numbers are little-endian, floats IEEE 754:
@@ -90,10 +90,10 @@ pub use write::write;
 /// Address of the configuration block: the last flash sector of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
 
-/// Bit rate of every port of the firmware, bit/s. The configuration block cannot change it.
+/// Bit rate of every port of the firmware, bit/s. It is fixed.
 pub const BAUD: u32 = 115_200;
 
-/// First bytes of every configuration block, which identify it.
+/// First bytes of every configuration block.
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// Version of the configuration block's format.
@@ -102,13 +102,13 @@ pub const VERSION: u16 = 11;
 /// Length of a configuration block, bytes.
 pub const LEN: usize = 392;
 
-/// Maximum number of points of a configuration block for the distribution of the interference along x.
+/// Maximum number of interference points in a configuration block.
 pub const MAX_POINTS: usize = 16;
 
-/// Number of bytes that the block's CRC covers: all except the CRC itself.
+/// Number of bytes that the CRC covers: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Maximum value of `probe_after_ms` in a block, ms. After this silence a relay requests a heartbeat from a neighbour.
+/// Maximum of `probe_after_ms`, ms. A neighbour that is silent for this time is asked for a heartbeat.
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
@@ -117,24 +117,23 @@ const LEN_FIELD: u16 = 392;
 /// Configuration block as stored in flash.
 pub type Block = [u8; LEN];
 
-/// Storage for the points of a mission's distribution of the interference along x.
+/// Storage for the interference points of a mission.
 pub type FieldStorage = [FieldPoint; MAX_POINTS];
 
-/// Initial content of the storage for the points of a mission's distribution of interference along x.
+/// Initial content of a [`FieldStorage`].
 pub const EMPTY: FieldStorage = [FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 0.0,
 }; MAX_POINTS];
 
-/// Reads and checks a configuration block of arbitrary bytes. If it gives the interference as a distribution along x,
-/// its points are stored in `storage`.
+/// Reads and checks a configuration block. The interference points, if any, are copied to `storage`.
 ///
-/// A relay accepts every returned configuration, with two exceptions: it rejects the joint method for more than 100
-/// relays, and a configuration that needs a feature its build lacks.
+/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions: more than 100
+/// relays with the joint method, and a feature that the relay's build lacks.
 ///
 /// # Errors
-/// [`ConfigError`] names the fault, and for a number out of range which one.
-#[inline(never)] // its stack frame is released before the relay needs the space
+/// [`ConfigError`] names the fault, or the number that is out of range.
+#[inline(never)] // frees its stack frame before the relay needs the space
 pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config, ConfigError> {
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);
@@ -237,7 +236,7 @@ pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
     }
 }
 
-/// Returns the autopilot's signing key in a block that [`read`] has accepted; `None` without a key.
+/// Returns the autopilot's signing key of a block that [`read`] has accepted; `None` without a key.
 pub fn autopilot_key(block: &Block) -> Option<[u8; 32]> {
     let raw: &Layout = zerocopy::transmute_ref!(block);
     let key = raw.autopilot_key;

@@ -50,7 +50,7 @@ pub enum Register {
     DebugFreeze = 0xE004_2008,
 }
 
-/// Access to the chip's registers, or to a mock of them in RAM.
+/// Access to the chip's registers, real or simulated.
 pub trait Registers {
     /// Returns the value of the hardware register `register`.
     fn read(&mut self, register: Register) -> u32;

@@ -13,8 +13,8 @@
 //! | image | sector 0, the vectors alone; sectors 5 and 6 |
 //! | configuration block | sector 7 |
 //!
-//! USART2 on PA2 and PA3 is not used: solder bridges SB13 and SB14 connect both pins to the ST-LINK's virtual serial port, and
-//! not to D0 and D1.
+//! USART2 on PA2 and PA3 is not used. The solder bridges SB13 and SB14 connect these pins to the ST-LINK's virtual
+//! serial port, and not to D0 and D1.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -35,8 +35,9 @@ bind_interrupts!(
     }
 );
 
-/// Creates the description of the board. An erase of a flash sector stops the CPU for 0.25 s (16 KiB) or 0.55 s (64
-/// KiB); these are typical times, and the longest are twice as long.
+/// Creates the description of the board.
+///
+/// An erase of a flash sector stops the CPU for 0.25 s (16 KiB) or 0.55 s (64 KiB), at most for twice as long.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     Board::new(
         seed(),
