@@ -20,7 +20,7 @@ pub fn read<T: Parser>(
     let (words, beyond) = config::read::<T>(section).map_err(|line| refuse(&line))?;
     let options = T::try_parse_from(words).map_err(|error| {
         if !error.use_stderr() {
-            // Help text, or a mistake. A closed output is ignored.
+            // Text of help or version. A closed standard output is ignored.
             let _ = error.print();
             return ExitCode::SUCCESS;
         }

@@ -187,7 +187,9 @@ impl FileOptions {
     }
 }
 
-/// Returns the value of the option `name` on the command line, if it is there; empty if it is the last word.
+/// Returns the value of the option `name` on the command line, if it is there.
+///
+/// The value is empty if the option is the last word.
 fn value_of(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
@@ -320,7 +322,9 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// Adds the SNR gap of fitted slots (as long as each hop needs) to the options `given`, if the file has one.
+/// Adds the SNR gap of the file's fitted slots, if any, to the options `given`.
+///
+/// A fitted slot is as long as its hop needs.
 fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), String> {
     let error = |refusal: mission::Refusal| refusal.to_string();
     let (mission, _) = mission::mission(scenario, 1, COMPANION_TOLERANCE).map_err(error)?;

@@ -1,4 +1,4 @@
-//! Log lines, written by a separate thread, so that a slow reader or a full disk never blocks the program.
+//! Log lines, written by a separate thread. A slow reader or a full disk never blocks the program.
 //!
 //! A line that cannot be written is dropped. The next written line reports how many were dropped.
 

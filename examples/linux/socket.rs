@@ -105,7 +105,9 @@ impl StatusSocket {
 }
 
 impl Client {
-    /// Reads from the client; returns true after a line, the end of the stream, an overlong line or a timeout.
+    /// Reads from the client; returns true if the request is complete.
+    ///
+    /// A request ends with a line, the end of the stream, too many bytes or a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {

@@ -255,7 +255,9 @@ pub fn load(option: &str, file: &Path) -> Result<Option<Vec<u8>>, String> {
     }
 }
 
-/// Returns the record in `bytes`, the content of a [`StoredFile`], if its CRC is right and it has `length` bytes.
+/// Returns the record in `bytes`, the content of a [`StoredFile`].
+///
+/// `None` if its CRC is wrong or it does not have `length` bytes.
 pub fn record(bytes: &[u8], length: usize) -> Option<&[u8]> {
     let (record, check) = bytes.split_at_checked(length)?;
     (sum(record) == *check).then_some(record)

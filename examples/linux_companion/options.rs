@@ -20,8 +20,7 @@ use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, Method, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
 
-/// Latency of a frame between two relays. It is caused by two kernels, two USB adapters (up to 16 ms each) and the
-/// computation.
+/// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
 const LATENCY: Duration = Duration::from_millis(40);
 
 /// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
@@ -111,8 +110,8 @@ pub(crate) struct Options {
     /// Maximum speed of the drone, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
     speed: f32,
-    /// Neighbour that a directional antenna points to, forward on the drone: the targets have that heading. Without it the autopilot
-    /// chooses the heading
+    /// Neighbour that a directional antenna points to. It points forward on the drone, so the targets have a heading.
+    /// Without it the autopilot chooses the heading
     #[arg(long, value_name = "SIDE", value_enum, requires = "autopilot")]
     antenna: Option<Antenna>,
     #[command(flatten)]
