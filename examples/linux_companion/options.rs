@@ -221,8 +221,7 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that the program can know the time of flight, and that a full battery lasts long enough. A full battery
-    /// must last longer than the reserve and a replacement.
+    /// Checks that the flight time can be known, and that a full battery outlasts reserve plus replacement.
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(
@@ -243,7 +242,7 @@ impl BatteryOptions {
     }
 }
 
-/// Direction of a directional antenna.
+/// Neighbour that a directional antenna points to.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Antenna {
     /// The neighbour toward the transmitter.
@@ -261,11 +260,11 @@ pub(crate) struct Plan {
     pub(crate) key: Option<SigningKey>,
     pub(crate) autopilot: Option<AutopilotPlan>,
     pub(crate) overrides: Vec<Override>,
-    /// Planned position of this relay; `None` without a plan in the file.
+    /// Planned position of this relay, if the file has a plan.
     pub(crate) planned: Option<Placement>,
 }
 
-/// Reads and checks the command line. The error is the exit status after help or a mistake was printed.
+/// Reads and checks the command line. The error is the exit status after help or a mistake.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     let (options, beyond) = command::read(section)?;
     plan(options, beyond).map_err(|line| command::refuse(&line))
@@ -280,7 +279,7 @@ fn micros(seconds: f32) -> Duration {
     Duration::from_micros((f64::from(seconds) * 1e6) as u64)
 }
 
-/// Adds the options that the file's sections `[network]` and `[companion]` give.
+/// Adds the options of the file's sections `[network]` and `[companion]`.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.companion;
@@ -401,7 +400,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// Returns the load of the shared radio channel, and checks that the channel can carry all relays.
+/// Returns the load of the shared radio channel. Its data rate must suffice for all relays.
 fn channel_load(options: &Options) -> Result<ChannelLoad, String> {
     let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
@@ -458,8 +457,7 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     mission::mission(config, "--")
 }
 
-/// Parses the interference's distribution along x. The memory of its points is never freed, because the mission refers
-/// to them until the program ends.
+/// Parses the interference along x. Its points are leaked, because the mission refers to them until exit.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text
