@@ -165,7 +165,7 @@ where
     }
 }
 
-/// Parses the name of an output file; `-` is rejected, because the report goes to standard output.
+/// Parses the name of an output file. `-` is rejected, because the report goes to standard output.
 ///
 /// # Errors
 /// The name is empty or `-`; the message names the alternative.
