@@ -73,7 +73,9 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// Computes the positions of all relays from the mission alone by the joint method, from all its initial chains.
+/// Computes the positions of all relays from the mission alone by the joint method.
+///
+/// It tries all initial chains of the method.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));
