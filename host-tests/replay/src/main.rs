@@ -37,7 +37,7 @@ fn main() -> ExitCode {
 
 /// Checks that the page replaces neither an input file nor another capture.
 fn check_out(options: &Options) -> Result<(), String> {
-    // A file that does not exist has no such path.
+    // A missing file has no such path.
     let Ok(path) = options.out.canonicalize() else {
         return Ok(());
     };
