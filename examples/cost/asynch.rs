@@ -1,4 +1,4 @@
-//! Cost of the runners around a relay: a whole sweep from one port to the other, polled and asynchronous.
+//! Cost of the runners around a relay for a whole sweep, with polled and asynchronous ports.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -107,7 +107,7 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3, and the first sweep message from relay 1: its bytes, its length, and when it is sent.
+/// Returns relay 2 of 3 and the first sweep message from relay 1: bytes, length, and time.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {

@@ -7,7 +7,9 @@ use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 use super::counter::relay;
 use super::missions::mission;
 
-/// Measures the maximum stack use of a relay's calls, bytes: a pattern shows which words were overwritten.
+/// Measures the maximum stack use of a relay's calls, bytes.
+///
+/// The calls overwrite a pattern on the stack.
 #[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);

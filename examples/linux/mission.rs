@@ -96,8 +96,8 @@ pub struct MissionOptions {
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9) and position x, y (m, -1e7 to 1e7): x toward the receiver, y to the right
-    /// when facing it. `unknown` for relays that listen; default 80,500,400
+    /// Interferer: power (W, 1e-6 to 1e9) and position x, y (m, -1e7 to 1e7). x is toward the receiver, y to the
+    /// right when facing it. `unknown` for relays that listen; default 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
     pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
@@ -119,7 +119,7 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the interference: the interferer of the command line, else `field`, else the paper's interferer.
+    /// Returns the interference of the command line, else `field`, else that of the paper.
     ///
     /// `field` is the file's interference along x.
     pub fn interference(&self, field: Option<Interference>) -> Interference {

@@ -13,7 +13,7 @@ const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns the reasons why the drone waits for its neighbours: toward the transmitter, toward the receiver.
+/// Returns the reasons why the drone waits for its neighbours: upstream, downstream.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }

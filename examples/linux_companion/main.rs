@@ -1,4 +1,4 @@
-//! Relay on a Linux companion computer, over ttys: USB adapters, the UART of a header, telemetry radios.
+//! Relay on a Linux companion computer, over ttys: USB adapters, UARTs, telemetry radios.
 //!
 //! ```text
 //! cargo companion --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1

@@ -119,7 +119,7 @@ enum Line {
     Endurance([f32; 2]),
 }
 
-/// Parses a line: a position with or without a power, `receiver` and a power, or `endurance` and two times.
+/// Parses a line: position with or without power, `receiver` and power, or `endurance` and two times.
 ///
 /// Returns the reason as an error if the line is invalid, or has a power although `listens` is false.
 fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {

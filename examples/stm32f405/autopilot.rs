@@ -1,4 +1,6 @@
-//! Link to the drone's autopilot, PX4 or ArduCopter, at USART1: TX PA9, RX PA10, 115 200 baud, MAVLink 2.
+//! Link to the drone's autopilot, PX4 or ArduCopter: MAVLink 2 at 115 200 baud.
+//!
+//! It uses USART1: TX PA9, RX PA10.
 //!
 //! Used if the block has Tx and Rx positions; otherwise the port is never opened.
 

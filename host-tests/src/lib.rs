@@ -9,7 +9,7 @@
 //! | [`firmware`] | firmware images, their flash, and emulated drones |
 //! | [`python`] | independent peers in Python |
 
-// Empty on a microcontroller, where no tests run, for `cargo check --target thumbv7em-none-eabihf`.
+// Empty on a microcontroller, where no tests run; for `cargo check --target thumbv7em-none-eabihf`.
 #![cfg_attr(target_os = "none", no_std)]
 
 #[cfg(not(target_os = "none"))]

@@ -31,8 +31,9 @@ pub(super) struct Layout {
     /// interference as a distribution along x.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
-    /// Channel: carrier (Hz), excess losses with and without line of sight (factors), and the line-of-sight
-    /// weight, 0 to 1.
+    /// Channel: carrier frequency (Hz), two excess losses (factors), and the line-of-sight weight (0 to 1).
+    ///
+    /// The excess losses are with and without line of sight.
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],

@@ -50,7 +50,9 @@ pub(crate) fn stop() -> ! {
     }
 }
 
-/// Panic handler that makes the link fail if it is used: so `cargo cost` proves that no panic is reachable.
+/// Panic handler that makes the link fail if it is used.
+///
+/// So `cargo cost` proves that no panic is reachable.
 #[cfg(prove_no_panic)]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {

@@ -19,7 +19,9 @@ pub(crate) use uav_relay_block::BAUD;
 /// Capacity of the receive queue, bytes: 11 ms of traffic.
 pub(crate) const RECEIVED: usize = 128;
 
-/// Capacity of the send queue, bytes: more than the longest frame, so that the main loop can sleep while it is sent.
+/// Capacity of the send queue, bytes: more than the longest frame.
+///
+/// So the main loop can sleep while a frame is sent.
 pub(crate) const OUTGOING: usize = 256;
 
 pub(crate) type Queues<const OUT: usize = OUTGOING, const IN: usize = RECEIVED> =

@@ -11,7 +11,7 @@ use uav_relay_scenario::{Interference, Scenario};
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Choice {
-    /// Only x, along the line from transmitter to receiver. All relays have the same altitude.
+    /// Distance x along the line from transmitter to receiver. All relays have the same altitude.
     Places,
     Altitudes,
     Sides,
@@ -92,7 +92,7 @@ impl Problem {
         }
     }
 
-    /// Returns the problem in the form of the other solvers: link, and limits of altitude and lateral position.
+    /// Returns link and limits (altitude and lateral position) of the problem, as other solvers use them.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {

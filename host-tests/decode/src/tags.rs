@@ -14,9 +14,9 @@ pub enum TagCheck {
     Right,
     /// The tag is wrong.
     Wrong,
-    /// Not checked: the network key is unknown.
+    /// The tag was not checked, because the network key is unknown.
     NoKey,
-    /// Not checked: no handshake of the two nodes was captured.
+    /// The tag was not checked, because no handshake of the two nodes was captured.
     NoHandshake,
 }
 

@@ -506,7 +506,9 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Removes the part about received frames from an alarm: a replay does not know what the station received.
+/// Removes the part about received frames from an alarm.
+///
+/// A replay does not know what the station received.
 fn replayed(text: String) -> String {
     match text.split_once("nothing received from the chain") {
         Some(("", rest)) => {

@@ -59,7 +59,9 @@ pub enum Refused {
     NoAutopilot,
     /// The Tx and Rx positions form no valid line, or their distance differs from the mission's.
     Course(CourseError),
-    /// The relay rejects the settings: this build lacks a feature, or the joint method has more than 100 relays.
+    /// The relay rejects the settings.
+    ///
+    /// This build lacks a feature, or the joint method has more than 100 relays.
     Setup(SetupError),
 }
 

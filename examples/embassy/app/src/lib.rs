@@ -1,4 +1,4 @@
-//! Application of every board here: it creates the relay from the configuration block, and runs its ports.
+//! Application of every board here: creates the relay from the configuration block, and runs its ports.
 //!
 //! It also logs events and setpoints.
 //!

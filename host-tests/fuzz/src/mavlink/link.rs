@@ -389,7 +389,7 @@ impl Link {
         }
     }
 
-    /// Checks a flight target sent by the link: finite, near the line, within the speed limit, and permitted now.
+    /// Checks a flight target: finite, near the line, within the speed limit, and permitted now.
     fn check_target(&mut self, payload: &[u8]) {
         let state = self.autopilot.state();
         let may = matches!(state, State::Engaged | State::Blind)

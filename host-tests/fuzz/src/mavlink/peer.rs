@@ -122,7 +122,9 @@ impl Peer {
         self.history.get(at).cloned()
     }
 
-    /// Sets the autopilot's clock: a day earlier or later, near the tested link's, or to the largest timestamp.
+    /// Sets the autopilot's clock to another time.
+    ///
+    /// It is a day earlier or later, near the tested link's time, or the largest timestamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
         const DAY: u64 = 8_640_000_000;
         self.stamp = match input.below(6) {

@@ -1,4 +1,4 @@
-//! Reference parser by the definition of frames: finds the earliest valid frame, then continues after it.
+//! Reference parser by the definition of frames: finds the earliest valid frame, then the next.
 
 use uav_relay::flight::mavlink::frame;
 

@@ -207,9 +207,9 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission: the newest stored one, that loaded before flight, or another.
+    /// Returns version and digest of a mission: the newest stored, the loaded one, or another.
     ///
-    /// Another mission has a newer, older or arbitrary version.
+    /// The loaded mission was loaded before flight. Another one has a newer, older or arbitrary version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {
@@ -233,7 +233,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the session number of a fence (message of the collision guard): the relay's, a small one, or any.
+    /// Appends the session number of a fence (collision-guard message): the relay's, small, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),

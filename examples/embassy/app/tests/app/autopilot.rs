@@ -14,10 +14,10 @@ fn apart(a: Placement, b: Placement) -> f32 {
     apart.map(|part| part * part).iter().sum::<f32>().sqrt()
 }
 
-/// Checks the targets that the autopilot receives: none on the ground, and the drone's position while the pilot
-/// flies.
+/// Checks the targets that the autopilot receives.
 ///
-/// Once the pilot chooses OFFBOARD, the drone flies to its relay's position within the speed limit.
+/// On the ground there are none. While the pilot flies, they are the drone's position. Once the pilot chooses
+/// OFFBOARD, the drone flies to its relay's position within the speed limit.
 #[test]
 fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     let start = Placement::on_line(100.0, 20.0);

@@ -21,7 +21,9 @@ fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// Checks that a relay restarted three times never votes for an older view: the promised number never falls.
+/// Checks that a relay restarted three times never votes for an older view.
+///
+/// The promised view number must never fall.
 ///
 /// The other two relays fly on and readmit it.
 #[test]

@@ -1,4 +1,4 @@
-//! Figures of the relay image: sizes, largest stack, and the proof that no panic is reachable.
+//! Figures of the relay image: sizes and largest stack; and the proof that it cannot panic.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -13,10 +13,10 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 
 const RELAY: &str = "stm32f405";
 
-/// Name of the firmware image with one port, which leads to a shared radio.
+/// Firmware image with one port, to a shared radio.
 const RADIO: &str = "stm32f405_radio";
 
-/// Name of the firmware image that uses asynchronous ports.
+/// Firmware image with asynchronous ports.
 const ASYNC: &str = "stm32f405_async";
 
 const ASYNC_FEATURES: &[&str] = &["--no-default-features", "--features", "async"];
@@ -47,10 +47,10 @@ type Image = (
     [u64; 3],
 );
 
-/// Firmware images whose costs are measured, with the largest permitted flash, static RAM and stack.
+/// Measured firmware images, with the maximum of flash, static RAM and stack.
 ///
-/// Relay and ground station share some code. This sharing costs an image with `auth` 0.4 KB of flash, and saves it 0.8
-/// KB of stack.
+/// Relay and ground station share some code, which costs an image with `auth` 0.4 KB of flash, and saves 0.8 KB of
+/// stack.
 const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
@@ -177,7 +177,7 @@ fn cargo(command: &str, example: &str) -> Command {
     cargo
 }
 
-/// Builds a firmware example with the cargo options `more`, and returns the path of its ELF file.
+/// Builds a firmware example with the cargo options `more`; returns the path of its ELF file.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
     run(cargo("build", example).args(more))?;
     Ok(PathBuf::from("target")
@@ -205,8 +205,8 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 
 /// Returns the largest stacks of the main thread and of one interrupt, bytes.
 ///
-/// The thread begins with the function that `Reset` calls; the interrupt includes the frame that the processor saves
-/// with its FPU registers. `pair` is true for two ports to neighbours, `flies` for a port to an autopilot.
+/// The thread begins with the function that `Reset` calls. The interrupt includes the frame saved by the processor
+/// with its FPU registers. `pair` is true for ports to two neighbours, `flies` for a port to an autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
@@ -237,7 +237,7 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     let (thread, path) = deepest("main")?;
     println!("deepest stack: {thread} bytes by {}", path.join(" > "));
     let mut handler = 0;
-    // A radio needs one port, and without the feature `flight` the autopilot's is not used.
+    // A radio needs one port. Without the feature `flight` the autopilot's port is not used.
     let others = [pair.then_some("USART3"), flies.then_some("USART1")];
     for name in ["USART2", "SysTick"]
         .into_iter()
@@ -248,9 +248,9 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Proves that no relay image can panic: each links with a handler that calls an undefined function.
+/// Proves that no relay image can panic: each links with a panic handler that cannot be linked.
 ///
-/// The control is an image with a deliberate panic, which must not link.
+/// To test the proof, an image with a deliberate panic must fail to link.
 pub(crate) fn no_panic() -> Result<(), String> {
     only_finished_futures_panic()?;
     let link = |example: &str, features: &[&str], flags: &[&str]| {
@@ -273,10 +273,10 @@ pub(crate) fn no_panic() -> Result<(), String> {
     }
 }
 
-/// Checks that the asynchronous image has no panics except those for polling a completed future.
+/// Checks that the asynchronous image can only panic when a completed future is polled.
 ///
-/// The compiler adds such a panic to each `async fn`, so this image cannot be linked without a panic handler. An
-/// `await` never reaches the panic.
+/// The compiler adds this panic to each `async fn`, so the image cannot link without a panic handler. An `await`
+/// never reaches it.
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";
     let image = build(ASYNC, ASYNC_FEATURES)?;
@@ -299,7 +299,7 @@ fn only_finished_futures_panic() -> Result<(), String> {
             finished += 1;
         }
     }
-    // Finding none would mean that the search pattern is wrong.
+    // None at all would mean a wrong search pattern.
     if finished == 0 {
         return Err("the asynchronous image has no panic at all: link it with the others".into());
     }

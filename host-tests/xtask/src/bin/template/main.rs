@@ -48,8 +48,7 @@ fn write(name: &str, folder: &Path) -> Result<(), Box<dyn Error>> {
 
 /// Writes a firmware template to a folder, checks its formatting, lints it and builds it.
 ///
-/// The folder is outside this checkout, because inside it the checkout's cargo settings would hide missing linker
-/// arguments.
+/// The folder is outside this checkout, whose cargo settings would hide missing linker arguments.
 fn check(name: &str) -> Result<(), Box<dyn Error>> {
     let above = std::env::temp_dir().join(format!("uav-relay-template-{}", std::process::id()));
     let folder = above.join(name);
