@@ -113,7 +113,7 @@ impl Tap {
 ///
 /// Logs the file's name if another one had to be used.
 ///
-/// An earlier capture is never overwritten, because it may be the only record of a crash: if `asked` exists, a number
+/// An earlier capture is never overwritten, because it may be the only record of a crash. If `asked` exists, a number
 /// is added to the name.
 ///
 /// # Errors

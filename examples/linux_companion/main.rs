@@ -13,7 +13,7 @@
 //! `--upload-file` keeps them over a restart. `--view-file` keeps the relay's votes on the membership of the chain
 //! over a restart in flight; remove the file before another flight.
 //!
-//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with PX4 or ArduCopter over a tty or UDP: it
+//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with PX4 or ArduCopter over a tty or UDP. It
 //! streams targets and receives positions, so that the guard can keep drones apart. With `--positions` another
 //! program reports the position, and flies to the logged setpoints. With neither, nothing keeps drones apart, and the
 //! log warns.

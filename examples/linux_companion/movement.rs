@@ -1,7 +1,8 @@
 //! Log lines about the flight to the agreed position: setpoints and arrival.
 //!
-//! With an autopilot the guard moves the setpoint several times a second, so a line is written every 0.5 m and at the
-//! end of each move. Without one another program may fly the drone by these lines, so every change is logged.
+//! With an autopilot the guard moves the setpoint several times a second. A line is then written every 0.5 m and at
+//! the end of each move. Without an autopilot another program may fly the drone by these lines, so every change is
+//! logged.
 
 use serde_json::json;
 use uav_relay::{Duration, Instant, Placement, Relay};
@@ -151,8 +152,8 @@ impl Movement {
 impl Step {
     /// Logs this setpoint or arrival. Each number of a setpoint is also logged as the bits of its f32.
     ///
-    /// The position is in the mission's coordinates: `x_m` metres from the transmitter toward the receiver, `y_m` to
-    /// the right when facing the receiver, `altitude_m` above the ground.
+    /// The position is in the mission's coordinates. `x_m` is the distance from the transmitter toward the receiver,
+    /// `y_m` the distance to the right when facing the receiver, `altitude_m` the height above the ground.
     pub(crate) fn log(self, now: Instant, log: &Log) {
         match self {
             Self::Setpoint(place) => {

@@ -1,8 +1,8 @@
 //! Positions of the drone, read from a FIFO.
 //!
-//! A line has one of three forms: `x_m y_m altitude_m`, optionally followed by the interference measured there
-//! (`1.2e-12` in W, or `-95 dBm`); `receiver POWER`, measured at the ground receiver; `endurance SECONDS HOME`, the
-//! remaining flight time and the time to fly home.
+//! A line has one of three forms. `x_m y_m altitude_m` is a position; the interference measured there may follow, as
+//! `1.2e-12` in W or as `-95 dBm`. `receiver POWER` is the interference at the ground receiver. `endurance SECONDS
+//! HOME` has the remaining flight time and the time to fly home.
 
 use std::os::fd::BorrowedFd;
 use std::path::Path;

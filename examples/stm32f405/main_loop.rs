@@ -90,7 +90,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
 /// Returns no measurement. Replace it by one that returns the newest measurement of your receiver.
 ///
 /// To estimate the interferer, the relay also needs the drone's position. If the mission has the interference as a
-/// function of x, call `Relay::restart` at the leader after enough samples: the chain then agrees on positions for
+/// function of x, call `Relay::restart` at the leader after enough samples. The chain then agrees on positions for
 /// the measured interference.
 const fn measured() -> Option<Sample> {
     None

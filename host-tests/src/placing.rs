@@ -106,7 +106,7 @@ pub struct Solved {
 
 /// Checks that the crate's solution is at most `allowed` (relative) below the optimum, and never above.
 ///
-/// All relays of the chain `link` must have the same altitude: then the crate finds the optimum, because each relay
+/// All relays of the chain `link` must have the same altitude. Then the crate finds the optimum, because each relay
 /// goes as far as the target SIR permits. Without any chain of an SIR above 0 the crate must find no solution; then
 /// `None` is returned.
 pub fn optimum_is_found(

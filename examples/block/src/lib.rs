@@ -128,8 +128,8 @@ pub const EMPTY: FieldStorage = [FieldPoint {
 
 /// Reads and checks a configuration block. The interference points, if any, are copied to `storage`.
 ///
-/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions: more than 100
-/// relays with the joint method, and a feature that the relay's build lacks.
+/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions. It rejects the
+/// joint method for more than 100 relays, and a feature that its build lacks.
 ///
 /// # Errors
 /// [`ConfigError`] names the fault, or the number that is out of range.

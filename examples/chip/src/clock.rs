@@ -200,8 +200,8 @@ pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
 
 /// Returns the frequencies that [`start`] reaches, and switches back to the HSI.
 ///
-/// For HALs that set up the clocks themselves and wait for them without a limit: they can be told to use only clocks
-/// that work.
+/// Some HALs set up the clocks themselves, and wait for them without a limit. Such a HAL can be told to use only
+/// clocks that work.
 pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {

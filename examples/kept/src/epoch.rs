@@ -4,10 +4,10 @@
 //! used. An epoch is used only after its entry has been read back, so an entry cut short has not been used. A sector
 //! of 128 KiB holds 10 922 starts.
 //!
-//! A failed write is retried at the next places. If all fail, the epoch is used all the same: it is larger than all
-//! stored ones, so the neighbours accept it, whereas they would reject an older one throughout the flight. But the
-//! next start may get the same epoch and be rejected until the neighbours restart. So the failure is logged as an
-//! error, and the drone must not fly again before its block has a larger epoch and its flash is sound.
+//! A failed write is retried at the next places. If all fail, the epoch is used all the same. It is larger than all
+//! stored ones, so the neighbours accept it; they would reject an older one throughout the flight. But the next start
+//! may get the same epoch and be rejected until the neighbours restart. So the failure is logged as an error. The
+//! drone must not fly again before its block has a larger epoch and its flash is sound.
 
 use crate::journal::{Flash, Journal, WhenFull};
 

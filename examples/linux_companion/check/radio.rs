@@ -149,7 +149,8 @@ impl Radio {
 
     /// Returns the numbers of the relays that may fly.
     ///
-    /// A relay may fly if it reports so, or if it is in a chain and has not reported that its drone is on the ground.
+    /// It may fly if it reports so. A relay in a chain may also fly if it has not reported that its drone is on the
+    /// ground.
     fn flying(&self) -> Vec<String> {
         let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
         let flying = self.heard.iter().filter(|(_, heard)| flies(heard));

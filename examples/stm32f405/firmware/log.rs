@@ -1,6 +1,6 @@
 //! Log lines, with `--features defmt`. They go to a UART (`uart_log.rs`) or to the debug probe.
 //!
-//! With `--features rtt`, `probe-rs run` prints them. They are then written to RAM without blocking; the probe cannot
+//! With `--features rtt`, `probe-rs run` prints them. They are then written to RAM without blocking. The probe cannot
 //! request the counters, and frames that it reads too slowly are lost uncounted.
 #![allow(
     clippy::match_same_arms,

@@ -1,6 +1,6 @@
 //! Uploaded missions, persisted across a reboot.
 //!
-//! They are in a [`Journal`](uav_relay_kept::journal::Journal) whose key is the CRC of the configuration block: with
+//! They are in a [`Journal`](uav_relay_kept::journal::Journal) whose key is the CRC of the configuration block. With
 //! another block they are ignored, and the drone flies the mission of that block.
 //!
 //! An upload in flight erases nothing, because an erase of these sectors stops the CPU for 1 to 2 s. A sector of 128

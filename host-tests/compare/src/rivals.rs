@@ -16,7 +16,7 @@ const PROGRAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/serve.py");
 
 /// Returns the maximum wall-clock time to wait for an answer of the Python process.
 ///
-/// It is far above the processor time limit `limit_s`, s: a busy machine runs the process only part of the time, and
+/// It is far above the processor time limit `limit_s`, s. A busy machine runs the process only part of the time, and
 /// some steps of the solvers cannot be interrupted.
 fn patience(limit_s: f64) -> Duration {
     Duration::from_secs_f64(20.0 * limit_s + 60.0)

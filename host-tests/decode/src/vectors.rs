@@ -2,9 +2,9 @@
 //!
 //! Their file is `host-tests/tests/data/vectors.json`.
 //!
-//! The program encodes bodies by the byte tables (tags 0 and 2 also with the postcard implementation pohlednice
-//! 0.2.1), CRCs bit by bit, COBS by definition, and lists of target SIRs step by step with rounding. `FORMAT.md`
-//! describes the file.
+//! The program encodes bodies by the byte tables, and tags 0 and 2 also with the postcard implementation pohlednice
+//! 0.2.1. It computes CRCs bit by bit, COBS by definition, and lists of target SIRs step by step with rounding.
+//! `FORMAT.md` describes the file.
 
 use serde::{Deserialize, Deserializer, de::Error as _};
 

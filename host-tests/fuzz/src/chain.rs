@@ -31,9 +31,8 @@ const ROUNDING: f64 = 1.3e-7;
 /// Fuzz target. Reads `data` as a mission, the relays' settings, and operations on the frames between relays.
 ///
 /// # Panics
-/// A relay breaks a rule that the module `watch` checks, two neighbours are too close, or the chain does not agree
-/// after the faults have ended. The separation is only checked if both positions come from the same pass.
-/// message along the chain and back) are too close. Or the chain does not agree after faults have ended.
+/// A relay breaks a rule that the module `watch` checks. Or two neighbours are too close, although their positions come
+/// from the same pass, a message along the chain and back. Or the chain does not agree after the faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }

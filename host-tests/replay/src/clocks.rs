@@ -1,11 +1,14 @@
 //! Merges the frames of several files by their clocks.
 //!
-//! The clock of the first file is the reference. A frame that occurs in two files connects their clocks: it was sent
-//! in one and received in the other, or received in both. A received frame is later than the sent one by its delay,
-//! so frames in one direction give lower bounds of the clock offset, and frames in the other direction upper bounds.
-//! In each `WINDOW` the mean of the closest two bounds is taken, in which the shortest delays of both directions
-//! cancel. Between windows the offset is interpolated, which follows the drift. A step of a clock ends an
-//! interpolation. Steps of the first file's clock are left out.
+//! The clock of the first file is the reference. A frame that occurs in two files connects their clocks. It was sent
+//! in one and received in the other, or received in both.
+//!
+//! A received frame is later than the sent one by its delay. So frames in one direction give lower bounds of the
+//! clock offset, and frames in the other direction upper bounds. In each `WINDOW` the mean of the closest two bounds
+//! is taken, in which the shortest delays of both directions cancel.
+//!
+//! Between windows the offset is interpolated, which follows the drift. A step of a clock ends an interpolation.
+//! Steps of the first file's clock are left out.
 
 use std::collections::HashMap;
 

@@ -6,15 +6,15 @@ use super::{Chain, Member};
 
 /// Maximum number of rounds until all relays agree. In a round each relay receives one frame.
 ///
-/// The slowest agreement takes some minutes of virtual time, while the relays do not use links that were lost
-/// repeatedly, and then 24 passes along 4 relays.
+/// In the slowest agreement, the relays first do not use links that were lost repeatedly, for some minutes of virtual
+/// time. Then 24 passes go along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
     /// Runs the chain without faults until all relays agree in one view (membership of the chain).
     ///
     /// Panics if that takes more than [`PATIENCE`] rounds. Returns at once if the leader finds that no target SIR can
-    /// be met, or if a relay lowers the target in fixed steps, which takes too long.
+    /// be met. Does nothing if a relay lowers the target in fixed steps, which takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {

@@ -71,8 +71,8 @@ impl Body<'_, '_> {
 
     /// Appends the name of a view (membership of the chain).
     ///
-    /// It is the relay's accepted view, an earlier one, any one, or one of the next numbers with one of the first
-    /// four relays as proposer.
+    /// It is the relay's accepted view, an earlier one or any one. Or it has one of the next numbers, with one of the
+    /// first four relays as proposer.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {

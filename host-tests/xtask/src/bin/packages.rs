@@ -1,7 +1,7 @@
 //! Checks the workspace's dependencies and the packaged crate; run by `cargo ci`.
 //!
-//! Licences, a single registry, no duplicate versions in the library, and no link of the README to a file that is not
-//! packaged.
+//! It checks licences, a single registry, that the library needs no package in two versions, and that the README
+//! links to no file that is not packaged.
 //!
 //! Security advisories are not checked: they change without a commit, and must be downloaded.
 

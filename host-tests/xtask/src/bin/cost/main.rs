@@ -2,8 +2,8 @@
 //!
 //! It also proves that the firmware cannot panic.
 //!
-//! It builds the relay image and the image that counts instructions with the firmware profile. It reads sizes and the
-//! largest stack from the relay's ELF, runs the counting image in QEMU, and links the relay image with a panic
+//! It builds the relay image and the image that counts instructions, with the firmware profile. It reads sizes and
+//! the largest stack from the relay's ELF, and runs the counting image in QEMU. It links the relay image with a panic
 //! handler that cannot be linked. `cargo cost --write` writes the measured costs to the documents.
 
 mod counted;

@@ -15,7 +15,7 @@
 //! | `tested` | is run by a test of its own |
 //! | `window` | opens a window |
 //!
-//! A block that needs hardware is not run, but the options of this project's commands in it are checked: a program
+//! A block that needs hardware is not run. But the options of this project's commands in it are checked: a program
 //! must not reject them (status 2).
 //!
 //! A command must succeed, unless its comment begins with `exit status N`: then it must exit with that status.
