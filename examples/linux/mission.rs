@@ -53,7 +53,7 @@ const PAPERS: Interference = Interference::Source(Interferer {
 /// Placement method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Method {
-    /// Algorithm 1; in a field Algorithm 4
+    /// Algorithm 1; with --field Algorithm 4
     Align,
     /// Joint optimisation of positions, sides and altitudes
     #[value(alias = "altitude")]
@@ -109,8 +109,8 @@ pub struct MissionOptions {
     /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub rx_power: Option<f32>,
-    /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap `joint` chooses the places of the largest data rate in
-    /// slots as long as each hop needs
+    /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap each slot is as long as its hop
+    /// needs, and `joint` chooses the places with the largest data rate
     #[arg(long, value_name = "G", default_value_t = 0.0, allow_negative_numbers = true, value_parser = fitted_gap)]
     pub fitted_gap: f32,
     /// Minimum distance between two relays, m, 0 to 1e5

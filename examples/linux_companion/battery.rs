@@ -1,4 +1,4 @@
-//! Battery of the drone: logs the departure, texts the pilot, and delays a start in flight.
+//! Battery of the drone: logs the departure, sends texts to the pilot, and delays a start in flight.
 //!
 //! | departure | text to the pilot |
 //! | --- | --- |
@@ -98,7 +98,7 @@ impl Battery {
         self.waits
     }
 
-    /// Logs changes of the relay's departure, and texts them to the pilot.
+    /// Logs changes of the relay's departure, and sends them to the pilot as text.
     pub(crate) fn tend(
         &mut self,
         now: Instant,

@@ -122,7 +122,8 @@ pub(crate) struct Options {
     position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
-    /// Method of finding positions; with --field only `align`. The first relay's setting counts, with --field the last relay's
+    /// Placement method; with --field only `align`. The setting of the first relay applies, with --field that of the
+    /// last relay
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
     /// Interference as a function of the position along the line, instead of --interferer. Each point has X (m, -1e7 to 1e7, in

@@ -20,7 +20,7 @@
 //! | 32 | f32 | common power of the relays, W |
 //! | 36 | f32 | altitude of this relay, m |
 //! | 40 | f32 | power of this relay, W |
-//! | 44 | f32 | power of the interferer, W; 0 with a field, and for relays that listen without an initial guess |
+//! | 44 | f32 | power of the interferer, W; 0 with interference points, or if relays listen without a guess |
 //! | 48 | f32 | x of the interferer, m; 0 likewise |
 //! | 52 | f32 | y of the interferer, m; 0 likewise |
 //! | 56 | f32 | tolerance |
@@ -32,12 +32,12 @@
 //! | 96 | f32 | highest altitude of the band, m |
 //! | 100 | f32 | left limit of the lateral range, y in m: 0 or less |
 //! | 104 | f32 | right limit of the lateral range, y in m: 0 or more |
-//! | 108 | f32 | adjust: largest altitude change of a relay in one turn, m; 0 with another method |
+//! | 108 | f32 | adjust: largest altitude change of a relay in one move, m; 0 with another method |
 //! | 112 | u16 | adjust: maximum number of rounds, 1 to 65535; 0 with another method |
-//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 without a field |
+//! | 114 | u16 | points of the interference along x, 1 to [`MAX_POINTS`]; 0 without |
 //! | 116 | f32 | largest measurable interference, W; 0 without samples |
 //! | 120 | u32 | samples at each position; 0 without measurement |
-//! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 after the last point |
+//! | 124 + 8 k | f32 | x of interference point k, counted from 0, m; 0 after the last point |
 //! | 128 + 8 k | f32 | Upsilon of point k, 1/W; 0 after the last point |
 //! | 252 | u32 | smallest epoch for signing, 1 to 4294967294; 0 without a key |
 //! | 256 | 32 bytes | the network's signing key; all 0 without one |
@@ -47,8 +47,8 @@
 //! | 300 | i32 | latitude of the receiver, 1e-7 degrees |
 //! | 304 | i32 | longitude of the receiver, 1e-7 degrees |
 //! | 308 | i32 | height of the ground at the receiver above the mean sea level, mm |
-//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20; 0 means 5 m/s, and is required without sites |
-//! | 316 | 32 bytes | the autopilot's MAVLink signing key; all 0 without one, and without sites |
+//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20; 0 means 5 m/s; 0 without Tx and Rx positions |
+//! | 316 | 32 bytes | the autopilot's MAVLink signing key; all 0 without one, and without Tx and Rx positions |
 //! | 348 | f32 | noise power at every receiver, W: 0 to 1 |
 //! | 352 | u64 | sensing period of the leader after an agreement, us; this and the next two are 0 if the relays do not listen |
 //! | 360 | u64 | half-life of a measurement's weight, us |

@@ -3,7 +3,7 @@
 //! | function | pins |
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | USART2: TX PA2, RX PA3 |
-//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
+//! | autopilot, if the block has Tx and Rx positions | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI; `SysTick` every millisecond |
 

@@ -3,9 +3,9 @@
 //! | file | content |
 //! | --- | --- |
 //! | `problem` | the problems and their true optima |
-//! | `own` | this crate's chains and times |
+//! | `own` | chains and times of this crate |
 //! | `environment` | Python with SciPy and NLopt |
-//! | `rivals` | the other solvers' chains and times |
+//! | `rivals` | chains and times of the other solvers |
 //! | `results` | the results, as printed by `--json` |
 //! | `score` | evaluation of a chain, independent of the solver |
 //! | `table` | the results as markdown |

@@ -47,9 +47,9 @@ pub struct Loss {
 }
 
 impl Loss {
-    /// Returns true if the relay was silent only because all were: `all` is that period.
+    /// Returns true if this silence is a part of `all`, a silence of all relays.
     ///
-    /// Its own silence may begin up to 5 s earlier and end up to 5 s later.
+    /// It may begin up to 5 s earlier and end up to 5 s later.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -262,7 +262,7 @@ struct Recorder<'a> {
     worst_db: Option<f64>,
     /// Present silences, by relay number.
     open: BTreeMap<u16, Loss>,
-    /// Last time without any reporting relay.
+    /// Last time at which no relay reported.
     silent_at: Instant,
     /// Time of the first agreement, s, and numbers of snapshots since then.
     ///

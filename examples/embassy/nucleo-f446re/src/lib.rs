@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | USART1: TX PA9 (D8, CN10 pin 21), RX PA10 (D2, CN10 pin 33) |
 //! | neighbour toward the receiver | USART3: TX PC10 (CN7 pin 1), RX PC11 (CN7 pin 2) |
-//! | autopilot, for a drone with sites | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
+//! | autopilot, if the block has Tx and Rx positions | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
 //! | driver enable of the radio | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
 //! | clock | PLL, 180 MHz, from the 8 MHz of the ST-LINK or from the HSI |

@@ -3,7 +3,7 @@
 //! | function | resource |
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | UART0: TX GP0, RX GP1 |
-//! | neighbour toward the receiver; with a radio the autopilot, for a drone with sites | UART1: TX GP4, RX GP5 |
+//! | neighbour toward the receiver, or with a radio the autopilot | UART1: TX GP4, RX GP5 |
 //! | driver enable of the radio | GP2: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | configuration block | the last 4 KiB of the flash |

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | USART2: TX PA2, RX PA3 |
 //! | neighbour toward the receiver | USART3: TX PB10, RX PB11 |
-//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
+//! | autopilot, if the block has Tx and Rx positions | USART1: TX PA9, RX PA10 |
 //! | driver enable of the radio | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI |

@@ -81,7 +81,9 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs the numbered steps of `lane` one after the other, beside the main lane; returns the failures.
+/// Runs the numbered steps of `lane` one after the other; returns the failures.
+///
+/// The main lane runs at the same time.
 ///
 /// The output of a step is printed at its end, so that it does not mix with others. `all` is the number of all steps,
 /// for the headings.

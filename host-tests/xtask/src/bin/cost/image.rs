@@ -106,7 +106,7 @@ const IMAGES: &[Image] = &[
         // - autopilot (f64 geodesy in software, MAVLink, a port, the guard): 26 KiB flash, 2.3 KiB RAM; signed MAVLink: 3 KiB
         // - noise in every method: 3 to 4 KiB of each image
         // - sensing, which solves in f64: 20 KiB and the largest stack; of these 1.4 KiB are settings and measurements
-        // - uploads that move the sites: 3.5 KiB
+        // - uploads that move Tx and Rx: 3.5 KiB
         // - failsafes are never undone, lagging and late bytes distrusted, reasons to wait reported: 10 KiB
         // - halt of a chain out of order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
         // - clock tree and watchdog: 1 to 2 KiB of every image; cells of the best start: 600 bytes RAM
@@ -117,7 +117,7 @@ const IMAGES: &[Image] = &[
         //   autopilot
         // - both directions by Algorithms 1, 2 and 4, in sensing and uploads, and longer texts: 7 KiB
         // - both directions by the joint method: 11 KiB flash, 1.6 KiB RAM, 0.5 KiB stack
-        // - exact hops of both directions in a field: 1.5 KiB
+        // - exact hops of both directions with interference along x: 1.5 KiB
         // - fitted slots: 5 KiB flash, 104 bytes RAM
         // - departures, spares, and motions that end together: 6 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM

@@ -58,7 +58,7 @@ const PAGES: [&str; 15] = [
 #[derive(Parser)]
 #[command(name = "pages")]
 struct Options {
-    /// Run for pages whose names contain this only
+    /// Run only the pages whose names contain this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
     /// Run only the slow commands of the pages
