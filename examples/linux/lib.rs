@@ -1,4 +1,4 @@
-//! Modules shared by the Linux programs. `examples/linux_companion`, a relay, and `examples/linux_ground`, the ground station.
+//! Modules shared by the Linux programs `linux_companion`, a relay, and `linux_ground`, a ground station.
 //!
 //! | module | content |
 //! | --- | --- |

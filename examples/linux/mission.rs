@@ -103,7 +103,8 @@ pub struct MissionOptions {
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
     pub noise: f32,
-    /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 is one direction only
+    /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 means traffic
+    /// toward the receiver only
     #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE))]
     pub reverse: f32,
     /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power

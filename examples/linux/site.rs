@@ -9,7 +9,8 @@ use uav_relay::{Geodetic, Sites};
 /// Options for the positions of the transmitter and the receiver on earth.
 #[derive(Args, Debug)]
 pub struct SiteOptions {
-    /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
+    /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and ground height above the mean sea
+    /// level, m
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_rx", allow_hyphen_values = true, value_parser = site)]
     site_tx: Option<Geodetic>,
     /// Position of the receiver

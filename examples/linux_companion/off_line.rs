@@ -2,7 +2,7 @@
 //!
 //! | kind | position | reported |
 //! | --- | --- | --- |
-//! | off the line | more than 5 km from the line, so that the relay has no position | once on the ground, every 10 s in the air; also to the operator |
+//! | off the line | over 5 km from the line: no position | on the ground once, in the air every 10 s; also to the operator |
 //! | off the fence | more than [`FENCE_M`] outside the mission's geofence, horizontally | every 10 s in the air |
 
 use std::fmt;
@@ -302,8 +302,8 @@ mod tests {
     #[test]
     fn nothing_is_reported_up_to_100_m_outside_the_geofence() {
         let (tx, rx) = (site(47.40, 8.54), site(47.40, 8.55));
-        // The line points east, so its left side is north: 50 m in the mission and 100 m of tolerance. 0.01 degrees of latitude
-        // are 1112 m.
+        // The line points east, so its left side is north: 50 m in the mission and 100 m of tolerance. 0.01 degrees
+        // of latitude are 1112 m.
         for (lat, lon, outside) in [
             (47.400, 8.545, None),
             (47.4013, 8.545, None),

@@ -1,7 +1,7 @@
 //! Configuration block of a drone: index, mission and keys. It is written once, separately from the firmware.
 //!
-//! The block has a flash sector of its own, which firmware updates do not touch: [`ADDRESS`] on an STM32F405. `cargo provision`
-//! writes it from a scenario. All numbers are little-endian, floats IEEE 754:
+//! The block has a flash sector of its own, which firmware updates do not touch: [`ADDRESS`] on an STM32F405. `cargo
+//! provision` writes it from a scenario. All numbers are little-endian, floats IEEE 754:
 //!
 //! | byte | type | content |
 //! | --- | --- | --- |
@@ -20,7 +20,7 @@
 //! | 32 | f32 | common power of the relays, W |
 //! | 36 | f32 | altitude of this relay, m |
 //! | 40 | f32 | power of this relay, W |
-//! | 44 | f32 | power of the interferer, W; 0 with interference points, or if relays listen without a guess |
+//! | 44 | f32 | power of the interferer, W; 0 with interference points, or if relays listen without an initial guess |
 //! | 48 | f32 | x of the interferer, m; 0 likewise |
 //! | 52 | f32 | y of the interferer, m; 0 likewise |
 //! | 56 | f32 | tolerance |
@@ -47,13 +47,13 @@
 //! | 300 | i32 | latitude of the receiver, 1e-7 degrees |
 //! | 304 | i32 | longitude of the receiver, 1e-7 degrees |
 //! | 308 | i32 | height of the ground at the receiver above the mean sea level, mm |
-//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20; 0 means 5 m/s; 0 without Tx and Rx positions |
+//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20, or 0 for 5 m/s; must be 0 without Tx and Rx positions |
 //! | 316 | 32 bytes | the autopilot's MAVLink signing key; all 0 without one, and without Tx and Rx positions |
 //! | 348 | f32 | noise power at every receiver, W: 0 to 1 |
-//! | 352 | u64 | sensing period of the leader after an agreement, us; this and the next two are 0 if the relays do not listen |
+//! | 352 | u64 | time from an agreement to the next sensing, us; this and the next two are 0 if relays do not listen |
 //! | 360 | u64 | half-life of a measurement's weight, us |
 //! | 368 | f32 | relative error of one measurement, 1e-3 to 1 |
-//! | 372 | u32 | silence until a neighbour is probed, ms, at most 1200000; it is lost after three times as long. 0 means 5000 |
+//! | 372 | u32 | silence until a neighbour is probed, ms, to 1200000; it is lost after three times this. 0 means 5000 |
 //! | 376 | f32 | SIR needed on the way back from Rx to Tx, relative to that on the way there: 0 (one direction) to 1 |
 //! | 380 | f32 | power of the receiver on the way back, W; without effect if the number before is 0 |
 //! | 384 | f32 | SNR gap of fitted slots, linear: 1 to 1000, with method 1 and without sensing; 0 for equal slots |

@@ -8,8 +8,9 @@
 //! | PLL from the HSI | 168 MHz | 42 MHz | 84 MHz |
 //! | HSI | 16 MHz | 16 MHz | 16 MHz |
 //!
-//! Every wait is bounded. A failed attempt is undone before the next one. The PLL's input is 2 MHz, as RM0090 6.3.2 recommends;
-//! both cores need five flash wait states above 150 MHz at 2.7 to 3.6 V (RM0090 table 10, RM0390 table 5).
+//! Every wait is bounded. A failed attempt is undone before the next one. The input of the PLL is 2 MHz, as RM0090
+//! 6.3.2 recommends. Above 150 MHz at 2.7 to 3.6 V the flash needs five wait states (RM0090 table 10, RM0390 table
+//! 5).
 
 use crate::crystal::{self, Crystal, HSI_HZ};
 use crate::registers::{Register, Registers};

@@ -10,7 +10,8 @@
 //! stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has another
 //! key fails its CRC and is ignored.
 //!
-//! An erase stops the CPU. [`Journal::tidy`] erases at a start; in flight [`Journal::append`] erases only with [`WhenFull::Erase`].
+//! An erase stops the CPU. [`Journal::tidy`] erases at a start. In flight [`Journal::append`] erases only with
+//! [`WhenFull::Erase`].
 
 use uav_relay::CRC_32C;
 
@@ -96,7 +97,9 @@ struct Newest {
 }
 
 impl<F: Flash> Journal<F> {
-    /// Creates a journal whose records have `payload_words` words of payload. Records stored under another `key` are ignored.
+    /// Creates a journal whose records have `payload_words` words of payload.
+    ///
+    /// Records stored under another `key` are ignored.
     pub const fn new(flash: F, payload_words: usize, key: u32) -> Self {
         Self {
             flash,

@@ -88,8 +88,8 @@ mod defmt_frames {
     /// True if interrupts were enabled before the log frame: then its end enables them again.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-    // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame, which no
-    // `Format` of this program makes, would garble only the text of both. No method logs.
+    // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame,
+    // which no `Format` of this program makes, would garble only the text of both. No method logs.
     unsafe impl defmt::Logger for Logger {
         fn acquire() {
             let on = primask::read().is_active();

@@ -81,8 +81,8 @@ impl Sector {
     }
 
     const fn words<'a>(self) -> &'a [u32] {
-        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors` that is
-        // borrowed while the slice lives.
+        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors`
+        // that is borrowed while the slice lives.
         unsafe { core::slice::from_raw_parts(self.0 as *const u32, self.len()) }
     }
 

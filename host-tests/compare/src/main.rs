@@ -32,8 +32,8 @@ use problem::Problem;
 use results::{Results, Solved};
 use rivals::{Rivals, SOLVERS};
 
-/// Places relays with this crate, SciPy and NLopt, and prints what each reached in which time. All run on this machine, one after
-/// the other. The table is markdown.
+/// Places relays with this crate, SciPy and NLopt, and prints what each reached in which time. All run on this
+/// machine, one after the other. The table is markdown.
 #[derive(Parser, Debug)]
 #[command(
     name = "compare",

@@ -103,18 +103,19 @@ const IMAGES: &[Image] = &[
         RELAY,
         &[],
         // Shares of this image, and of others where stated:
-        // - autopilot (f64 geodesy in software, MAVLink, a port, the guard): 26 KiB flash, 2.3 KiB RAM; signed MAVLink: 3 KiB
+        // - autopilot (f64 geodesy in software, MAVLink, a port, the guard): 26 KiB flash, 2.3 KiB RAM; signed MAVLink:
+        //   3 KiB
         // - noise in every method: 3 to 4 KiB of each image
         // - sensing, which solves in f64: 20 KiB and the largest stack; of these 1.4 KiB are settings and measurements
         // - uploads that move Tx and Rx: 3.5 KiB
         // - failsafes are never undone, lagging and late bytes distrusted, reasons to wait reported: 10 KiB
         // - halt of a chain out of order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
         // - clock tree and watchdog: 1 to 2 KiB of every image; cells of the best start: 600 bytes RAM
-        // - no stuck part of a chain, wrong sensors named, clock steps tolerated: 3 KiB of each image, 7 KiB of this one
-        // - losses of four links per side, unflown drones as obstacles, copies of a relay with a key: 1 KiB flash, 300 bytes RAM,
-        //   up to 900
-        //   bytes stack of each image with a guard; the operator's command to clear a lost relay: 1 KiB of those with an
-        //   autopilot
+        // - recovery of stuck parts of a chain, reports of faulty sensors, tolerated clock steps: 3 KiB of each image,
+        //   7 KiB of this one
+        // - losses of four links per side, unflown drones as obstacles, copies of a relay with a key: 1 KiB flash, 300
+        //   bytes RAM, up to 900 bytes stack of each image with a guard; the operator's command to clear a lost relay:
+        //   1 KiB of those with an autopilot
         // - both directions by Algorithms 1, 2 and 4, in sensing and uploads, and longer texts: 7 KiB
         // - both directions by the joint method: 11 KiB flash, 1.6 KiB RAM, 0.5 KiB stack
         // - exact hops of both directions with interference along x: 1.5 KiB

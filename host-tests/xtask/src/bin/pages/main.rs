@@ -2,8 +2,9 @@
 //!
 //! They run in a folder like a clean clone; their output is compared with the page.
 //!
-//! A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are commands. A
-//! following block `text` under the same heading is the expected output, and so are the other lines of a `console`.
+//! A block of commands is a fence `sh`, `bash` or `console`. In a `console` only lines that begin with `$ ` are
+//! commands. A following block `text` under the same heading is the expected output, and so are the other lines of a
+//! `console`.
 //!
 //! | word after `sh`, `bash` or `console` | the block |
 //! | --- | --- |

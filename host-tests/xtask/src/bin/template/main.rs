@@ -17,7 +17,8 @@ struct Arguments {
     /// Folder to write to; it must be empty or missing
     #[arg(required_unless_present = "check")]
     folder: Option<PathBuf>,
-    /// Write every template into an empty folder of its own, check its formatting, lint it and build it. `cargo ci` does so
+    /// Write every template into an empty folder of its own, check its formatting, lint it and build it. `cargo ci`
+    /// does so
     #[arg(long, conflicts_with_all = ["name", "folder"])]
     check: bool,
 }
