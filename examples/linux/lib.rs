@@ -1,4 +1,4 @@
-//! Modules shared by the Linux programs `linux_companion`, a relay, and `linux_ground`, a ground station.
+//! Modules shared by the Linux programs: `linux_companion` (relay) and `linux_ground` (ground station).
 //!
 //! | module | content |
 //! | --- | --- |

@@ -2,7 +2,7 @@
 //!
 //! | kind | position | reported |
 //! | --- | --- | --- |
-//! | off the line | over 5 km from the line: no position | on the ground once, in the air every 10 s; also to the operator |
+//! | off the line | over 5 km off: no position | on the ground once, in the air every 10 s; also to the operator |
 //! | off the fence | more than [`FENCE_M`] outside the mission's geofence, horizontally | every 10 s in the air |
 
 use std::fmt;
