@@ -40,7 +40,9 @@ const EVERY: Duration = Duration::from_millis(2_000);
 /// Number of frames rejected for one reason between two checks, from which on it is reported.
 const MANY: u32 = 3;
 
-/// Number of damaged frames, without an intact one, for which the log suggests a wrong baud rate.
+/// Number of damaged frames between two checks for which the log suggests a wrong baud rate.
+///
+/// It suggests this only if no intact frame was received meanwhile.
 const DAMAGED: u32 = 10;
 
 /// Detector of reasons why frames are rejected. It compares the counters with those at the last check.

@@ -98,6 +98,8 @@ pub struct PartialLine(Vec<u8>);
 
 impl PartialLine {
     /// Appends received bytes, and passes each complete line to `line`, without its line feed.
+    ///
+    /// A longer line is cut to `LONGEST + 1` bytes.
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {

@@ -6,8 +6,8 @@
 //! A view change takes three or four records, and a sector of 16 KiB holds 240. The second sector is blank at a
 //! start, so the next 240 records, some 60 view changes, need no erase. When both are full, the older one is erased
 //! in flight, because a relay must not vote without storing its votes. The newest record stays in the other sector.
-//! The sectors are small, because an erase of 16 KiB stops the CPU for at most 0.5 s, and one of 128 KiB for up to 2
-//! s.
+//! The sectors are small, because an erase of 16 KiB stops the CPU for 0.25 s, at most 0.5 s, and one of 128 KiB for
+//! up to 2 s.
 
 use uav_relay::{Instant, Relay, ViewRecord};
 

@@ -19,7 +19,7 @@ const INTERFACE_DESCRIPTION_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
 
-/// Resolution of the timestamps in a capture, as a negative power of ten, s.
+/// Resolution of the timestamps in a capture: 10^-9 s. A pcapng file has only the exponent, 9.
 const NANOSECONDS: u8 = 9;
 
 /// Direction of a frame, seen from the node that writes the capture.

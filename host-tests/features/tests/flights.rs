@@ -10,6 +10,7 @@ use uav_relay_features::{Chain, paper, shared};
 
 // Results of the full set of features. After a change of the arithmetic or the wire format, print them with `--
 // --nocapture`.
+/// Expected x of each relay in a chain of five, m, as the bits of an f32.
 const OF_FIVE: [u32; 5] = [
     0x439b_7618,
     0x43ac_5a98,

@@ -98,7 +98,7 @@ impl Medium {
         }
     }
 
-    /// Returns a receiver and bytes that have arrived there by `now`, if any.
+    /// Returns the index of a receiver, and bytes that have arrived there by `now`, if any.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
             return None;

@@ -3,7 +3,7 @@
 use super::rows::{Row, Table, last_number, rows, tables};
 use super::{Field, Format, Kind, Layout};
 
-/// Returns the text below the heading that begins with `from`, up to the next heading.
+/// Returns the text below the heading that begins with `from`, up to the next heading of level 2 or 3.
 fn section<'a>(document: &'a str, from: &str) -> Option<&'a str> {
     let (_, rest) = document.split_once(from)?;
     let end = ["\n## ", "\n### "].iter().filter_map(|to| rest.find(to));

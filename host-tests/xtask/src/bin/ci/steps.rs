@@ -331,8 +331,8 @@ fn embassy() -> Vec<Step> {
 
 /// Returns the step that tests the library and a simulated chain with the features in `set` only.
 ///
-/// `set` is a list with commas. The exhaustive model of views depends on no feature, and takes most of the time. So
-/// it runs without features and with all features only.
+/// `set` is a list with commas. The exhaustive model of views depends on no feature, and takes most of the time of
+/// the library's tests. So it runs without features and with all features only.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
