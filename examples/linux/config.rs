@@ -150,7 +150,7 @@ impl FileOptions {
         })
     }
 
-    /// Removes the file's options that are also on the command line, or that an option there excludes.
+    /// Removes options of the file that the command line repeats or excludes.
     ///
     /// Returns the other options, and the overrides: the removed options whose values differ from the command line.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {

@@ -284,7 +284,7 @@ mod tests {
         assert!(swapped.kind == Kind::Line && swapped.is_swapped);
         let text = swapped.to_string();
         assert!(text.ends_with("km from the line between transmitter and receiver: are latitude and longitude swapped?"), "{text}");
-        // Line in another valley.
+        // Line from Tx to Rx in another valley.
         let other = off(site(46.54, 7.40), site(46.55, 7.41), drone).expect("off");
         assert!(other.kind == Kind::Line && !other.is_swapped);
         assert!(other.to_string().ends_with(

@@ -534,7 +534,7 @@ fn parameters(folder: Option<&Path>, kind: Kind) -> Result<(PathBuf, Vec<Paramet
         })
         .collect();
     let mut all = all?;
-    // The old name is used for both.
+    // A renamed parameter is listed under its old name only.
     all.retain(|it| NEW_NAMES.iter().all(|(_, new, _)| *new != it.name));
     Ok((file.clone(), all))
 }

@@ -136,7 +136,7 @@ impl Bench {
         let heard = sent
             .last()
             .and_then(|frame| Member::from_handshake(&frame.bytes));
-        // That handshake was of an earlier start.
+        // The handshake sent above counts as one of an earlier start.
         heard.map(|member| member.restarted())
     }
 

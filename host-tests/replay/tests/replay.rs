@@ -395,7 +395,7 @@ fn ten_minutes_of_eight_relays_are_a_small_page_with_a_report() {
         "{:?}",
         flight.available
     );
-    // Relay 2 is lost for good, and the others move together.
+    // Relay 2 is lost for good, and the others move to their new positions.
     let [loss] = flight.losses.as_slice() else {
         panic!("{:?}", flight.losses)
     };

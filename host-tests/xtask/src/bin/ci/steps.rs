@@ -56,7 +56,9 @@ pub(crate) struct Step {
 pub(crate) enum Lane {
     /// Main lane, one step after the other.
     Main,
-    /// Starts in the main lane, which does not wait for its end: the step mostly waits for the wall clock.
+    /// Starts after the previous step of the main lane, which then goes on at once.
+    ///
+    /// The step mostly waits for the wall clock.
     Waiting,
     /// Low priority, after the previous `Background` step, with a target folder of its own.
     Background,
@@ -363,7 +365,7 @@ fn firmware() -> Vec<Step> {
         step(name, command)
     };
     vec![
-        // The default members, as a user at the root and `cargo hack check --target` check them without --package.
+        // Checks the default members, as a user at the root and `cargo hack check --target` do without --package.
         step(
             "the default members, target",
             format!("cargo check --locked --target {TARGET}"),

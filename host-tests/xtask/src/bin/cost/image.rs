@@ -108,8 +108,8 @@ const IMAGES: &[Image] = &[
         // - noise in every method: 3 to 4 KiB of each image
         // - sensing, which solves in f64: 20 KiB and the largest stack; of these 1.4 KiB are settings and measurements
         // - uploads that move Tx and Rx: 3.5 KiB
-        // - failsafes are never undone, lagging and late bytes distrusted, reasons to wait reported: 10 KiB
-        // - halt of a chain out of order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
+        // - no undone failsafes, distrust of late bytes, reports of reasons to wait: 10 KiB
+        // - halt of a chain in the wrong order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
         // - clock tree and watchdog: 1 to 2 KiB of every image; cells of the best start: 600 bytes RAM
         // - recovery of stuck parts of a chain, reports of faulty sensors, tolerated clock steps: 3 KiB of each image,
         //   7 KiB of this one
