@@ -1,13 +1,13 @@
 //! A relay under radio silence computes its own position from the mission alone.
 //!
-//! `cargo run --example silent_place` prints the positions of a chain of five, each computed separately, as the relays would
-//! agree on by messages.
+//! `cargo run --example silent_place` prints the positions of a chain of five, each computed separately. With
+//! messages, the relays would agree on the same positions.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use uav_relay::channel::{AirGround, Channel};
 use uav_relay::{Band, Interference, Interferer, Mission, MissionConfig, Profile};
 
-/// Channel at 2 GHz; the excess losses are 0.1 dB and 21 dB, as factors. A number out of range fails the build.
+/// Channel at 2 GHz with excess losses of 0.1 dB and 21 dB, as factors. The build checks the ranges.
 const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => channel,
     Err(_) => panic!("a channel parameter is out of range"),

@@ -1,4 +1,4 @@
-//! Cost of the runners around a relay. A full sweep from one port to the other, on polled and on asynchronous ports.
+//! Cost of the runners around a relay for a whole sweep, with polled and asynchronous ports.
 
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -18,7 +18,7 @@ use super::missions::mission;
 /// Bit rate of the ports, bit/s.
 const BAUD: u32 = 115_200;
 
-/// Serial port in memory. `coming` is a frame and the range of its unread bytes, `gone` the number of bytes sent.
+/// Serial port in memory. `coming` is a frame and the range of its unread bytes; `gone` counts sent bytes.
 struct Memory {
     coming: Cell<([u8; MAX_FRAME], usize, usize)>,
     gone: Cell<usize>,
@@ -107,8 +107,7 @@ impl Clock for FixedClock {
     }
 }
 
-/// Returns relay 2 of 3, a sweep message, the message's length, and a time. The message is the first sweep from relay 1 to relay 2; the
-/// time is that at which relay 1 sends this message.
+/// Returns relay 2 of 3 and the first sweep message from relay 1: bytes, length, and time.
 fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     const THREE: Mission = mission(3);
     let settings = Settings {
@@ -125,9 +124,8 @@ fn relay_and_sweep() -> Option<(Relay, [u8; MAX_FRAME], usize, Instant)> {
     Some((relay(2, settings, THREE), frame, len, now))
 }
 
-/// Measures the instructions with which relay 2 handles a sweep message. The blocking and the async driver of its ports are
-/// compared. The sweep message carries the search for the positions along the chain.
-#[inline(never)] // its relays are not on the stack of the others
+/// Measures the instructions for relay 2 to handle a sweep message, with blocking and async ports.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn runners() {
     let Some((mut middle, frame, len, now)) = relay_and_sweep() else {
         return;

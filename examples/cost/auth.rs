@@ -10,8 +10,7 @@ use super::missions::mission;
 
 pub(crate) const KEY: Key = Key::new([0xA5; 32]);
 
-/// Returns the number of instructions for the authentication tag of a frame with `body` payload bytes. Sender and
-/// receiver each compute the tag once.
+/// Returns the number of instructions for the authentication tag of `body` payload bytes.
 fn tag(body: usize) -> u32 {
     const LONGEST: [u8; 231] = [0x5A; 231];
     let signed = black_box(LONGEST.get(..10 + body).unwrap_or_default());
@@ -34,9 +33,8 @@ fn exchange_all(upper: &mut Relay, lower: &mut Relay, now: Instant) {
     }
 }
 
-/// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay. The sweep
-/// message carries the search for positions along the chain.
-#[inline(never)] // its relays are not on the stack of the others
+/// Measures the instructions for authentication tags, a signed sweep message, and a rejected replay.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn auth() {
     const THREE: Mission = mission(3);
     hprintln!("tag_32 {}", tag(32));
@@ -51,7 +49,7 @@ pub(crate) fn auth() {
     let mut middle = relay(2, settings, THREE);
     let mut tail = relay(3, settings, THREE);
     let start = Instant::ZERO;
-    // The handshakes must end before the first sweep; those of the last relay go first.
+    // The handshakes must end before the first sweep. The last relay sends its handshake first.
     exchange_all(&mut middle, &mut tail, start);
     exchange_all(&mut head, &mut middle, start);
     exchange_all(&mut middle, &mut tail, start);
@@ -77,7 +75,7 @@ pub(crate) fn auth() {
         "passed_on {}",
         u32::from(sent.is_some_and(|sent| sent.len > 90))
     );
-    // A repeated frame is a replay: with a valid tag, it takes longest to reject.
+    // A replay: with a valid tag it takes longest to reject.
     let before = middle.stats().replayed;
     let refused = instructions(|| middle.handle_bytes(now, Port::Upstream, bytes));
     hprintln!("refused {}", refused);

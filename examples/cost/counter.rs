@@ -13,11 +13,13 @@ pub(crate) fn ticks<T>(work: impl FnOnce() -> T) -> u32 {
     before.wrapping_sub(SYST::get_current()) & TOP
 }
 
-/// Returns the number of instructions that `work` takes. The instructions of the measurement itself are not counted.
+/// Returns the number of instructions that `work` takes, without those of the measurement itself.
+///
 /// Above 780 000 instructions the result is wrong, because the counter wraps.
 pub(crate) fn instructions<T>(work: impl FnOnce() -> T) -> u32 {
     let empty = ticks(|| ());
-    // 128 ns at 168 MHz are 21.504 ticks, 2 688 / 125: the largest count of ticks times 125 is still a u32.
+    // One instruction takes 128 ns: 21.504 ticks at 168 MHz, or 2 688 / 125. The largest count times 125 still fits
+    // in a u32.
     (ticks(work).saturating_sub(empty) * 125 + 1_344) / 2_688
 }
 
@@ -37,7 +39,7 @@ pub(crate) fn next_frame(relay: &mut Relay, now: Instant) -> Option<([u8; MAX_FR
     Some((frame, transmit.len))
 }
 
-/// Ends the program with an endless sleep, for the case that the emulator QEMU does not exit.
+/// Sleeps forever, in case QEMU does not exit.
 pub(crate) fn stop() -> ! {
     loop {
         cortex_m::asm::wfi();

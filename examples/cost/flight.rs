@@ -1,4 +1,4 @@
-//! Cost of converting positions between the line and the earth, in f64. This core has no f64 instructions.
+//! Cost of converting positions between mission and earth coordinates in f64, which this core lacks.
 
 use core::hint::black_box;
 
@@ -8,8 +8,9 @@ use uav_relay::{Geodetic, Placement, Sites};
 
 use super::counter::instructions;
 
-/// Measures the instructions of three computations with the line from Tx to Rx on earth. They are its creation, and
-/// the conversion of a position from the mission's coordinates to latitude and longitude, and back.
+/// Measures the instructions for the line from Tx to Rx on earth.
+///
+/// These are its creation, and the conversion of a position to latitude and longitude and back.
 #[inline(never)]
 pub(crate) fn flight() {
     let site = Geodetic::from_degrees;

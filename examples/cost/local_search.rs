@@ -1,4 +1,4 @@
-//! Cost of one relay's share of a turn and of a measurement.
+//! Cost of one relay's local search, and of a measurement.
 
 use core::hint::black_box;
 use cortex_m_semihosting::hprintln;
@@ -12,7 +12,7 @@ use super::counter::instructions;
 use super::missions::{HIGH, INTERFERER};
 
 /// Measures the instructions for one relay's local search (Algorithm 2) and interference estimate.
-#[inline(never)] // its relays are not on the stack of the others
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn local_search() {
     let place = Placement::on_line;
     let beside = |place| HopEnd {

@@ -1,8 +1,8 @@
 //! Cost of a relay's calls on a Cortex-M4F, in instructions and bytes of stack. Run by `cargo cost` in QEMU.
 //!
-//! With `-icount shift=7` QEMU advances 128 ns with every instruction, and SysTick counts at 168 MHz on this machine, so that the
-//! counter measures instructions. They are exact and the same in every run, but they are not cycles. Results are printed by
-//! semihosting, which traps on a board without a debugger: do not flash this image.
+//! With `-icount shift=7` QEMU advances 128 ns with every instruction. SysTick counts at 168 MHz on this machine, so
+//! the counter measures instructions. They are exact and the same in every run, but they are not cycles. Results are
+//! printed by semihosting, which traps on a board without a debugger: do not flash this image.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(all(target_os = "none", feature = "async"))]

@@ -6,8 +6,7 @@ use uav_relay::{Adjust, Instant, MAX_FRAME, Method, Mission, Phase, Port, Relay,
 use super::counter::{instructions, relay};
 use super::missions::{HIGH, UNEVEN};
 
-/// Simulated chain of three relays that records the cost of the most expensive call. The cost of a call of a relay's
-/// functions is its number of instructions.
+/// Simulated chain of three relays that records the instructions of the most expensive call.
 pub(crate) struct Flight {
     relays: heapless::Vec<Relay, 3>,
     /// Number of instructions of the most expensive call of a relay's function so far.
@@ -20,7 +19,7 @@ impl Flight {
     fn new(mission: Mission, settings: Settings) -> Self {
         let mut relays = heapless::Vec::new();
         for index in [1, 2, 3] {
-            // One relay at a time on the stack.
+            // Creates one relay at a time, to save stack.
             _ = relays.push(relay(index, settings, mission));
         }
         Self {
@@ -53,12 +52,13 @@ impl Flight {
         }
     }
 
-    /// Runs the chain until all relays hold their agreed positions, for at most `turns` rounds. A round delivers the
-    /// pending frames, then handles the next timers. Returns true if all relays hold their positions.
+    /// Runs the chain until all relays hold their agreed positions; returns true if they do.
+    ///
+    /// It ends after `turns` rounds. Each round delivers the pending frames and handles the next timers.
     fn run_until_holding(&mut self, turns: u32) -> bool {
         let mut now = Instant::ZERO;
         for _ in 0..turns {
-            // In both directions, so that answers are delivered.
+            // In both directions, so that replies are delivered.
             for at in [0, 1, 2, 1, 0] {
                 self.drain(at, now);
             }
@@ -84,15 +84,17 @@ impl Flight {
     }
 }
 
-/// Result of a simulated chain. `settled` is 1 if all relays hold their agreed positions, `most` the instructions of
-/// the most expensive call, and `longest` the length of the longest frame, bytes.
+/// Result of a simulated chain.
+///
+/// `settled`: 1 if all relays hold their agreed positions. `most`: instructions of the most expensive call.
+/// `longest`: longest frame, bytes.
 struct Flown {
     settled: u32,
     most: u32,
     longest: usize,
 }
 
-/// Runs one chain to its end. Not inlined, because the stack has no room for several chains at once.
+/// Runs one chain to its end. Not inlined, because the stack has room for one chain only.
 #[inline(never)]
 fn fly(mission: Mission, settings: Settings) -> Flown {
     let mut flight = Flight::new(mission, settings);

@@ -6,8 +6,7 @@ use uav_relay::{
     Band, Field, FieldPoint, Interference, Interferer, Mission, MissionConfig, Profile,
 };
 
-/// Channel at 2 GHz with line of sight. The excess losses are 0.1 dB with and 21 dB without line of sight, as
-/// factors.
+/// Channel at 2 GHz with line of sight. Excess losses: 0.1 dB with and 21 dB without line of sight, as factors.
 pub(crate) const CHANNEL: Channel = match Channel::new(2e9, 1.023_293, 125.892_54, AirGround::Los) {
     Ok(channel) => channel,
     Err(_) => panic!("a channel parameter is out of range"),
@@ -47,7 +46,7 @@ pub(crate) const INTERFERER: Interferer = Interferer {
     y_m: 150.0,
 };
 
-/// Mission of three relays with altitudes of 20 to 300 m to choose from.
+/// Mission of three relays that may choose altitudes of 20 to 300 m.
 pub(crate) const HIGH: Mission = Mission::new(MissionConfig {
     band: Band {
         least_m: 20.0,
@@ -63,23 +62,22 @@ pub(crate) const BOTH: Mission = Mission::new(MissionConfig {
     ..*HIGH.config()
 });
 
-/// Mission of three relays at one altitude, with data both ways in fitted slots. A fitted slot is a time slot as long
-/// as its hop needs.
+/// Mission of three relays at one altitude, with data both ways in fitted slots.
+///
+/// A fitted slot is as long as its hop needs.
 pub(crate) const FITTED: Mission = Mission::new(MissionConfig {
     band: Band::at(20.0),
     fitted_gap: 2.0,
     ..*BOTH.config()
 });
 
-/// Mission of three relays at altitudes of 20 to 300 m, with data both ways in fitted slots. A fitted slot is a time
-/// slot as long as its hop needs.
+/// Mission of three relays at altitudes of 20 to 300 m, with data both ways in fitted slots.
 pub(crate) const FITTED_HIGH: Mission = Mission::new(MissionConfig {
     fitted_gap: 2.0,
     ..*BOTH.config()
 });
 
-/// Mission of three relays that may choose altitudes, and lateral offsets. The offsets from the line Tx-Rx are up to
-/// 280 m to either side.
+/// Mission of three relays that may choose altitudes, and lateral offsets up to 280 m to either side.
 pub(crate) const WIDE: Mission = Mission::new(MissionConfig {
     lateral: Band {
         least_m: -280.0,
@@ -107,7 +105,7 @@ pub(crate) const POINTS: [FieldPoint; 4] = [
     },
 ];
 
-/// Mission of three relays whose interference is a known distribution along x, not the same everywhere.
+/// Mission of three relays with a known interference along x that varies.
 pub(crate) const UNEVEN: Mission = Mission::new(MissionConfig {
     interference: Interference::Field(Field::new(&POINTS)),
     ..*mission(3).config()

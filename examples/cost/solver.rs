@@ -7,10 +7,9 @@ use uav_relay::optimiser::joint::{Seat, Solver};
 use super::counter::instructions;
 use super::missions::{BOTH, FITTED, FITTED_HIGH, HIGH, WIDE};
 
-/// Solves a chain of `relays` relays by the joint method, in several calls of the solver.
+/// Solves a chain of `relays` relays by the joint method, in several calls.
 ///
-/// Returns three numbers: the instructions of all calls together, the instructions of the most expensive call, and the
-/// number of calls.
+/// Returns the instructions of all calls, the instructions of the most expensive call, and the number of calls.
 fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     let Ok(mission) = of.with_relays(relays) else {
         return (0, 0, 0);
@@ -32,7 +31,7 @@ fn solve_instructions(of: &Mission, relays: u16) -> (u32, u32, u32) {
     }
 }
 
-/// Measures the instructions of the joint method's solver alone, without messages between relays.
+/// Measures the instructions of the joint method's solver, without messages.
 #[inline(never)]
 pub(crate) fn joint() {
     for (of, relays, suffix) in [

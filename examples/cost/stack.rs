@@ -7,8 +7,10 @@ use uav_relay::{Instant, MAX_FRAME, Mission, Phase, Port, Relay, Settings};
 use super::counter::relay;
 use super::missions::mission;
 
-/// Measures the maximum stack use of a relay's calls, bytes. The calls overwrite a pattern on the stack.
-#[inline(never)] // its relays are not on the stack of the others
+/// Measures the maximum stack use of a relay's calls, bytes.
+///
+/// The calls overwrite a pattern on the stack.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn stack() {
     const TWO: Mission = mission(2);
     let mut head = relay(1, Settings::default(), TWO);
@@ -50,7 +52,7 @@ pub(crate) fn used_stack(work: impl FnOnce()) -> u32 {
     unpainted_bytes()
 }
 
-/// Fills the part of the stack that the next call will use with a pattern.
+/// Fills the stack that the next call will use with a pattern.
 #[inline(never)]
 pub(crate) fn paint() {
     let mut words = [0_u32; PAINTED];
@@ -68,7 +70,7 @@ pub(crate) fn unpainted_bytes() -> u32 {
     let words = core::mem::MaybeUninit::<[u32; PAINTED]>::uninit();
     let first = black_box(words.as_ptr().cast::<u32>());
     let untouched = (0..PAINTED)
-        // SAFETY: inside the array. Its content is arbitrary on purpose, and volatile reads take it as it is.
+        // SAFETY: inside the array. Its content is arbitrary on purpose; a volatile read of it is allowed.
         .take_while(|at| unsafe { first.add(*at).read_volatile() } == PAINT)
         .count();
     u32::try_from(4 * (PAINTED - untouched)).unwrap_or(u32::MAX)

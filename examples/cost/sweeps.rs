@@ -11,7 +11,7 @@ use uav_relay::{Instant, MAX_FRAME, Mission, MissionConfig, Phase, Port, Setting
 use super::counter::{instructions, next_frame, relay};
 use super::missions::{INTERFERER, MISSION, mission};
 
-#[inline(never)] // its relays are not on the stack of the others
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn reach() {
     let common = MISSION.config().common;
     let middle = Hop::new(
@@ -33,9 +33,9 @@ pub(crate) fn reach() {
     reach_in_noise();
 }
 
-/// Measures the instructions of `Hop::reach` (farthest position that meets a target SIR) with noise.
+/// Measures the instructions of `Hop::reach` (farthest position with a target SIR) with receiver noise.
 ///
-/// The receiver noise is 1e-4 to 100 times the interference 100 m from the interferer.
+/// The noise is 1e-4 to 100 times the interference 100 m from the interferer.
 fn reach_in_noise() {
     const LEVELS: usize = 4;
     let mut all = [0; LEVELS * 30];
@@ -66,8 +66,9 @@ fn reach_in_noise() {
     hprintln!("reach_noise_median {}", middle.unwrap_or(0));
 }
 
-/// Instructions of the most expensive calls that handle a sweep and its verdict. A sweep is a message that carries
-/// the search for positions along the chain; the verdict is the message with its result on the way back.
+/// Instructions of the most expensive calls that handle a sweep message and its verdict.
+///
+/// A sweep message carries the search for positions along the chain; the verdict returns the result.
 struct SweepCost {
     begin: u32,
     through: u32,
@@ -80,9 +81,8 @@ struct SweepCost {
     settled: bool,
 }
 
-/// Prints the costs of a sweep (search for positions along the chain). The costs are measured for two missions: with
-/// traffic in one direction, and with traffic in both directions.
-#[inline(never)] // its relays are not on the stack of the others
+/// Prints the costs of a sweep (search for positions), for traffic in one and in both directions.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn sweep() {
     const THREE: Mission = mission(3);
     const BOTH_WAYS: Mission = Mission::new(MissionConfig {
@@ -106,7 +106,7 @@ pub(crate) fn sweep() {
     hprintln!("settled_both_ways {}", u32::from(cost.settled));
 }
 
-/// Measures a sweep (search for positions along three relays) and its result on the way back.
+/// Measures a sweep (search for positions) along three relays, and its verdict on the way back.
 #[inline(never)]
 fn measured(mission: Mission) -> SweepCost {
     let settings = Settings {
@@ -136,7 +136,7 @@ fn measured(mission: Mission) -> SweepCost {
             black_box(middle.poll_transmit(now, &mut out));
             black_box(&out);
         }));
-        // The same frame through a clone, outside of the measurement.
+        // The clone handles the same frame; only the call above is measured.
         again.handle_bytes(now, Port::Upstream, bytes);
         let Some((frame, len)) = next_frame(&mut again, now) else {
             break;
@@ -177,8 +177,8 @@ fn measured(mission: Mission) -> SweepCost {
     }
 }
 
-/// Measures the instructions for deframing and checking the first sweep message of eight relays.
-#[inline(never)] // its relays are not on the stack of the others
+/// Measures the instructions to deframe and check the first sweep message of eight relays.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn deframe() {
     let settings = Settings {
         predict: false,
@@ -207,10 +207,10 @@ pub(crate) fn deframe() {
     hprintln!("frame {}", cost);
 }
 
-/// Measures the instructions with which relay 1 of 100 computes the target SIR from the mission. The relay does this
-/// in several calls, before it sends its first message. Prints the cost of the most expensive call, and the number of
-/// calls.
-#[inline(never)] // its relays are not on the stack of the others
+/// Measures the instructions for relay 1 of 100 to predict the target SIR.
+///
+/// It does this in several calls before its first message. Prints the most expensive call, and the number of calls.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn predict() {
     const HUNDRED: Mission = mission(100);
     let mut head = relay(1, Settings::default(), HUNDRED);

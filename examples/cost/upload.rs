@@ -7,9 +7,8 @@ use super::auth::KEY;
 use super::counter::{instructions, next_frame, relay};
 use super::missions::mission;
 
-/// Measures the instructions that relay 1 takes to accept a mission offered by a ground station. The offered mission
-/// is the relay's own, as version 1.
-#[inline(never)] // its relays are not on the stack of the others
+/// Measures the instructions for relay 1 to accept an uploaded mission: its own, as version 1.
+#[inline(never)] // keeps its relays off the stack of other measurements
 pub(crate) fn upload() {
     const THREE: Mission = mission(3);
     let now = Instant::ZERO;
@@ -27,7 +26,7 @@ pub(crate) fn upload() {
     if ground.upload(now, upload).is_err() {
         return;
     }
-    // Handshakes come first; the offer is the frame after which the relay holds an upload.
+    // Handshakes come first. The frame after which the relay holds an upload is the offer.
     loop {
         while let Some(len) = ground.poll_transmit(&mut frame) {
             let bytes = frame.get(..len).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Build script of every board. It passes defmt's linker script and the location of memory.x to the linker.
+//! Build script of every board: passes defmt's linker script and the folder of memory.x to the linker.
 
 fn main() {
     let folder = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();

@@ -1,18 +1,18 @@
-//! Answers of the golden image, byte by byte the same on the target and on the host.
+//! Answers of the test firmware. They are the same, byte by byte, on the target and on a PC.
 
 use uav_relay::optimiser::pass::Verdict;
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{self, FrameError, MAX_FRAME};
 use uav_relay::wire::message::{Message, MessageError, SweepVerdict};
 
-/// First bytes that the test firmware sends. They tell the test that the firmware is ready to receive frames.
+/// First bytes that the firmware sends: it is ready to receive frames.
 pub const READY: &[u8] = b"ready\0";
 
-/// Generator of the answers to received frames. A test compares the answers of the target with the answers of a PC.
+/// Generator of the answers to received frames.
 ///
-/// The answer to a valid frame is the same frame, decoded and encoded once more. After a sweep message a second answer
-/// follows: a verdict message that contains values of the sweep. The answer to an invalid frame is a digit for the
-/// error, and a delimiter.
+/// The answer to a valid frame is that frame, decoded and encoded again. After a sweep message a second answer
+/// follows: a verdict with values of the sweep. The answer to an invalid frame is a digit for the error, and a
+/// delimiter.
 pub struct Answerer {
     deframer: Deframer,
 }

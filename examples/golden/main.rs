@@ -1,5 +1,7 @@
-//! Firmware that shows that target and PC agree on every byte. On USART2 (TX PA2, RX PA3), 115 200 baud, it answers each frame with
-//! the crate's result. `host-tests/tests/qemu/golden.rs` compares the answers with those of a PC.
+//! Firmware that shows that target and PC agree on every byte.
+//!
+//! It answers each frame on USART2 (TX PA2, RX PA3, 115 200 baud) with the crate's result.
+//! `host-tests/tests/qemu/golden.rs` compares the answers with those of a PC.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -42,7 +44,7 @@ fn serve(mut uart: Uart) -> ! {
     use embedded_hal_nb::serial::Read as _;
 
     let mut answerer = answer::Answerer::new();
-    // Bytes sent to it before this would be lost.
+    // Bytes sent to the firmware before this would be lost.
     say(&mut uart, answer::READY);
     loop {
         if let Ok(byte) = uart.read() {

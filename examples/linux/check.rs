@@ -1,21 +1,20 @@
-//! Colours, end and verdict of a check before flight, `--check`.
+//! Result of a check before flight (`--check`): colours, end and last line.
 
 use uav_relay::{Duration, Instant};
 
-/// Result of one item of a check, as a text. `Ok` is green, `Err` is red.
+/// Result of one item of a check: `Ok` is green, `Err` is red.
 pub type Finding = Result<String, String>;
 
-/// Returns the colour of an item of a check.
+/// Returns the colour of a result.
 #[must_use]
 pub const fn colour(is_green: bool) -> &'static str {
     if is_green { "green" } else { "red" }
 }
 
-/// Returns the last line of a check: all items are green, or `red` of `all` items are red. `items` is the plural noun
-/// for the items.
+/// Returns the last line of a check: how many of `all` items are red. `items` is their plural noun.
 ///
 /// # Errors
-/// The line, if an item is red.
+/// The line, if at least one item is red.
 pub fn verdict(red: usize, all: usize, items: &str) -> Finding {
     if red == 0 {
         Ok(format!("all {all} {items} are green"))
@@ -24,11 +23,10 @@ pub fn verdict(red: usize, all: usize, items: &str) -> Finding {
     }
 }
 
-/// Condition for the end of a check. The check ends when all items have been green for `green_for`, or at the time
-/// `limit`.
+/// Condition for the end of a check: all items green for `green_for`, or the time `limit`.
 #[derive(Debug)]
 pub struct End {
-    /// Time at which the check ends even if an item is red.
+    /// Time at which the check ends in any case.
     pub limit: Instant,
     /// Time for which all items have to be green.
     pub green_for: Duration,
@@ -37,7 +35,7 @@ pub struct End {
 }
 
 impl End {
-    /// Updates the state with `are_green`, true if all items are green now. Returns true at the end of the check.
+    /// Updates the state; `are_green` is true if all items are green now. Returns true at the end of the check.
     pub fn is_reached(&mut self, now: Instant, are_green: bool) -> bool {
         let since = self.green_since.filter(|_| are_green);
         self.green_since = are_green.then(|| since.unwrap_or(now));

@@ -8,18 +8,19 @@ use uav_relay_scenario::deployment::Deployment;
 
 use crate::config::{self, FileOnlySettings, FileOptions};
 
-/// Parses the command line and the file named by `--config`. `section` reads the file's section that only this
-/// program has.
+/// Parses the command line and the file named by `--config`.
+///
+/// `section` reads the file's section that is only for this program.
 ///
 /// # Errors
-/// The exit status after `--help` or a mistake, which has been printed.
+/// The exit status after `--help` or a mistake; the message has been printed.
 pub fn read<T: Parser>(
     section: fn(&Deployment, &mut FileOptions),
 ) -> Result<(T, FileOnlySettings), ExitCode> {
     let (words, beyond) = config::read::<T>(section).map_err(|line| refuse(&line))?;
     let options = T::try_parse_from(words).map_err(|error| {
         if !error.use_stderr() {
-            // Help text. A closed standard output is ignored.
+            // Text of help or version. A closed standard output is ignored.
             let _ = error.print();
             return ExitCode::SUCCESS;
         }
@@ -57,12 +58,12 @@ pub fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Parser of an option's value, in the form that clap takes.
+/// Parser of an option's value, as clap takes it.
 pub trait Parse<T>: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {}
 
 impl<T, F: Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static> Parse<T> for F {}
 
-/// Returns the parser of a whole number within `least` to `most`. Its error is a message with the range.
+/// Returns the parser of a whole number in the range `least` to `most`. Its error names the range.
 pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Parse<T> {
     move |text: &str| {
         let value: Option<u64> = text.trim().parse().ok();
@@ -73,7 +74,7 @@ pub fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Parse<T> {
     }
 }
 
-/// Returns the parser of a number within a range. Its error is a message with the range.
+/// Returns the parser of a number in a range. Its error names the range.
 pub fn number([least, most]: [f32; 2]) -> impl Parse<f32> {
     move |text: &str| {
         let value = text.trim().parse().ok();
@@ -83,7 +84,7 @@ pub fn number([least, most]: [f32; 2]) -> impl Parse<f32> {
     }
 }
 
-/// Parses one of several numbers in an option's value. Error messages begin with the number's `name`.
+/// Parses one of several numbers in an option's value; `name` is its name in error messages.
 ///
 /// # Errors
 /// A message with the name and the allowed range.

@@ -1,6 +1,6 @@
-//! Reader of the `--config` file of all tools. Its keys become options before those of the command line.
+//! Reader of the `--config` file of all tools. Its keys become options in front of the command line's.
 //!
-//! Every number therefore has one name and one check, and the command line overrides the file.
+//! So every number has one name and one check, and the command line overrides the file.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -17,29 +17,29 @@ use crate::log::Log;
 use crate::mission::Method;
 use crate::site::degrees;
 
-/// Settings that only the `--config` file can give, because they have no option.
+/// Settings of the `--config` file that have no option.
 #[derive(Clone, Debug, Default)]
 pub struct FileOnlySettings {
-    /// Path-loss parameters of the channel in the file. `None` for the default channel, which is the channel of the
-    /// paper.
+    /// Path-loss parameters of the file; `None` for the default channel, that of the paper.
     pub channel: Option<Channel>,
-    /// Distribution of the interference along x given by the file; `None` if the file has none.
+    /// Interference along x in the file, if any.
     pub field: Option<Interference>,
-    /// Profiles (altitude and power) of single relays, each with the index of its relay.
+    /// Profiles (altitude and power) of single relays, with the relay's index.
     pub profiles: Vec<(u16, Profile)>,
-    /// Indices of the relays whose altitude the file fixes. The method chooses only the altitudes of the other relays.
+    /// Indices of the relays with a fixed altitude. The method chooses the others.
     pub held: Vec<u16>,
     /// Positions of the relays in the file's plan; empty without a plan.
     pub places: Vec<Placement>,
-    /// Elevation model below the line from Tx to Rx, if the file has one.
+    /// Elevation model of the terrain below the line from Tx to Rx, if the file has one.
     pub terrain: Option<TerrainSpec>,
     /// Options of the command line that override the file.
     pub overrides: Vec<Override>,
 }
 
 impl FileOnlySettings {
-    /// Rejects `--altitude` and `--uav-power` for a relay that has its own `[[relay]]` profile in the file. Relay
-    /// `index` would ignore these options.
+    /// Rejects `--altitude` and `--uav-power` if relay `index` has its own `[[relay]]` profile in the file.
+    ///
+    /// The relay would ignore these options.
     ///
     /// # Errors
     /// One line that names the option and the file's table.
@@ -55,28 +55,28 @@ impl FileOnlySettings {
     }
 }
 
-/// Command-line option that overrides another value in the file.
+/// Command-line option that overrides a value in the file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Override {
-    /// Option of the command line and its value, as one text.
+    /// Option on the command line and its value, as one text.
     pub option: String,
-    /// Value in the configuration file that a command-line option overrides.
+    /// Overridden value in the file.
     pub file_value: String,
     file: String,
 }
 
 impl Override {
-    /// Returns true if the overriding option has this name.
+    /// Returns true if the option on the command line has this name.
     #[must_use]
     pub fn has_name(&self, name: &str) -> bool {
         self.option.split(' ').next() == Some(name)
     }
 }
 
-/// Section of a scenario file that `--interferer` and `--field` override.
+/// Section of the file that `--interferer` and `--field` override.
 const FIELD_SECTION: &str = "[field]";
 
-/// Logs a line for each override, so that an ignored value of the file is noticed.
+/// Logs a line for each override, so that ignored values of the file are noticed.
 pub fn log_overrides(overrides: &[Override], log: &Log) {
     for one in overrides {
         let Override {
@@ -112,15 +112,13 @@ impl FileOptions {
         self.options.extend(value.map(|value| (name, Some(value))));
     }
 
-    /// Adds an option whose value is a path relative to the file's folder. Does nothing if the file has no value for
-    /// this option.
+    /// Adds an option whose value is a path relative to the file's folder, if the file has one.
     pub fn path(&mut self, name: &'static str, path: Option<&PathBuf>) {
         let path = path.map(|path| self.folder.join(path).into_os_string());
         self.options.extend(path.map(|path| (name, Some(path))));
     }
 
-    /// Adds an option whose value is a path or a `udp:` address. A path is relative to the file's folder; an address
-    /// is unchanged.
+    /// Adds an option whose value is a path relative to the file's folder, or a `udp:` address.
     pub fn path_or_udp(&mut self, name: &'static str, place: Option<&String>) {
         match place {
             Some(path) if !path.starts_with("udp:") => self.path(name, Some(&PathBuf::from(path))),
@@ -135,7 +133,7 @@ impl FileOptions {
         }
     }
 
-    /// Checks that the file or the command line names an autopilot if the file has settings for one.
+    /// Checks that an autopilot is named if the file has settings for one.
     fn has_autopilot(&self, line: &[OsString]) -> Result<(), String> {
         let file_value = |name: &str| self.options.iter().find(|(option, _)| *option == name);
         if file_value("--autopilot").is_some() || value_of(line, "--autopilot").is_some() {
@@ -152,11 +150,9 @@ impl FileOptions {
         })
     }
 
-    /// Removes the options of the file that the command line overrides. They are also on the command line, or excluded
-    /// by another option there.
+    /// Removes options of the file that the command line repeats or excludes.
     ///
-    /// Returns the remaining options, and the overrides. An override is a removed option whose value differs from the
-    /// value on the command line.
+    /// Returns the other options, and the overrides: the removed options whose values differ from the command line.
     fn without_overridden(mut self, line: &[OsString], file: &str) -> (Self, Vec<Override>) {
         let mut overrides = Vec::new();
         self.options.retain(|(name, value)| {
@@ -191,8 +187,9 @@ impl FileOptions {
     }
 }
 
-/// Returns the value of the option `name` on the command line; `None` without this option. The value is empty if the
-/// option is the last word.
+/// Returns the value of the option `name` on the command line, if it is there.
+///
+/// The value is empty if the option is the last word.
 fn value_of(line: &[OsString], name: &str) -> Option<String> {
     let with_value = format!("{name}=");
     line.iter().enumerate().find_map(|(at, word)| {
@@ -205,18 +202,17 @@ fn value_of(line: &[OsString], name: &str) -> Option<String> {
     })
 }
 
-/// Returns true if two values of an option are the same text, or the same list of numbers. An empty `other` also
-/// counts as the same, because an option without a value has an empty value.
+/// Returns true if two values are the same text or the same numbers. An empty `other` is always the same.
 fn is_same(one: &str, other: &str) -> bool {
     let numbers = |text: &str| -> Option<Vec<u64>> {
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().ok());
         numbers.map(|number| Some(number?.to_bits())).collect()
     };
-    // An empty value means that nothing follows the option.
+    // `other` is empty if nothing follows the option.
     one == other || other.is_empty() || numbers(one).is_some_and(|one| Some(one) == numbers(other))
 }
 
-/// Command-line options that have an effect only with an autopilot, and their keys in the file.
+/// Options that have an effect only with an autopilot, and their keys in the file.
 const NEEDS_AUTOPILOT: [(&str, &str); 6] = [
     ("--autopilot-baud", "autopilot_baud"),
     ("--autopilot-key-file", "autopilot_key_file"),
@@ -226,7 +222,7 @@ const NEEDS_AUTOPILOT: [(&str, &str); 6] = [
     ("--descent", "descent_m_s"),
 ];
 
-/// Command-line options, each with the options that are removed from the file when it is given.
+/// Command-line options, each with the options of the file that it removes.
 const EXCLUDES: [(&str, &[&str]); 6] = [
     ("--shared", &["--upstream", "--downstream"]),
     ("--upstream", &["--shared"]),
@@ -247,10 +243,11 @@ const EXCLUDES: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Merges the `--config` file into the command line. Returns the arguments, the file's first, and the settings that
-/// only a file can give.
+/// Merges the `--config` file into the command line. Returns the arguments, the file's first.
 ///
-/// `section` reads the file's section that only this program has.
+/// The second result has the settings that only a file can give.
+///
+/// `section` reads the file's section that is only for this program.
 ///
 /// # Errors
 /// One line that states the fault in the file.
@@ -276,7 +273,7 @@ pub fn read<T: Parser>(
     let file_only = mission_options(&scenario, &mut given)
         .map_err(|error| format!("--config {}: {error}", file.display()))?;
     let method = value_of(&line, "--method").or_else(|| deployment.network.method.clone());
-    // A wrong name is refused with the other options.
+    // A wrong name is rejected with the other options.
     let method = method.and_then(|name| Method::from_str(&name, false).ok());
     if method == Some(Method::Joint) {
         fitted_slots(&scenario, &mut given)
@@ -325,8 +322,9 @@ fn named(line: &[OsString]) -> Option<PathBuf> {
     })
 }
 
-/// Adds the SNR gap of the file's fitted slots, if it has any, to the options `given`. A fitted slot is a time slot as
-/// long as its hop needs.
+/// Adds the SNR gap of the file's fitted slots, if any, to the options `given`.
+///
+/// A fitted slot is as long as its hop needs.
 fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), String> {
     let error = |refusal: mission::Refusal| refusal.to_string();
     let (mission, _) = mission::mission(scenario, 1, COMPANION_TOLERANCE).map_err(error)?;
@@ -336,7 +334,7 @@ fn fitted_slots(scenario: &Scenario, given: &mut FileOptions) -> Result<(), Stri
     Ok(())
 }
 
-/// Adds the mission of the file's scenario to the options `given`. Returns the settings for which there is no option.
+/// Adds the mission of the file to the options `given`. Returns the settings without an option.
 fn mission_options(
     scenario: &Scenario,
     given: &mut FileOptions,
@@ -418,7 +416,7 @@ fn place(planned: &PlannedPlace) -> Placement {
     }
 }
 
-/// Returns the scenario without a minimum separation: with 0 m, any number of relays fits on the line.
+/// Returns the scenario with a minimum separation of 0 m: then any number of relays fits.
 fn without_separation(scenario: &Scenario) -> Scenario {
     Scenario {
         min_separation_m: 0.0,

@@ -1,4 +1,4 @@
-//! Frame counters as JSON, and the reasons of rejected frames in words. Each reason is reported once.
+//! Frame counters as JSON, and the reasons of rejected frames in words.
 
 use serde_json::{Value, json};
 use uav_relay::{Duration, Instant, Stats};
@@ -37,15 +37,15 @@ pub fn counted(stats: &Stats) -> Value {
 /// Interval between two checks of the frame counters.
 const EVERY: Duration = Duration::from_millis(2_000);
 
-/// Minimum number of frames rejected for a reason between two checks before the reason is reported.
+/// Number of frames rejected for one reason between two checks, from which on it is reported.
 const MANY: u32 = 3;
 
-/// Minimum number of damaged frames between two checks for the log to suggest a wrong baud rate. The log suggests this
-/// only if no intact frame was received between the two checks.
+/// Number of damaged frames between two checks for which the log suggests a wrong baud rate.
+///
+/// It suggests this only if no intact frame was received meanwhile.
 const DAMAGED: u32 = 10;
 
-/// Detector of reasons why frames are rejected. It compares the counters with the counters at the last check, and
-/// remembers the reasons that it has reported.
+/// Detector of reasons why frames are rejected. It compares the counters with those at the last check.
 #[derive(Debug, Default)]
 pub struct RejectionReasons {
     last: Stats,
@@ -54,8 +54,9 @@ pub struct RejectionReasons {
 }
 
 impl RejectionReasons {
-    /// Returns a text about a reason why frames are rejected; `None` if there is no new reason. Each reason is returned
-    /// once. `signs` is true if this relay signs its frames.
+    /// Returns a text about a new reason for rejected frames, if any. Each reason is returned once.
+    ///
+    /// `signs` is true if this relay signs its frames.
     pub fn next_reason(&mut self, now: Instant, stats: &Stats, signs: bool) -> Option<String> {
         if now < self.check_at {
             return None;

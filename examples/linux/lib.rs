@@ -1,11 +1,11 @@
-//! Modules shared by the Linux programs. `examples/linux_companion`, a relay, and `examples/linux_ground`, the ground station.
+//! Modules shared by the Linux programs: `linux_companion` (relay) and `linux_ground` (ground station).
 //!
 //! | module | content |
 //! | --- | --- |
 //! | [`check`] | colours, end and verdict of a check before flight |
 //! | [`command`] | command-line parsing and its error messages |
 //! | [`config`] | `--config` file, as options before those of the command line |
-//! | [`mission`], [`site`] | options of the mission, and of the line's place on earth |
+//! | [`mission`], [`site`] | options of the mission, and of the Tx and Rx positions on earth |
 //! | [`tty`] | non-blocking tty as a `SerialPort` |
 //! | [`replug`] | tty that is reopened when it disappears; counts and captures its bytes |
 //! | [`tap`] | capture of the ports' traffic |

@@ -56,8 +56,7 @@ pub fn words(line: &[u8]) -> Result<Vec<&str>, String> {
 pub struct InvalidLines(u64);
 
 impl InvalidLines {
-    /// Counts an invalid line. The first one is logged as the event `event`, with the reason `why` and a description
-    /// of valid lines.
+    /// Counts an invalid line. The first one is logged as `event`, with the reason `why` and the valid forms.
     pub fn refuse(
         &mut self,
         now: Instant,
@@ -85,7 +84,7 @@ impl InvalidLines {
 
 const READS: usize = 16;
 
-/// Open FIFO, from which lines are read.
+/// FIFO from which lines are read.
 #[derive(Debug)]
 pub struct Fifo {
     fd: OwnedFd,
@@ -93,14 +92,14 @@ pub struct Fifo {
     partial_line: PartialLine,
 }
 
-/// Incomplete line, as received so far. A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes, which marks it as
-/// too long.
+/// Incomplete line. A line longer than [`LONGEST`] is cut to `LONGEST + 1` bytes, which shows that it was too long.
 #[derive(Debug, Default)]
 pub struct PartialLine(Vec<u8>);
 
 impl PartialLine {
-    /// Appends received bytes, and passes each completed line to `line` without its line feed. Cuts a line to `LONGEST
-    /// + 1` bytes.
+    /// Appends received bytes, and passes each complete line to `line`, without its line feed.
+    ///
+    /// A longer line is cut to `LONGEST + 1` bytes.
     pub fn take(&mut self, bytes: &[u8], mut line: impl FnMut(&[u8])) {
         for &byte in bytes {
             if byte == b'\n' {
@@ -120,7 +119,7 @@ impl Fifo {
     /// One line that names `option` and the fault.
     pub fn open(option: &str, path: &Path) -> Result<Self, String> {
         let name = format!("{option} {}", path.display());
-        // We open it for writing, too, so that it never reports an end of file when a writer leaves.
+        // Also opened for writing, so that no end of file occurs when a writer leaves.
         let flags = OFlags::RDWR | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
         let fd = open(path, flags, Mode::empty()).map_err(|error| format!("{name}: {error}"))?;
         let kind = fstat(&fd).map(|stat| FileType::from_raw_mode(stat.st_mode));
@@ -147,7 +146,7 @@ impl Fifo {
             let count = match read(&self.fd, &mut buffer) {
                 Ok(count @ 1..) => count,
                 Err(Errno::INTR) => continue,
-                // Nothing to read. An end of file can not occur, because this process holds the FIFO open for writing.
+                // No more input. An end of file cannot occur, because this process has the FIFO open for writing.
                 _ => break,
             };
             let bytes = buffer.get(..count).unwrap_or_default();

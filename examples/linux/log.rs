@@ -1,5 +1,6 @@
-//! Log lines, written by a separate thread. A slow reader or a full disk never blocks the program. A line that cannot be written is
-//! dropped and counted. The next written line reports the number of dropped lines.
+//! Log lines, written by a separate thread. A slow reader or a full disk never blocks the program.
+//!
+//! A line that cannot be written is dropped. The next written line reports how many were dropped.
 
 use std::fmt;
 use std::fs::File;
@@ -15,7 +16,7 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 use uav_relay::Instant;
 
-/// Maximum number of log lines waiting for the writer thread; further lines are dropped.
+/// Maximum number of waiting log lines; further lines are dropped.
 const QUEUE: usize = 1_024;
 
 /// Options of the log.
@@ -30,11 +31,10 @@ pub struct LogOptions {
     pub log_file: Option<PathBuf>,
 }
 
-/// Identity of the program that writes the log. Logs of several programs are read side by side, so every line names
-/// the program.
+/// Identity of the program, which every log line names. Logs of several programs are read side by side.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// Name of the program in a line of text, such as `relay 2`.
+    /// Name of the program in a text line, such as `relay 2`.
     pub name: String,
     /// Name of the field that identifies the program in a JSON line, such as `index`.
     pub key: &'static str,
@@ -50,19 +50,18 @@ struct Format {
 
 enum Order {
     Line(Instant, String),
-    /// Request for a confirmation. The writer thread confirms through the channel once all earlier lines are written or
-    /// dropped.
+    /// Request for a confirmation through the channel, once all earlier lines are written or dropped.
     Flush(SyncSender<()>),
 }
 
-/// State shared by the log's callers and its writer thread.
+/// State that callers and writer thread share.
 #[derive(Debug, Default)]
 struct Shared {
     dropped: AtomicU64,
     reopen: AtomicBool,
 }
 
-/// Handle of the log. No call blocks, except `flush`, and none fails.
+/// Handle of the log. No call fails, and only `flush` blocks.
 #[derive(Clone, Debug)]
 pub struct Log {
     orders: SyncSender<Order>,
@@ -81,7 +80,7 @@ impl Log {
             Some(path) => {
                 appended(path).map_err(|error| format!("--log-file {}: {error}", path.display()))?
             }
-            // Not `Stdout`, because flushing its buffer at exit could block for ever.
+            // Not `Stdout`: to flush its buffer at exit could block forever.
             None => std::io::stdout()
                 .as_fd()
                 .try_clone_to_owned()
@@ -113,7 +112,7 @@ impl Log {
         })
     }
 
-    /// Logs an event at `now`: its short name, data fields for programs, and a text for people.
+    /// Logs an event at `now`: short name, data fields for programs, and a text for people.
     pub fn event(&self, now: Instant, event: &str, fields: Value, text: impl fmt::Display) {
         let line = self.format.line(now, event, fields, &text.to_string());
         if self.orders.try_send(Order::Line(now, line)).is_err() {
@@ -126,7 +125,7 @@ impl Log {
         self.event(now, event, Value::Null, text);
     }
 
-    /// Logs that frames are signed, and the epoch, a number that rises at every start.
+    /// Logs that frames are signed, and the epoch.
     pub fn signed(&self, epoch: u32) {
         let what =
             format_args!("frames are signed; epoch {epoch} (start counter, larger at every start)");
@@ -143,7 +142,7 @@ impl Log {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
-    /// Waits until all log lines are written, for at most the time `at_most`.
+    /// Waits until all log lines are written, at most for `at_most`.
     pub fn flush(&self, at_most: Duration) {
         let end = Clock::now() + at_most;
         let (done, flushed) = sync_channel(1);
@@ -166,9 +165,9 @@ fn appended(path: &Path) -> std::io::Result<File> {
 struct Writer {
     file: File,
     path: Option<PathBuf>,
-    /// True if the last log line was written only partly, for example because the disk is full.
+    /// True if the last line was written only partly, for example on a full disk.
     torn: bool,
-    /// Number of dropped lines that have already been reported in the log.
+    /// Number of dropped lines already reported in the log.
     reported_drops: u64,
     format: Arc<Format>,
     shared: Arc<Shared>,
@@ -255,7 +254,7 @@ impl Format {
     }
 }
 
-/// Escapes control characters, so that a name with a line feed does not make two lines.
+/// Escapes control characters, so that a text with a line feed stays one line.
 fn printable(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for sign in text.chars() {

@@ -15,10 +15,10 @@ pub const DISTANCE_M: [f32; 2] = [1.0, 1e6];
 /// Permitted range of an altitude, m.
 pub const ALTITUDE_M: [f32; 2] = [0.1, 1e4];
 
-/// Permitted range of the lower limit of lateral offsets y, left of the line Tx to Rx, m.
+/// Permitted range of the left limit of lateral offsets, y in m (facing the receiver).
 pub const LEFT_M: [f32; 2] = [-1e5, 0.0];
 
-/// Permitted range of the upper limit of lateral offsets y, right of the line Tx to Rx, m.
+/// Permitted range of the right limit of lateral offsets, y in m (facing the receiver).
 pub const RIGHT_M: [f32; 2] = [0.0, 1e5];
 
 /// Permitted range of a transmit power, W.
@@ -27,12 +27,10 @@ pub const POWER_W: [f32; 2] = [1e-6, 1e6];
 /// Permitted range of a noise power, W.
 pub const NOISE_W: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--reverse`, a ratio of two SIRs. It is the SIR that a hop needs toward the transmitter, divided
-/// by the SIR that it needs toward the receiver.
+/// Permitted range of `--reverse`: SIR toward the transmitter, relative to the SIR toward the receiver.
 pub const REVERSE: [f32; 2] = [0.0, 1.0];
 
-/// Permitted range of `--fitted-gap` above 0. The value is the SNR gap, a power ratio, for time slots as long as each
-/// hop needs.
+/// Permitted range of `--fitted-gap` above 0: the SNR gap, a power ratio.
 pub const FITTED_GAP: [f32; 2] = [1.0, 1e3];
 
 fn fitted_gap(text: &str) -> Result<f32, String> {
@@ -52,10 +50,10 @@ const PAPERS: Interference = Interference::Source(Interferer {
     y_m: 400.0,
 });
 
-/// Method of finding positions.
+/// Placement method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Method {
-    /// Algorithm 1; in a field Algorithm 4
+    /// Algorithm 1; with --field Algorithm 4
     Align,
     /// Joint optimisation of positions, sides and altitudes
     #[value(alias = "altitude")]
@@ -98,21 +96,22 @@ pub struct MissionOptions {
     /// Power of every relay, W, 1e-6 to 1e6
     #[arg(long, value_name = "W", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub uav_power: f32,
-    /// Interferer: power (W, 1e-6 to 1e9) and position (m, -1e7 to 1e7). The position is along the line to the receiver, and to the
-    /// right of it. `unknown` for relays that listen; default 80,500,400
+    /// Interferer: power (W, 1e-6 to 1e9) and position x, y (m, -1e7 to 1e7). x is toward the receiver, y to the
+    /// right when facing it. `unknown` for relays that listen; default 80,500,400
     #[arg(long, value_name = "P,X,Y", allow_hyphen_values = true, value_parser = guess)]
     pub interferer: Option<Interference>,
     /// Noise power at every receiver, W, 0 to 1
     #[arg(long, value_name = "W", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(NOISE_W))]
     pub noise: f32,
-    /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 is one direction only
+    /// SIR that a hop needs toward the transmitter, relative to its SIR toward the receiver, 0 to 1. 0 means traffic
+    /// toward the receiver only
     #[arg(long, value_name = "R", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(REVERSE))]
     pub reverse: f32,
     /// Power with which the receiver sends toward the transmitter, W, 1e-6 to 1e6; default: --tx-power
     #[arg(long, value_name = "W", allow_negative_numbers = true, value_parser = number(POWER_W))]
     pub rx_power: Option<f32>,
-    /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap `joint` chooses the places of the largest data rate in
-    /// slots as long as each hop needs
+    /// SNR gap of fitted slots, linear, 1 to 1000; 0 for equal slots. With a gap each slot is as long as its hop
+    /// needs, and `joint` chooses the places with the largest data rate
     #[arg(long, value_name = "G", default_value_t = 0.0, allow_negative_numbers = true, value_parser = fitted_gap)]
     pub fitted_gap: f32,
     /// Minimum distance between two relays, m, 0 to 1e5
@@ -121,14 +120,14 @@ pub struct MissionOptions {
 }
 
 impl MissionOptions {
-    /// Returns the interference of the mission: the interferer of the command line. Without one, `field` is returned,
-    /// the interference that the file gives along x. Without both, the interferer of the paper is returned.
+    /// Returns the interference of the command line, else `field`, else that of the paper.
+    ///
+    /// `field` is the file's interference along x.
     pub fn interference(&self, field: Option<Interference>) -> Interference {
         self.interferer.or(field).unwrap_or(PAPERS)
     }
 
-    /// Returns the mission's parameters for `relays` relays. If `channel` is `None`, the channel is the channel of
-    /// the paper.
+    /// Returns the mission's parameters for `relays` relays. Without `channel` it has the paper's channel.
     ///
     /// # Errors
     /// One line that states the fault.
@@ -138,7 +137,8 @@ impl MissionOptions {
         interference: Interference,
         channel: Option<Channel>,
     ) -> Result<MissionConfig, String> {
-        // 2 GHz, excess losses of 0.1 dB with line of sight and 21 dB without: bit-identical to the simulator's channel.
+        // 2 GHz, excess losses of 0.1 dB and 21 dB with and without line of sight: bit-identical to the simulator's
+        // channel.
         let channel = match channel {
             Some(channel) => channel,
             None => Channel::from_db(2e9, 0.1, 21.0, AirGround::Los)
@@ -169,7 +169,7 @@ impl MissionOptions {
     }
 }
 
-/// Checks a mission's parameters. Error messages name options, which begin with `prefix`: "--" or "--new-".
+/// Checks a mission's parameters. Option names in error messages begin with `prefix`: "--" or "--new-".
 ///
 /// # Errors
 /// One line that names the option and the fault.
@@ -182,7 +182,7 @@ pub fn mission(config: MissionConfig, prefix: &str) -> Result<Mission, String> {
         band,
         ..
     } = config;
-    // The error about gaps needs two relays or more.
+    // The error about the separation needs two relays or more.
     let gaps = relays.saturating_sub(1).max(1);
     Mission::try_new(config).map_err(|error| match error {
         MissionError::TooManyForDistance => format!(

@@ -10,14 +10,15 @@ use uav_relay::{Duration, Instant};
 pub struct Notify {
     socket: UnixDatagram,
     to: SocketAddr,
-    /// Interval of the reports to systemd's watchdog: half of its timeout. `None` without a watchdog.
+    /// Interval of the reports to systemd's watchdog, half of its timeout; `None` without a watchdog.
     every: Option<Duration>,
     due: Instant,
 }
 
 impl Notify {
-    /// Opens the socket that `NOTIFY_SOCKET` names. Returns `None` without this variable, or if the socket cannot be
-    /// reached. With `None` the program runs without notifications.
+    /// Opens the socket that `NOTIFY_SOCKET` names; `None` if that is unset, or cannot be reached.
+    ///
+    /// Without it the program runs without notifications.
     pub fn open() -> Option<Self> {
         let to = address(&std::env::var_os("NOTIFY_SOCKET")?)?;
         let socket = UnixDatagram::unbound().ok()?;
@@ -35,8 +36,7 @@ impl Notify {
         self.send("READY=1");
     }
 
-    /// Reports to systemd's watchdog that the program is alive, if the report is due. Returns the time of the next
-    /// report; `None` without a watchdog.
+    /// Reports to systemd's watchdog if due. Returns the time of the next report; `None` without a watchdog.
     pub fn tend(&mut self, now: Instant) -> Option<Instant> {
         let every = self.every?;
         if self.due <= now {
@@ -66,7 +66,7 @@ fn address(name: &OsStr) -> Option<SocketAddr> {
     SocketAddr::from_pathname(name).ok()
 }
 
-/// Returns half of the watchdog timeout that systemd requests of this process. `None` without a timeout.
+/// Returns half of the watchdog timeout that systemd sets for this process, if any.
 fn watchdog() -> Option<Duration> {
     let micros: u64 = std::env::var("WATCHDOG_USEC").ok()?.parse().ok()?;
     let pid = std::env::var("WATCHDOG_PID").ok();

@@ -1,4 +1,4 @@
-//! Tty that is reopened whenever it disappears, so that a loose cable does not end the program.
+//! Tty that is reopened when it disappears, so that a loose cable does not end the program.
 
 use std::fmt;
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -14,7 +14,7 @@ use crate::log::Log;
 use crate::tap::Tap;
 use crate::tty::Tty;
 
-/// Pause before the first attempt to reopen a tty. The pause doubles with every attempt, up to [`LONGEST`].
+/// Pause before the first attempt to reopen a tty. It doubles with every attempt, up to [`LONGEST`].
 const FIRST: Duration = Duration::from_millis(250);
 const LONGEST: Duration = Duration::from_millis(4_000);
 
@@ -32,19 +32,18 @@ pub struct Replug {
     tap: Option<Tap>,
 }
 
-/// Traffic counters of a serial port (tty): bytes, and the number of times that the port failed. A port fails when it
-/// is unplugged, for example.
+/// Traffic counters of a tty: bytes, and number of failures, for example when it was unplugged.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     read: u64,
     written: u64,
-    /// Number of bytes to send that were discarded while the serial port was missing.
+    /// Number of bytes to send that were discarded while the tty was missing.
     lost: u64,
     times_gone: u32,
 }
 
 impl Replug {
-    /// Opens the tty. This must succeed at the start, because a wrong name is a mistake.
+    /// Opens the tty. It must exist at the start, because a wrong name is a mistake.
     ///
     /// # Errors
     /// One line that names the option and the fault.
@@ -61,19 +60,19 @@ impl Replug {
         })
     }
 
-    /// Passes all further traffic of this tty to `tap`, which captures it in a file.
+    /// Captures all further traffic of this tty with `tap`.
     pub fn tapped(&mut self, tap: Tap) {
         self.tap = Some(tap);
     }
 
-    /// Adds a comment to the next frame in the capture, if enabled: an act of the operator.
+    /// Adds a comment on an act of the operator to the next frame in the capture, if any.
     pub fn note(&mut self, note: &str) {
         if let Some(tap) = &mut self.tap {
             tap.note(note);
         }
     }
 
-    /// Closes a tty that has failed, and tries to reopen it when it is time. Logs each loss and each return once.
+    /// Closes a failed tty, and reopens it when it is time. Logs each loss and each return once.
     pub fn tend(&mut self, now: Instant, log: &Log) {
         let failure = self.tty.as_ref().and_then(Tty::failure);
         if let Some(failure) = failure {
@@ -190,7 +189,7 @@ impl SerialPort for Replug {
 
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Fault> {
         let Some(tty) = &mut self.tty else {
-            // The bytes would be outdated when the port is back.
+            // The bytes would be outdated when the tty is back.
             self.counts.lost += bytes.len() as u64;
             return Ok(bytes.len());
         };

@@ -23,7 +23,7 @@ use crate::socket::StatusSocket;
 /// Maximum wait at exit for the log to write its last lines.
 const LAST_LINES: Duration = Duration::from_millis(500);
 
-/// Longest sleep after poll(2) has failed. Without the sleep, a lasting failure would keep the CPU busy.
+/// Longest sleep after poll(2) has failed, so that a lasting failure does not keep the CPU busy.
 const NAP: Duration = Duration::from_millis(10);
 
 /// Common services of a long-running program: log, clock, signals, status socket and systemd.
@@ -34,9 +34,9 @@ pub struct Service {
     clock: Clock,
     socket: Option<StatusSocket>,
     signals: SignalDelivery<UnixStream, SignalOnly>,
-    /// True from a SIGHUP, which requests to reopen the log, until the log is reopened.
+    /// True from a SIGHUP until the log is reopened.
     hangup: bool,
-    /// True from a SIGUSR1, which requests the status in the log, until the status is logged.
+    /// True from a SIGUSR1 until the status is logged.
     asks_status: bool,
     notify: Option<Notify>,
 }
@@ -76,11 +76,12 @@ impl Service {
         self.notify.iter().for_each(Notify::ready);
     }
 
-    /// Handles signals and status requests, and reports to systemd's watchdog. Returns the time by which the next call
-    /// is due; `None` if no time is set.
+    /// Handles signals and status requests, and reports to systemd's watchdog.
     ///
-    /// `answer` returns the answer to a request. The argument of `answer` is `None` for a status request; otherwise
-    /// it is a command and its sender. `who` names the program in the log line after a SIGHUP.
+    /// Returns the time by which the next call is due, if any.
+    ///
+    /// `answer` answers a request: its argument is `None` for the status, else a command and its sender. `who` names
+    /// the program in the log line after a SIGHUP.
     pub fn tend(
         &mut self,
         time: Instant,
@@ -110,12 +111,11 @@ impl Service {
         again.into_iter().chain(alive).min()
     }
 
-    /// Sleeps until the time `wake`, a signal, a status request, or input on one of `ttys` or `others`. If `wake` is
-    /// `None`, there is no time limit.
+    /// Sleeps until the time `wake`, if any, a signal, a request, or input on one of `ttys` or `others`.
     ///
     /// Returns the events of each of `others`, and true after SIGINT or SIGTERM.
     ///
-    /// A tty is ready when it has received bytes, or accepts bytes again after it was full.
+    /// A full tty also ends the sleep when it accepts bytes again.
     pub fn sleep<'a>(
         &mut self,
         wake: Option<Instant>,
@@ -124,7 +124,7 @@ impl Service {
     ) -> (Vec<PollFlags>, bool) {
         let time = self.now();
         let span = wake.map(|at| Duration::from_micros(at.since(time).as_micros()));
-        // A span too long for a Timespec means for ever.
+        // A time too long for a Timespec means no limit.
         let timeout = span.and_then(|span| Timespec::try_from(span).ok());
         let mut ttys: Vec<&mut Replug> = ttys.filter(|tty| tty.is_open()).collect();
         let on_ttys = ttys.iter().filter_map(|tty| tty.interest());
@@ -141,7 +141,7 @@ impl Service {
         let result = poll(&mut fds, timeout.as_ref());
         let mut found: Vec<PollFlags> = fds.iter().map(PollFd::revents).collect();
         if !matches!(result, Ok(_) | Err(Errno::INTR)) {
-            // For want of memory, for instance: the program goes on.
+            // poll(2) has failed, for example for want of memory: the program goes on.
             std::thread::sleep(span.map_or(NAP, |span| span.min(NAP)));
             found.fill(PollFlags::empty());
         }

@@ -9,7 +9,8 @@ use uav_relay::{Geodetic, Sites};
 /// Options for the positions of the transmitter and the receiver on earth.
 #[derive(Args, Debug)]
 pub struct SiteOptions {
-    /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and the ground's height above the mean sea level, m
+    /// Position of the transmitter. Latitude and longitude, degrees (WGS84), and ground height above the mean sea
+    /// level, m
     #[arg(long, value_name = "LAT,LON,AMSL", requires = "site_rx", allow_hyphen_values = true, value_parser = site)]
     site_tx: Option<Geodetic>,
     /// Position of the receiver
@@ -26,7 +27,7 @@ impl SiteOptions {
         Some(Sites { tx, rx })
     }
 
-    /// Returns the positions of transmitter and receiver, if given. Checks that they are `distance_m` apart.
+    /// Returns the Tx and Rx positions, if given. Checks that they are `distance_m` apart.
     ///
     /// # Errors
     /// One line that names the option and the right distance.
@@ -45,7 +46,7 @@ impl SiteOptions {
     }
 }
 
-/// Positions of transmitter and receiver, displayed in the format of the command-line options.
+/// Tx and Rx positions, displayed as on the command line.
 #[derive(Clone, Copy, Debug)]
 pub struct Between(pub Sites);
 
@@ -56,7 +57,7 @@ impl fmt::Display for Between {
     }
 }
 
-/// Returns a geodetic position with latitude and longitude swapped, which is a frequent mistake.
+/// Returns a position with latitude and longitude swapped, which is a frequent mistake.
 #[must_use]
 pub fn swapped(site: Geodetic) -> Geodetic {
     Geodetic {
@@ -66,7 +67,7 @@ pub fn swapped(site: Geodetic) -> Geodetic {
     }
 }
 
-/// Formats a position as the command-line options do: latitude and longitude (degrees), height (m).
+/// Formats a position as on the command line: latitude and longitude (degrees), height (m).
 pub fn degrees(at: Geodetic) -> String {
     let part = |number: i32, unit: f64| f64::from(number) / unit;
     let (lat, lon) = (part(at.lat_e7, 1e7), part(at.lon_e7, 1e7));

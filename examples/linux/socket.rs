@@ -1,6 +1,7 @@
-//! Unix socket for the operator: one JSON object for each connection, which is then closed. A client that sends a line gives a
-//! command, and the object reports the result; a client that sends nothing gets the state. The program never waits for a client:
-//! an answer that does not fit the kernel's buffer is cut.
+//! Unix socket for the operator: one JSON object for each connection, which is then closed.
+//!
+//! A client that sends a line gives a command, and the object is its result. A client that sends nothing gets the
+//! state. The program never waits for a client: an answer that does not fit the kernel's buffer is cut.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::os::fd::{AsFd as _, BorrowedFd};
@@ -13,11 +14,10 @@ use uav_relay::{Duration, Instant};
 
 use crate::lines::LONGEST;
 
-/// Maximum number of connections that one call of [`StatusSocket::questions`] accepts.
+/// Maximum number of connections accepted per call of [`StatusSocket::questions`].
 const ANSWERS: usize = 4;
 
-/// Maximum number of clients whose request is not complete. If there are more, the oldest requests are handled at once,
-/// as if they were complete.
+/// Maximum number of incomplete requests. With more, the oldest count as complete.
 const CLIENTS: usize = 16;
 
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -37,16 +37,16 @@ struct Client {
     until: Instant,
 }
 
-/// Complete request of a client at the status socket.
+/// Complete request of a client.
 #[derive(Debug)]
 pub struct Question {
     stream: UnixStream,
-    /// Received command line; `None` requests the state.
+    /// Command line of the client; `None` requests the state.
     pub command: Option<String>,
 }
 
 impl StatusSocket {
-    /// Creates the socket. Replaces a socket file that an earlier program has left behind.
+    /// Creates the socket. A socket file left by an earlier program is replaced.
     ///
     /// # Errors
     /// One line that names the socket and the fault.
@@ -81,8 +81,9 @@ impl StatusSocket {
         std::iter::once(self.listener.as_fd()).chain(clients)
     }
 
-    /// Accepts connections and reads from them. Returns the complete requests, and the time by which the next call is
-    /// due; `None` without clients.
+    /// Accepts connections and reads from them; returns the complete requests.
+    ///
+    /// The second result is the time by which the next call is due; `None` without clients.
     pub fn questions(&mut self, now: Instant) -> (Vec<Question>, Option<Instant>) {
         let accepted = (0..ANSWERS).map_while(|_| self.listener.accept().ok());
         let accepted = accepted.filter(|(stream, _)| stream.set_nonblocking(true).is_ok());
@@ -104,8 +105,9 @@ impl StatusSocket {
 }
 
 impl Client {
-    /// Reads from the client. Returns true if the request is complete: after a line, the end of the stream, an
-    /// overlong line or a timeout.
+    /// Reads from the client; returns true if the request is complete.
+    ///
+    /// A request ends with a line, the end of the stream, too many bytes or a timeout.
     fn is_complete(&mut self, now: Instant) -> bool {
         let mut bytes = [0; LONGEST];
         let has_ended = match self.stream.read(&mut bytes) {
@@ -142,8 +144,7 @@ impl Question {
         "an unknown user".to_owned()
     }
 
-    /// Sends the answer to the client and closes the connection. If the kernel's buffer for this client is full, only
-    /// a part is sent.
+    /// Sends the answer and closes the connection. If the kernel's buffer is full, only a part is sent.
     pub fn answer(mut self, answer: &Value) {
         let _ = self.stream.write_all(format!("{answer}\n").as_bytes());
     }

@@ -1,4 +1,4 @@
-//! Files that survive a power failure: the epoch, and records that are written in flight.
+//! Files that survive a power failure: the epoch, and records written in flight.
 
 use std::fs::{File, remove_file, rename};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -19,11 +19,11 @@ fn replace(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     beside.push(".new");
     let written = write(Path::new(&beside), bytes).and_then(|()| rename(&beside, file));
     if written.is_err() {
-        // Removes the partial file, which matters on a full disk.
+        // Removes the partial file, to free a full disk.
         let _ = remove_file(&beside);
     }
     written?;
-    // The renamed directory entry must be synced, too.
+    // The directory entry must be synced after the rename, too.
     let folder = file
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
@@ -36,10 +36,11 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     new.sync_all()
 }
 
-/// Returns the epoch of this start, which is one more than the number in `file`. The file is updated before the epoch
-/// is used, so that a relay never uses an epoch twice, even after a power failure.
+/// Returns the epoch of this start: the number in `file` plus one.
 ///
-/// A missing file counts as the clock's seconds since 1970, so that the epoch does not restart from 1.
+/// The file is updated before the epoch is used, so that no epoch is used twice, even after a power failure.
+///
+/// Without a file the epoch is the clock's seconds since 1970, so that it does not restart from 1.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -65,7 +66,7 @@ pub fn next_epoch(file: &Path) -> Result<u32, String> {
     Ok(epoch)
 }
 
-/// Pause before a failed write of a record is tried again.
+/// Pause before a failed write is retried.
 const AGAIN: Duration = Duration::from_millis(1_000);
 
 /// Maximum wait, at exit, for a write that is in progress.
@@ -73,11 +74,10 @@ const LAST: Span = Span::from_millis(500);
 
 type Done = (std::io::Result<()>, Span);
 
-/// File with one record and a CRC-32C. A separate thread writes it, so that a slow or full disk never blocks the
-/// program.
+/// File with one record and a CRC-32C. A separate thread writes it, so that a slow disk never blocks the program.
 ///
-/// After a failed write the program flies on; the failure is logged once and counted, and the write is tried again
-/// every second.
+/// After a failed write the program flies on. The failure is logged once and counted, and the write is retried every
+/// second.
 #[derive(Debug)]
 pub struct StoredFile {
     option: &'static str,
@@ -86,7 +86,7 @@ pub struct StoredFile {
     done: Receiver<Done>,
     /// Socket that becomes readable when a write has ended, for poll(2).
     ended: UnixStream,
-    /// Newest record for the file, written or not; `None` if there is none.
+    /// Newest record, written or not, if any.
     record: Option<Vec<u8>>,
     writing: Option<Vec<u8>>,
     /// Record of the last completed write, successful or not.
@@ -99,8 +99,7 @@ pub struct StoredFile {
 }
 
 impl StoredFile {
-    /// Starts the writer thread of `file`, which `option` names. `record` is the record that the file has from an
-    /// earlier start; `None` without one.
+    /// Starts the writer thread of `file`, which `option` names. `record` is the file's present record, if any.
     ///
     /// # Errors
     /// One line that names the file and the fault.
@@ -118,7 +117,7 @@ impl StoredFile {
                 if results.send((result, begun.elapsed())).is_err() {
                     return;
                 }
-                // It has room for this byte: the earlier one was read together with its result.
+                // There is room for this byte: the previous one was read together with its result.
                 let _ = end.write(&[0]);
             }
         };
@@ -144,11 +143,9 @@ impl StoredFile {
         })
     }
 
-    /// Begins to write `record`, unless it is already written. Returns true once the write has ended, even if the
-    /// write has failed.
+    /// Begins to write `record`, unless it is already written. Returns true once the write has ended or failed.
     ///
-    /// After a failure the program flies on, because a drone in the air must not become silent because of a full
-    /// disk.
+    /// After a failure the program flies on: a drone in the air must not become silent because of a full disk.
     pub fn store(&mut self, record: &[u8]) -> bool {
         if self.record.as_deref() != Some(record) {
             self.record = Some(record.to_vec());
@@ -160,8 +157,9 @@ impl StoredFile {
         is_tried
     }
 
-    /// Handles the end of a write, and begins the next write if a newer record waits. A failed write is retried after a
-    /// pause. Returns the time of the retry; `None` if no retry is needed.
+    /// Handles the end of a write, and writes a newer record. Retries a failed write after a pause.
+    ///
+    /// Returns the time of the retry; `None` if no retry is needed.
     pub fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         let mut bytes = [0; 8];
         let _ = (&self.ended).read(&mut bytes);
@@ -175,7 +173,7 @@ impl StoredFile {
         (self.failing && self.writing.is_none()).then_some(self.again_at)
     }
 
-    /// Passes the newest record to the writer thread, unless that thread is writing.
+    /// Passes the newest record to the writer thread, unless it is busy.
     fn write(&mut self) {
         if let (None, Some(record)) = (&self.writing, &self.record)
             && self
@@ -226,7 +224,7 @@ impl StoredFile {
         self.ended.as_fd()
     }
 
-    /// Returns the number of successful writes of the record file.
+    /// Returns the number of successful writes.
     pub const fn writes(&self) -> u64 {
         self.writes
     }
@@ -236,7 +234,7 @@ impl StoredFile {
         1e3 * self.slowest.as_secs_f64()
     }
 
-    /// Returns the number of failed writes of the record file.
+    /// Returns the number of failed writes.
     pub const fn failures(&self) -> u64 {
         self.failures
     }
@@ -257,8 +255,9 @@ pub fn load(option: &str, file: &Path) -> Result<Option<Vec<u8>>, String> {
     }
 }
 
-/// Returns the record in `bytes`, the content of a [`StoredFile`]. `None` if the record does not have `length` bytes
-/// or its CRC is wrong.
+/// Returns the record in `bytes`, the content of a [`StoredFile`].
+///
+/// `None` if its CRC is wrong or it does not have `length` bytes.
 pub fn record(bytes: &[u8], length: usize) -> Option<&[u8]> {
     let (record, check) = bytes.split_at_checked(length)?;
     (sum(record) == *check).then_some(record)

@@ -1,5 +1,6 @@
-//! Capture of the neighbour ports' traffic, for `cargo decode` and Wireshark. A separate thread writes it, so a slow disk blocks
-//! nothing; pieces that exceed the queue are left out and counted.
+//! Capture of the traffic with the neighbours, for `cargo decode` and Wireshark.
+//!
+//! A separate thread writes it, so a slow disk blocks nothing. What exceeds the queue is left out and counted.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -16,13 +17,12 @@ use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, Interface};
 use crate::log::Log;
 use crate::replug::Replug;
 
-/// Maximum number of reads and writes that wait for the capture's writer thread. Further reads and writes are not
-/// captured.
+/// Maximum number of reads and writes that wait for the writer thread; further ones are not captured.
 const QUEUE: usize = 1_024;
 
 const MAX_CAPTURES: u32 = 9_999;
 
-/// Bytes that one call has received or sent at the port with the number `port`.
+/// Bytes received or sent by one call, at the port number `port`.
 struct Piece {
     port: usize,
     at: Duration,
@@ -35,18 +35,18 @@ struct Piece {
 /// State of a capture of serial traffic, shared by all its ports.
 #[derive(Debug, Default)]
 struct CaptureState {
-    /// Error because of which the capture has ended before the program; unset without an error.
+    /// Error that ended the capture, if any.
     fault: OnceLock<String>,
     is_reported: AtomicBool,
 }
 
-/// Capture of one port. It passes the port's traffic to the thread that writes the capture file.
+/// Capture of one port. It passes the traffic to the writer thread.
 #[derive(Debug)]
 pub struct Tap {
     port: usize,
     state: Arc<CaptureState>,
     sender: SyncSender<Piece>,
-    /// Comment that the next piece takes along; empty for none.
+    /// Comment on the next frame; empty for none.
     note: String,
     left_out: u64,
     is_over: bool,
@@ -91,7 +91,7 @@ impl Tap {
         self.is_over
     }
 
-    /// Returns the error that ended the capture, but only once for all ports.
+    /// Returns the error that ended the capture. Only one port returns it, once.
     #[must_use]
     pub fn fault(&self) -> Option<&str> {
         let was_reported = self.state.is_reported.swap(true, Ordering::Relaxed);
@@ -103,17 +103,18 @@ impl Tap {
         (!was_reported).then_some(fault)
     }
 
-    /// Returns the number of reads and writes left out of the capture, because its queue was full.
+    /// Returns the number of reads and writes left out because the queue was full.
     pub const fn left_out(&self) -> u64 {
         self.left_out
     }
 }
 
-/// Captures all further traffic of `ttys` in the file `asked`. Logs the name of the file if another name had to be
-/// used.
+/// Captures all further traffic of `ttys` in the file `asked`.
 ///
-/// An earlier capture is never overwritten, because it may be the only record of a crash before this start: if
-/// `asked` exists, a number is added to the file's name.
+/// Logs the file's name if another one had to be used.
+///
+/// An earlier capture is never overwritten, because it may be the only record of a crash. If `asked` exists, a number
+/// is added to the name.
 ///
 /// # Errors
 /// One line that names the file.
@@ -143,7 +144,7 @@ pub fn attach<'a>(
     }
     capture.flush().map_err(wrong)?;
     std::thread::spawn(move || {
-        // The closed channel informs the taps.
+        // The taps notice the closed channel.
         if let Err(error) = write(&mut capture, &interfaces, &receiver) {
             _ = state.fault.set(error.to_string());
         }
@@ -156,7 +157,7 @@ pub fn attach<'a>(
     Ok(())
 }
 
-/// Creates the capture file under the first free name. A device or a FIFO is opened under its own name.
+/// Creates the capture file under the first free name. A device or FIFO is opened as it is.
 fn create(path: &Path) -> Result<(File, PathBuf), String> {
     let named = |error: io::Error| format!("--capture {}: {error}", path.display());
     let is_other = path.metadata().is_ok_and(|it| !it.is_file());
@@ -192,7 +193,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Splits the traffic into frames and writes them to the capture file. Flushes the file whenever the queue is empty.
+/// Splits the traffic into frames, and writes them. Flushes the file when the queue is empty.
 fn write(
     capture: &mut Capture<BufWriter<File>>,
     interfaces: &[Interface],

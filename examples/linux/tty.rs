@@ -1,4 +1,4 @@
-//! Non-blocking tty as a [`SerialPort`]: raw, 8N1, without flow control.
+//! Non-blocking tty as a [`SerialPort`]: raw, 8N1, no flow control.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::Path;
@@ -16,7 +16,7 @@ use uav_relay::serial::{Fault, SerialPort};
 pub struct Tty {
     fd: OwnedFd,
     name: String,
-    /// True if the tty has accepted only a part of the last write, because it is full.
+    /// True after a partial write: the tty is full.
     full: bool,
     failure: Option<String>,
 }
@@ -56,15 +56,17 @@ impl Tty {
         }
     }
 
-    /// Marks the tty as failed if poll(2) reported a hang-up or an error. For an unplugged adapter poll(2) returns at
-    /// once at every call; without the mark the program would never sleep.
+    /// Marks the tty as failed if poll(2) reported a hang-up or an error.
+    ///
+    /// For an unplugged adapter poll(2) returns at once at every call, so without the mark the program would never
+    /// sleep.
     pub fn noticed(&mut self, events: PollFlags) {
         if events.intersects(PollFlags::HUP | PollFlags::ERR | PollFlags::NVAL) {
             self.fail("the device was disconnected");
         }
     }
 
-    /// Returns the error that made this tty unusable; `None` while it works.
+    /// Returns the error that made this tty unusable, if any.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
@@ -75,7 +77,7 @@ impl Tty {
             .get_or_insert_with(|| format!("{name}: {what}"));
     }
 
-    /// Returns the number of bytes that a read or write transferred; `None` if it must be repeated later.
+    /// Returns the number of transferred bytes; `None` if the call must be repeated later.
     fn done(&mut self, result: Result<usize, Errno>) -> Result<Option<usize>, Fault> {
         match result {
             Ok(count) => Ok(Some(count)),
@@ -106,7 +108,7 @@ impl SerialPort for Tty {
         let result = rustix::io::read(&self.fd, into);
         let count = self.done(result)?;
         if count == Some(0) {
-            // With VMIN = 1 an end of file means that the other end hung up.
+            // With VMIN = 1 an end of file means that the device is gone.
             self.fail("the device was disconnected");
         }
         Ok(count.unwrap_or(0))
@@ -123,7 +125,7 @@ impl SerialPort for Tty {
     }
 
     fn has_left(&mut self) -> Result<Option<bool>, Fault> {
-        // Only called for a pin that enables the driver; for a tty the kernel does that (TIOCSRS485).
+        // Only for a driver-enable pin; for a tty the kernel does that (TIOCSRS485).
         Ok(None)
     }
 }
@@ -133,7 +135,8 @@ fn configured(path: &Path, baud: u32) -> Result<OwnedFd, Errno> {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     let fd = open(path, flags, Mode::empty())?;
     let mut line = tcgetattr(&fd)?;
-    // Two readers would each get a part of every frame. This lock, used by terminal programs, ends with the process.
+    // Two readers would each get a part of every frame. Terminal programs use this lock, too; it ends with the
+    // process.
     flock(&fd, FlockOperation::NonBlockingLockExclusive)?;
     line.make_raw();
     line.input_modes -= InputModes::IXOFF | InputModes::IXANY;
@@ -141,7 +144,7 @@ fn configured(path: &Path, baud: u32) -> Result<OwnedFd, Errno> {
     line.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
     line.set_speed(baud)?;
     tcsetattr(&fd, OptionalActions::Now, &line)?;
-    // Discards bytes from before the start, perhaps of another baud rate.
+    // Discards bytes from before the start, perhaps sent at another baud rate.
     tcflush(&fd, QueueSelector::IFlush)?;
     Ok(fd)
 }

@@ -63,14 +63,12 @@ pub(crate) struct AutopilotPlan {
     pub(crate) port: AutopilotPort,
     pub(crate) sites: Sites,
     pub(crate) pace: Pace,
-    /// Neighbour that the drone's directional antenna points to: upstream or downstream. `None` without such an
-    /// antenna.
+    /// Neighbour that the drone's directional antenna points to; `None` without such an antenna.
     pub(crate) antenna: Option<Side>,
     pub(crate) key: Option<SigningKey>,
-    /// Time of flight with a full battery, s, NaN if unknown, and two speeds, m/s. The speeds are those of the return
-    /// and of the descent.
+    /// Flight time with a full battery, s (NaN if unknown), return speed and descent speed, m/s.
     ///
-    /// `None` if the relay does not use the battery messages of the autopilot.
+    /// `None` if the autopilot's battery messages are not used.
     pub(crate) endurance: Option<[f32; 3]>,
 }
 
@@ -109,13 +107,12 @@ pub(crate) struct Companion {
     state: Option<&'static str>,
     answers: AnswerMonitor,
     off_line: OffLineMonitor,
-    /// Numbers of lost relays that have landed, as the operator has reported over MAVLink. They are kept until
-    /// `take_cleared` collects them.
+    /// Lost relays that have landed, as the operator has reported over MAVLink, until `take_cleared`.
     cleared: Vec<u16>,
 }
 
 impl Companion {
-    /// Opens the autopilot's port. This must succeed at the start, because a wrong name is a mistake.
+    /// Opens the autopilot's port. It must exist at the start, because a wrong name is a mistake.
     pub(crate) fn open(plan: &AutopilotPlan, now: Instant) -> Result<Self, String> {
         let port = port(&plan.port)?;
         let axis = Axis::between(plan.sites).map_err(|error| error.to_string())?;
@@ -140,7 +137,7 @@ impl Companion {
         })
     }
 
-    /// Logs the autopilot's port, the drone's speed limit, and whether frames are signed.
+    /// Logs the autopilot's port, the drone's speed limit, and if frames are signed.
     pub(crate) fn started(&self, log: &Log) {
         let (place, pace) = (&self.plan.port, self.plan.pace);
         let from = match place {
@@ -191,7 +188,7 @@ impl Companion {
         self.off_line.place(now)
     }
 
-    /// Exchanges bytes with the autopilot and data with the relay, and logs the events.
+    /// Exchanges bytes with the autopilot and data with the relay; logs the events.
     pub(crate) fn exchange(&mut self, now: Instant, log: &Log, relay: &mut Relay) {
         if let Port::Tty(tty) = &mut self.port {
             tty.tend(now, log);
@@ -232,8 +229,9 @@ impl Companion {
         std::mem::take(&mut self.cleared)
     }
 
-    /// Reports a drone that is far from the line between transmitter and receiver, if a report is due. The report goes
-    /// to the log; some reports also go to the operator.
+    /// Reports a drone that is far from the line Tx to Rx or outside its geofence, if a report is due.
+    ///
+    /// The report is logged; some reports also go to the operator.
     fn check_fence(&mut self, now: Instant, log: &Log, sites: Sites, lateral: Band) {
         let is_in_air = match self.link.state() {
             State::Silent | State::Grounded => false,
@@ -255,8 +253,7 @@ impl Companion {
         }
     }
 
-    /// Logs that no autopilot has been found since the start. Each kind of fault, such as no bytes or only noise, is
-    /// logged once.
+    /// Logs that no autopilot has been found since the start, once for each kind of received data.
     fn log_unanswered(&mut self, now: Instant, log: &Log) {
         let received = self.received_kind();
         if let Some(missing) = self.answers.check(now, received) {
@@ -266,7 +263,7 @@ impl Companion {
         }
     }
 
-    /// Returns the kind of data received so far, for example noise; `None` once the autopilot is found.
+    /// Returns the kind of received data, for example noise; `None` once the autopilot is found.
     fn received_kind(&self) -> Option<Received> {
         // A rejected signature is logged separately.
         if self.link.state() != State::Silent || self.link.refused() > 0 {
@@ -283,7 +280,7 @@ impl Companion {
         })
     }
 
-    /// Returns the log text about a missing autopilot: its port, and the checks for the operator.
+    /// Returns the log text about a missing autopilot, with hints for the operator.
     fn unanswered(&self, answer: Received) -> String {
         match (answer, &self.port) {
             (Received::Nothing, Port::Udp(datagrams)) => {
@@ -309,7 +306,7 @@ impl Companion {
         }
     }
 
-    /// Sends a text to the operator's ground station.
+    /// Sends a text to the operator.
     pub(crate) fn send_text(&mut self, text: &str) {
         self.link.send_text(text);
     }
@@ -324,12 +321,12 @@ impl Companion {
         self.link.is_landed(now)
     }
 
-    /// Shows an event of the relay on the operator's ground station.
+    /// Shows an event of the relay to the operator.
     pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 
-    /// Returns the time by which [`exchange`](Self::exchange) must be called again.
+    /// Returns the time by which [`exchange`](Self::exchange) must be called.
     pub(crate) fn wake(&self, now: Instant) -> Instant {
         let link = self.link.poll_timeout(now);
         let again = match &self.port {
@@ -511,8 +508,9 @@ const fn mistrusted(why: Mistrust) -> &'static str {
     }
 }
 
-/// Returns this machine's time as a MAVLink timestamp for signatures. If this clock is behind the autopilot's clock,
-/// the link counts on from the autopilot's timestamps.
+/// Returns this machine's time as a timestamp of MAVLink signatures.
+///
+/// If this clock is behind the autopilot's, the link counts on from the autopilot's timestamps.
 pub(crate) fn stamp() -> Stamp {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     let micros = since.map_or(0, |since| since.as_micros());

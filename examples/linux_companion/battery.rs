@@ -1,4 +1,4 @@
-//! Battery of the drone: departure in the log, texts to the pilot, wait at a start in flight.
+//! Battery of the drone: logs the departure, sends texts to the pilot, and delays a start in flight.
 //!
 //! | departure | text to the pilot |
 //! | --- | --- |
@@ -6,7 +6,7 @@
 //! | refused | every minute in flight |
 //! | free, or at the reserve | "battery: leave now" every 5 s until he takes over, by the library |
 //!
-//! The drone keeps its setpoint: its pilot flies it home. The companion never changes the mode.
+//! The drone keeps its setpoint; its pilot flies it home. The companion never changes the mode.
 
 use serde_json::{Value, json};
 use uav_relay::flight::autopilot::state::State;
@@ -16,17 +16,15 @@ use crate::autopilot::Companion;
 use crate::lost::log_command;
 use uav_relay_linux::log::Log;
 
-/// Time between two texts to the pilot about the same refused departure.
+/// Time between two texts about the same refused departure.
 const AGAIN: Duration = Duration::from_millis(60_000);
 
-/// Minimum time between two log lines about a departure that is pending.
+/// Minimum time between two log lines about a pending departure.
 const LOGGED: Duration = Duration::from_millis(10_000);
 
-/// Maximum time for which a starting relay waits for the endurance of its drone. The endurance is the remaining time of
-/// flight.
+/// Maximum wait of a starting relay for its drone's endurance (remaining flight time).
 const FIRST: Duration = Duration::from_millis(10_000);
-/// Maximum time for which a starting relay waits after the first low endurance. In this time its departure from the
-/// chain has to be confirmed.
+/// Maximum wait of a starting relay from the first low endurance until its departure is confirmed.
 const CONFIRMED: Duration = Duration::from_millis(20_000);
 
 /// State of the relay's departure from the chain because of its battery, as last logged.
@@ -35,18 +33,19 @@ pub(crate) struct Battery {
     departure: Departure,
     logged_at: Instant,
     told_at: Instant,
-    /// True while the relay waits for its endurance, before it takes part in the chain.
+    /// True while the starting relay waits for its endurance.
     waits: bool,
     /// Time of the first low endurance during the wait.
     low_at: Option<Instant>,
     has_reserve: bool,
-    /// Last time at which the endurance was known, or was not needed. It is not needed while the drone is not in the
-    /// air, and once the relay is informed that the endurance is unknown.
+    /// Last time at which the endurance was known or not needed.
+    ///
+    /// It is not needed on the ground, and once the relay knows that it is unknown.
     known_at: Instant,
 }
 
 impl Battery {
-    /// Creates the state at the start. If `has_reserve` is true, the relay waits for its endurance.
+    /// Creates the state at the start. With `has_reserve` the relay waits for its endurance.
     pub(crate) const fn new(has_reserve: bool) -> Self {
         Self {
             departure: Departure::Member,
@@ -59,10 +58,9 @@ impl Battery {
         }
     }
 
-    /// Returns true while a relay that has just started waits for its endurance.
+    /// Returns true while a starting relay waits for its endurance.
     ///
-    /// A relay that restarts with a low battery then leaves before it takes part in any agreement, and does not join
-    /// the chain.
+    /// A relay that restarts with a low battery then leaves before it takes part in an agreement.
     pub(crate) fn waits(&mut self, now: Instant, relay: &Relay, link: Option<&Companion>) -> bool {
         let left_s = relay.endurance_s(now);
         if left_s.is_some() && left_s < relay.endurance_limit_s() {
@@ -77,8 +75,9 @@ impl Battery {
         self.waits
     }
 
-    /// Informs the relay that its endurance is unknown, if none was received for 10 s. Does nothing while the autopilot
-    /// is silent or the drone is on the ground. The relay then reports the unknown endurance.
+    /// Informs the relay that its endurance is unknown, if none was received for 10 s.
+    ///
+    /// Not while the autopilot is silent or the drone is on the ground. The relay reports the unknown endurance.
     pub(crate) fn tell_unknown(
         &mut self,
         now: Instant,
@@ -99,7 +98,7 @@ impl Battery {
         self.waits
     }
 
-    /// Logs changes of the relay's departure, and sends them to the pilot.
+    /// Logs changes of the relay's departure, and sends them to the pilot as text.
     pub(crate) fn tend(
         &mut self,
         now: Instant,
@@ -142,7 +141,7 @@ impl Battery {
         }
     }
 
-    /// Executes the operator's commands `leave` and `stay`, and returns the answer. `None` for another command.
+    /// Executes the operator's commands `leave` and `stay`; returns the answer. `None` for other commands.
     pub(crate) fn command(
         now: Instant,
         log: &Log,
@@ -197,7 +196,7 @@ const fn is_pending(departure: Departure) -> bool {
     )
 }
 
-/// Returns the reason of a refused departure for the pilot, at most 37 bytes. `None` if the departure is not refused.
+/// Returns the reason of a refused departure for the pilot, at most 37 bytes; otherwise `None`.
 const fn refusal(departure: Departure) -> Option<&'static str> {
     Some(match departure {
         Departure::NeedsGuard => "refused: no guard",

@@ -1,4 +1,4 @@
-//! UDP port of an autopilot, from a local port that is the same at every start.
+//! UDP port of an autopilot. The local port is the same at every start.
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, ToSocketAddrs as _, UdpSocket};
@@ -7,8 +7,9 @@ use std::os::fd::{AsFd as _, BorrowedFd};
 use serde_json::{Value, json};
 use uav_relay_scenario::endpoint::Endpoint;
 
-/// Maximum number of attempts of a socket call. A call can fail because the peer has refused an earlier datagram, and
-/// is then repeated.
+/// Maximum number of attempts of a socket call.
+///
+/// A call can fail because the peer has refused an earlier datagram.
 const ATTEMPTS: usize = 4;
 
 #[derive(Debug)]
@@ -18,12 +19,12 @@ pub(crate) struct Datagrams {
     endpoint: Endpoint,
     read: u64,
     written: u64,
-    /// Number of "connection refused" replies. They mean that no program listens at the autopilot's port.
+    /// Number of "connection refused" replies: no program listens at the autopilot's port.
     refused: u64,
 }
 
 impl Datagrams {
-    /// Binds the local UDP port. Datagrams are accepted only from the autopilot's address and port.
+    /// Binds the local UDP port. Only datagrams from the autopilot's address and port are accepted.
     pub(crate) fn open(endpoint: &Endpoint) -> Result<Self, String> {
         let Endpoint {
             host, port, local, ..
@@ -55,15 +56,14 @@ impl Datagrams {
         })
     }
 
-    /// Reads one datagram; returns its length, 0 if no datagram was received.
+    /// Reads one datagram; returns its length, or 0.
     pub(crate) fn read(&mut self, into: &mut [u8]) -> usize {
         let count = self.call(|socket| socket.recv(into));
         self.read += count as u64;
         count
     }
 
-    /// Sends a frame as one datagram. If the kernel's buffer is full, the frame is dropped, because the next frame has
-    /// newer data.
+    /// Sends a frame as one datagram. If the kernel's buffer is full, it is dropped: the next one has newer data.
     pub(crate) fn send(&mut self, frame: &[u8]) {
         let count = self.call(|socket| socket.send(frame));
         self.written += count as u64;
@@ -72,10 +72,11 @@ impl Datagrams {
     fn call(&mut self, mut call: impl FnMut(&UdpSocket) -> std::io::Result<usize>) -> usize {
         for _ in 0..ATTEMPTS {
             match call(&self.socket) {
-                // An empty datagram is skipped.
+                // An empty datagram is ignored.
                 Ok(0) => {}
                 Ok(count) => return count,
-                // The refusal of an earlier datagram hides datagrams received since, and this one has not been sent yet.
+                // This error is about an earlier datagram: this one has not been sent, and received ones are still
+                // waiting.
                 Err(error) if error.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => break,
@@ -88,7 +89,7 @@ impl Datagrams {
         self.read
     }
 
-    /// Returns a text for the log about an address that does not answer. The text names the things to check.
+    /// Returns a log text about an address that does not answer, with things to check.
     pub(crate) fn silence(&self) -> String {
         let (peer, local) = (self.peer, self.endpoint.local);
         if self.refused > 0 {
@@ -137,7 +138,7 @@ mod tests {
     use super::Datagrams;
     use uav_relay_scenario::endpoint::Endpoint;
 
-    /// Checks that a refused datagram causes no loss of the next sent or received datagram.
+    /// Checks that a refused datagram causes no loss of the next one, sent or received.
     #[test]
     fn a_refusal_loses_no_datagram() {
         let free = || {

@@ -1,4 +1,4 @@
-//! Log lines for the reasons that keep a drone from its position.
+//! Log lines for the reasons that keep a drone from its setpoint.
 
 use serde_json::json;
 use uav_relay::HoldReason;
@@ -6,20 +6,19 @@ use uav_relay::{Duration, Instant, Relay, Side};
 
 use uav_relay_linux::log::Log;
 
-/// Time for which a reason to wait for a neighbour must last before it is logged. Shorter waits are normal while the
-/// relays agree on new positions.
+/// Minimum duration of a wait for a neighbour before it is logged.
+///
+/// Shorter waits are normal while the relays agree on new positions.
 const SETTLES: Duration = Duration::from_millis(3_000);
 
 const SIDES: [Side; 2] = [Side::Upstream, Side::Downstream];
 
-/// Returns the reasons why the drone waits for its neighbours. The first is for the neighbour toward the transmitter,
-/// the second for the neighbour toward the receiver. `None` if the drone does not wait.
+/// Returns the reasons why the drone waits for its neighbours: upstream, downstream.
 pub(crate) fn reasons(relay: &Relay) -> [Option<HoldReason>; 2] {
     SIDES.map(|side| relay.hold_reason(side))
 }
 
-/// Log of the reasons why the drone waits for its neighbours. The log has the logged reasons, and newer reasons that
-/// have not lasted long enough to be logged.
+/// Logged reasons why the drone waits for its neighbours, and newer ones that may not last.
 #[derive(Debug, Default)]
 pub(crate) struct HoldReasonLog {
     logged: [Option<HoldReason>; 2],
@@ -28,8 +27,7 @@ pub(crate) struct HoldReasonLog {
 }
 
 impl HoldReasonLog {
-    /// Logs changes in the reasons why the drone waits for its neighbours. Returns the time of the next check, if
-    /// any.
+    /// Logs changed reasons. Returns the time of the next check, if any.
     pub(crate) fn tend(
         &mut self,
         now: Instant,

@@ -1,7 +1,7 @@
 //! Lost relays, and the operator's command to clear them: `clear-lost 3`.
 //!
-//! The guard keeps clear of a silent relay, because its drone may still hover. Only a person can know that it has landed. The
-//! guard frees all of one side at once, so the command has to name every lost relay of that side.
+//! The guard keeps clear of a silent relay, because its drone may still hover. Only a person can know that it has
+//! landed. The guard frees all relays on one side at once, so the command must name every lost relay on that side.
 
 use std::collections::BTreeSet;
 
@@ -13,11 +13,11 @@ use uav_relay_linux::log::Log;
 
 pub(crate) const CLEAR: &str = "clear-lost";
 
-/// Relays that this relay has lost since its start, and does not receive at present.
+/// Relays that this relay has lost since its start and does not receive at present.
 #[derive(Debug)]
 pub(crate) struct Lost {
     index: u16,
-    /// Number of relays in the mission that this relay was started with.
+    /// Number of relays in the mission at the start.
     relays: u16,
     nodes: BTreeSet<u16>,
 }
@@ -100,13 +100,14 @@ impl Lost {
         Ok(cleared(named, side))
     }
 
-    /// Forgets lost relays that have landed, as the operator has reported over MAVLink.
+    /// Forgets lost relays that have landed, as reported over MAVLink.
     pub(crate) fn remove_cleared(&mut self, named: &[u16]) {
         self.nodes.retain(|node| !named.contains(node));
     }
 
-    /// Parses the number of a relay that a command reports as landed. Returns an error if the relay cannot be lost: it
-    /// is this relay itself, or this relay still receives it.
+    /// Parses the number of a relay that a command reports as landed.
+    ///
+    /// It is an error if that is this relay, or if this relay still receives it.
     fn number(&self, relay: &Relay, word: &str) -> Result<u16, String> {
         let number = word.parse().ok();
         let Some(number) = number.filter(|number| (1..=self.relays).contains(number)) else {
@@ -130,9 +131,9 @@ impl Lost {
     }
 }
 
-/// Logs an operator's command and its result; returns the answer for the status socket.
+/// Logs an operator's command and its result; returns the answer.
 ///
-/// `done` has the event's name and a text.
+/// `done` has the event's name and text.
 pub(crate) fn log_command(
     now: Instant,
     log: &Log,
@@ -148,7 +149,7 @@ pub(crate) fn log_command(
     json!({ "done": is_done, "text": text })
 }
 
-/// Returns the log text about the lost relays `named` on one side that the operator reports as landed.
+/// Returns the log text about lost relays on one side that the operator reports as landed.
 pub(crate) fn cleared(named: impl IntoIterator<Item = u16>, side: Side) -> String {
     let named: Vec<u16> = named.into_iter().collect();
     let they_have = if named.len() == 1 {

@@ -1,27 +1,28 @@
-//! A relay on a Linux companion computer, over real ttys. USB adapters, the UART of a header, telemetry radios.
+//! Relay on a Linux companion computer, over ttys: USB adapters, UARTs, telemetry radios.
 //!
 //! ```text
 //! cargo companion --index 2 --of 3 --upstream /dev/ttyUSB0 --downstream /dev/ttyUSB1
 //! cargo companion --index 2 --of 3 --shared /dev/ttyUSB0      # one radio for all
 //! cargo companion --help
 //! ```
-//! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain get the same `--of`, `--baud`,
-//! `--network` and mission; a neighbour with another mission is reported.
+//! The first relay needs no `--upstream`, the last one no `--downstream`. All relays of a chain need the same `--of`,
+//! `--baud`, `--network` and mission; another mission of a neighbour is reported.
 //!
-//! With `--key-file` and `--epoch-file` frames are signed; without, anybody in range can move the drones, and the log warns. A
-//! signing relay accepts new missions in flight (uploaded by `examples/linux_ground`), and `--upload-file` keeps them over a
-//! restart. `--view-file` keeps the relay's votes on the membership of the chain over a restart in flight; remove the file before
-//! another flight.
+//! With `--key-file` and `--epoch-file` frames are signed. Without them anybody in range can move the drones, and the
+//! log warns. A signing relay accepts new missions in flight (uploaded by `examples/linux_ground`), and
+//! `--upload-file` keeps them over a restart. `--view-file` keeps the relay's votes on the membership of the chain
+//! over a restart in flight; remove the file before another flight.
 //!
-//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with a PX4 or an ArduCopter over a tty or UDP: it streams
-//! targets and receives positions, so that the guard can keep drones apart. With `--positions` another program reports the
-//! position, and flies to the logged setpoints. Without either nothing keeps drones apart, and the log warns.
+//! With `--autopilot`, `--site-tx` and `--site-rx` it flies a drone with PX4 or ArduCopter over a tty or UDP. It
+//! streams targets and receives positions, so that the guard can keep drones apart. With `--positions` another
+//! program reports the position, and flies to the logged setpoints. With neither, nothing keeps drones apart, and the
+//! log warns.
 //!
 //! `--config` reads all options from one file: the scenario of the other tools, with further sections.
 //!
-//! Every event is one line on standard output or in a file, with each f32 also as its bits. In flight the relay survives a lost
-//! port, a full disk and a blocked log. Exit status: 0 after Ctrl-C or SIGTERM, 1 if it can not start, 2 if the options or the
-//! --view-file are wrong.
+//! Every event is one line on standard output or in a file, with each f32 also as its bits. In flight the relay
+//! survives a lost port, a full disk and a blocked log. Exit status: 0 after Ctrl-C or SIGTERM, 1 if it cannot start,
+//! 2 if the options or the --view-file are wrong.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -42,8 +43,8 @@
 //! | `hold_reasons.rs` | log lines for the reasons of a hold |
 //! | `lost.rs` | lost relays, and the operator's command to clear them |
 //!
-//! It shares a library with the ground station, `examples/linux`. It runs on other kinds of Unix, too; on a Mac the ttys are
-//! called `/dev/cu.*`.
+//! It shares a library with the ground station, `examples/linux`. It also runs on other kinds of Unix; on a Mac the
+//! ttys are called `/dev/cu.*`.
 #![cfg_attr(unix, forbid(unsafe_code))]
 
 #[cfg(unix)]

@@ -1,7 +1,8 @@
-//! Log lines about the flight to the agreed position: setpoints, and the arrival.
+//! Log lines about the flight to the agreed position: setpoints and arrival.
 //!
-//! With an autopilot the guard moves the setpoint several times a second, so a line is written for each 0.5 m and for the end of
-//! each move. Without one another program may fly the drone by these lines, so every change is logged.
+//! With an autopilot the guard moves the setpoint several times a second. A line is then written every 0.5 m and at
+//! the end of each move. Without an autopilot another program may fly the drone by these lines, so every change is
+//! logged.
 
 use serde_json::json;
 use uav_relay::{Duration, Instant, Placement, Relay};
@@ -11,26 +12,27 @@ use uav_relay_linux::log::Log;
 
 const STEP_M: f32 = 0.5;
 
-/// Maximum distance of a drone from the agreed position, m, for the drone to count as arrived. Autopilots hover up to
-/// 0.9 m off their target.
+/// Maximum distance of an arrived drone from its agreed position, m.
+///
+/// Autopilots hover up to 0.9 m off their target.
 const NEAR_M: f32 = 1.0;
 
-/// Time without a change of the setpoint after which a move has ended. A drone has arrived when it has been near its
-/// position for the same time, because it may first fly past the position.
+/// Time without a change of the setpoint after which a move has ended.
+///
+/// A drone near its position counts as arrived after the same time, because it may first fly past it.
 const SETTLES: Duration = Duration::from_millis(2_000);
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Step {
     Setpoint(Placement),
-    /// Arrival of the drone: the agreed position, and the drone's remaining distance from it, m.
+    /// Arrival of the drone: agreed position, and distance from it, m.
     Arrived(Placement, f32),
 }
 
-/// State of the log of a drone's moves. It has the logged setpoint, the newest setpoint, and the progress of the move.
+/// Log of a drone's moves: logged setpoint, newest setpoint, and progress.
 #[derive(Debug)]
 pub(crate) struct Movement {
-    /// True if small changes of the setpoint are not logged. Changes above [`STEP_M`] and the end of each move are
-    /// logged.
+    /// True if only changes above [`STEP_M`] and the end of each move are logged.
     is_sparse: bool,
     logged: Option<Placement>,
     newest: Option<Placement>,
@@ -55,7 +57,7 @@ impl Movement {
         }
     }
 
-    /// Handles a changed setpoint of `relay`; returns the line to log, or `None`.
+    /// Handles a changed setpoint; returns the line to log, if any.
     pub(crate) fn setpoint_changed(&mut self, now: Instant, relay: &Relay) -> Option<Step> {
         if self.is_sparse {
             return self.next(now, relay.setpoint(), relay.agreed_place());
@@ -65,8 +67,9 @@ impl Movement {
         Some(Step::Setpoint(setpoint))
     }
 
-    /// Returns the setpoint or arrival to log at `now`, or `None`. `drone` is the drone's position. Also returns the
-    /// time by which the next call is due.
+    /// Returns the setpoint or arrival to log, if any, and the time by which the next call is due.
+    ///
+    /// `drone` is the drone's position.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -87,7 +90,7 @@ impl Movement {
         (step, end.into_iter().chain(near).min())
     }
 
-    /// Returns the setpoint as a log line, or `None` if the setpoint need not be logged.
+    /// Returns the setpoint as a line to log, if any.
     fn next(
         &mut self,
         now: Instant,
@@ -122,7 +125,7 @@ impl Movement {
         self.near_since = None;
     }
 
-    /// Returns the drone's arrival at `goal`, if it must be logged; `None` otherwise.
+    /// Returns the drone's arrival at `goal`, if it must be logged.
     ///
     /// `goal` is the agreed position if the setpoint has reached it, otherwise `None`.
     fn arrival(
@@ -147,9 +150,10 @@ impl Movement {
 }
 
 impl Step {
-    /// Writes this setpoint or arrival to the log. The position is in the mission's coordinates: `x_m` metres from
-    /// the transmitter toward the receiver, `y_m` to the right of that line seen from above, and `altitude_m` above
-    /// the ground. Each number of a setpoint is also logged as the bits of its f32.
+    /// Logs this setpoint or arrival. Each number of a setpoint is also logged as the bits of its f32.
+    ///
+    /// The position is in the mission's coordinates. `x_m` is the distance from the transmitter toward the receiver,
+    /// `y_m` the distance to the right when facing the receiver, `altitude_m` the height above the ground.
     pub(crate) fn log(self, now: Instant, log: &Log) {
         match self {
             Self::Setpoint(place) => {
@@ -202,8 +206,9 @@ mod tests {
         }
     }
 
-    /// Checks the log lines of a setpoint that moves by 0.1 m every 0.2 s: every 0.6 m, and where it stops. A small
-    /// later change is not logged.
+    /// Checks the lines of a setpoint that moves by 0.1 m every 0.2 s: every 0.6 m, and the end.
+    ///
+    /// A small later change is not logged.
     #[test]
     fn a_line_for_each_half_metre_and_the_exact_end() {
         let mut movement = Movement::new(true);
@@ -223,8 +228,9 @@ mod tests {
         }
     }
 
-    /// Checks that a drone which flies past its goal and back is logged as arrived once. Passing the goal for less
-    /// than 2 s is no arrival.
+    /// Checks that a drone which flies past its goal and back is logged as arrived once.
+    ///
+    /// To be near the goal for less than 2 s is no arrival.
     #[test]
     fn a_drone_that_stays_has_arrived_once() {
         let mut movement = Movement::new(true);

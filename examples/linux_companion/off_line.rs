@@ -1,8 +1,8 @@
-//! Detects a drone that is far from its line. A frequent cause: latitude and longitude of the sites are swapped.
+//! Detects a drone that is far from its line Tx to Rx. Often latitude and longitude were swapped.
 //!
 //! | kind | position | reported |
 //! | --- | --- | --- |
-//! | off the line | more than 5 km from the line, so that the relay has no position | once on the ground, every 10 s in the air; also to the operator |
+//! | off the line | over 5 km off: no position | on the ground once, in the air every 10 s; also to the operator |
 //! | off the fence | more than [`FENCE_M`] outside the mission's geofence, horizontally | every 10 s in the air |
 
 use std::fmt;
@@ -17,11 +17,12 @@ const AGAIN: Duration = Duration::from_millis(10_000);
 
 const STALE: Duration = Duration::from_millis(3_000);
 
-/// Tolerance of the geofence, m. A drone is reported only if it is farther outside of the geofence.
+/// Tolerance of the geofence, m. Only drones farther outside are reported.
 const FENCE_M: f64 = 100.0;
 
-/// Minimum ratio for the log to suggest that latitude and longitude were swapped by mistake. The ratio is the drone's
-/// distance from the given line, divided by its distance from the line with swapped coordinates.
+/// Minimum ratio of two distances for the log to suggest swapped latitude and longitude.
+///
+/// The drone's distance from the line is divided by its distance from the line with swapped coordinates.
 const NEARER: f64 = 10.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -36,7 +37,7 @@ pub(crate) struct OffLineReport {
     kind: Kind,
     away_m: f64,
     outside_m: f64,
-    /// True if the drone is near the line when latitude and longitude of Tx and Rx are swapped.
+    /// True if the drone is near the line with swapped latitude and longitude.
     is_swapped: bool,
 }
 
@@ -60,15 +61,15 @@ impl OffLineMonitor {
         fresh.map(|(_, place)| place)
     }
 
-    /// Returns the report for a drone that the autopilot link has found far from the line Tx to Rx. `sites` are the
-    /// positions of Tx and Rx.
+    /// Returns the report on a drone far from the line Tx to Rx, `off_line`. `sites` are the Tx and Rx positions.
     pub(crate) fn line_report(&mut self, sites: Sites, off_line: OffLine) -> Option<OffLineReport> {
         self.lines(sites).map(|lines| lines.off_line(off_line))
     }
 
-    /// Returns the report of a drone outside its geofence, if a report is due. The drone's position is `off_line`; if
-    /// `off_line` is `None`, it is the newest measured position. The geofence surrounds the line between the Tx and Rx
-    /// positions `sites`; its width is the mission's `lateral` range.
+    /// Returns the report on a drone outside its geofence, if one is due.
+    ///
+    /// `off_line` is the position of a drone far from the line; without it the newest measured position is used. The
+    /// geofence surrounds the line between `sites`; its width is the mission's `lateral` range.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -91,7 +92,7 @@ impl OffLineMonitor {
         };
         (self.away_m, self.report) = (away_m, off);
         let off = off.filter(|off| off.kind == Kind::Fence)?;
-        // No report on the ground: a drone may wait anywhere, and is flown to its line from beside it.
+        // No report on the ground: a drone may start beside its line.
         let is_due = self.reported_at.is_none_or(|at| now.since(at) >= AGAIN);
         if !is_in_air || !is_due {
             return None;
@@ -107,8 +108,9 @@ impl OffLineMonitor {
         self.lines.as_ref()
     }
 
-    /// Returns the drone's distance from the line Tx to Rx as JSON, and the limit that the drone exceeds. The limit is
-    /// `line`, `geofence` or `null`.
+    /// Returns the drone's distance from the line Tx to Rx as JSON, and the limit that it exceeds.
+    ///
+    /// The limit is `line`, `geofence` or `null`.
     pub(crate) fn status(&self) -> Value {
         json!({
             "from_line_m": self.away_m,
@@ -121,8 +123,7 @@ impl OffLineMonitor {
     }
 }
 
-/// Line between the positions of Tx and Rx, and the line with latitude and longitude swapped. The swapped line is
-/// `None` if the swapped positions are invalid.
+/// Line from Tx to Rx, and the line with swapped latitude and longitude, `None` if invalid.
 #[derive(Debug)]
 struct Lines {
     sites: Sites,
@@ -156,8 +157,7 @@ impl Lines {
         along_m.hypot(place.y_m.into())
     }
 
-    /// Returns a report if a drone at `place` is outside the geofence with the mission's `lateral` range. `None` if the
-    /// drone is inside, or at most [`FENCE_M`] outside.
+    /// Returns a report if `place` is more than [`FENCE_M`] outside the geofence.
     fn off_fence(&self, place: Placement, lateral: Band) -> Option<OffLineReport> {
         let along_m = beyond(place.x_m.into(), 0.0, self.axis.distance_m());
         let aside_m = beyond(
@@ -181,7 +181,7 @@ fn beyond(value: f64, least: f64, most: f64) -> f64 {
 }
 
 impl OffLineReport {
-    /// Returns the text for the operator's ground station, at most 50 bytes. `None` for reports that are only logged.
+    /// Returns the text for the operator, at most 50 bytes; `None` for reports that are only logged.
     pub(crate) fn for_operator(&self) -> Option<String> {
         (self.kind == Kind::Line).then(|| {
             format!(
@@ -219,7 +219,7 @@ impl fmt::Display for OffLineReport {
     }
 }
 
-/// Distance, m, displayed as m or km and rounded for people.
+/// Distance, m, displayed in m or km and rounded.
 struct RoundedDistance(f64);
 
 impl fmt::Display for RoundedDistance {
@@ -284,7 +284,7 @@ mod tests {
         assert!(swapped.kind == Kind::Line && swapped.is_swapped);
         let text = swapped.to_string();
         assert!(text.ends_with("km from the line between transmitter and receiver: are latitude and longitude swapped?"), "{text}");
-        // Sites in another valley.
+        // Line from Tx to Rx in another valley.
         let other = off(site(46.54, 7.40), site(46.55, 7.41), drone).expect("off");
         assert!(other.kind == Kind::Line && !other.is_swapped);
         assert!(other.to_string().ends_with(
@@ -302,8 +302,8 @@ mod tests {
     #[test]
     fn nothing_is_reported_up_to_100_m_outside_the_geofence() {
         let (tx, rx) = (site(47.40, 8.54), site(47.40, 8.55));
-        // The line points east, so its left side is north: 50 m in the mission and 100 m of tolerance. 0.01 degrees of latitude
-        // are 1112 m.
+        // The line points east, so its left side is north: 50 m in the mission and 100 m of tolerance. 0.01 degrees
+        // of latitude are 1112 m.
         for (lat, lon, outside) in [
             (47.400, 8.545, None),
             (47.4013, 8.545, None),

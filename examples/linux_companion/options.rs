@@ -20,20 +20,20 @@ use uav_relay_linux::log::LogOptions;
 use uav_relay_linux::mission::{self, Method, MissionOptions};
 use uav_relay_linux::site::SiteOptions;
 
-/// Latency of a frame between two relays. It is caused by two kernels, two USB adapters (up to 16 ms each) and the
-/// computation.
+/// Latency of a frame: two kernels, two USB adapters (up to 16 ms each) and the computation.
 const LATENCY: Duration = Duration::from_millis(40);
 
-/// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop scenario.
+/// Relay of a chain, over ttys. Give all relays the same mission options; their defaults are the paper's multi-hop
+/// scenario.
 #[derive(Parser, Debug)]
 #[command(name = "linux_companion", version)]
 pub(crate) struct Options {
     /// TOML file with the scenario, and the sections `network` and `companion`. Options of the command line override it
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
-    /// Check before flight, for at most S seconds, 1 to 3600; 30 by default. Prints a line for each finding, green or red, and exits with
-    /// status 0 if all are green. It joins no chain and sends no targets. Before, it listens for a quarter of --dead-after-ms and two
-    /// seconds, and sends nothing to relays if one of them flies
+    /// Check before flight, for at most S seconds, 1 to 3600; 30 by default. Prints a line for each finding, green or
+    /// red, and exits with status 0 if all are green. It joins no chain and sends no targets. First it only listens,
+    /// for a quarter of --dead-after-ms and two seconds. It sends nothing to relays if one of them flies
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "30", require_equals = true, value_parser = whole::<u64>(1, 3_600), help_heading = "Check")]
     pub(crate) check: Option<u64>,
     /// Largest distance of the drone from its planned place, m, 1 to 1e6
@@ -77,8 +77,8 @@ pub(crate) struct Options {
     /// File for the newest mission uploaded in flight; without it an uploaded mission is lost at a restart
     #[arg(long, value_name = "FILE", requires = "key_file")]
     pub(crate) upload_file: Option<PathBuf>,
-    /// File for this relay's votes on the membership of the chain, created if missing. Needed for a restart in flight. Remove it
-    /// before another flight
+    /// File for this relay's votes on the membership of the chain, created if missing. Needed for a restart in
+    /// flight. Remove it before another flight
     #[arg(long, value_name = "FILE")]
     pub(crate) view_file: Option<PathBuf>,
     /// Milliseconds of silence before a neighbour is probed
@@ -87,13 +87,14 @@ pub(crate) struct Options {
     /// Milliseconds of silence before a neighbour counts as lost, more than --probe-after-ms
     #[arg(long, value_name = "MS", default_value_t = 15_000, allow_negative_numbers = true, value_parser = whole::<u64>(1, 3_600_000))]
     dead_after_ms: u64,
-    /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep drones apart.
-    /// A line `endurance SECONDS HOME` gives the remaining time of flight, and that of the way home. With --listen a line may end with the interference measured there, in W, or in dBm with that unit
+    /// FIFO for the drone's position, as lines `x_m y_m altitude_m`, at least twice a second. Setpoints then keep
+    /// drones apart. A line `endurance SECONDS HOME` gives the remaining flight time and the time to fly home. With
+    /// --listen a line may end with the interference measured there, in W, or in dBm with that unit
     #[arg(long, value_name = "FIFO")]
     pub(crate) positions: Option<PathBuf>,
-    /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives targets and
-    /// sends positions. LOCAL is the local port, the same at every start: 14540 to 14549 for PORT 14580 to 14589, as in PX4's
-    /// simulation, and else PORT + 1000
+    /// The drone's PX4 or ArduCopter: a tty, or a UDP port, `udp:HOST:PORT` or `udp:HOST:PORT@LOCAL`. It receives
+    /// targets and sends positions. LOCAL is the local port, the same at every start. Its default is 14540 to 14549
+    /// for PORT 14580 to 14589, as in PX4's simulation, and otherwise PORT + 1000
     #[arg(
         long,
         value_name = "TTY|udp:HOST:PORT[@LOCAL]",
@@ -104,30 +105,31 @@ pub(crate) struct Options {
     /// Bit rate of the tty to the autopilot, bit/s, 1200 to 4000000
     #[arg(long, value_name = "B", default_value_t = 115_200, requires = "autopilot", allow_negative_numbers = true, value_parser = whole::<u32>(1_200, 4_000_000))]
     autopilot_baud: u32,
-    /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits. Frames to it are signed, and unsigned ones from it are
-    /// rejected
+    /// File with the autopilot's MAVLink signing key, 64 hexadecimal digits. Frames to the autopilot are signed, and
+    /// unsigned frames from it are rejected
     #[arg(long, value_name = "FILE", requires = "autopilot")]
     autopilot_key_file: Option<PathBuf>,
     /// Maximum speed of the drone, m/s, 0.1 to 20
     #[arg(long, value_name = "M/S", default_value_t = 5.0, requires = "autopilot", allow_negative_numbers = true, value_parser = number([0.1, 20.0]))]
     speed: f32,
-    /// Neighbour that a directional antenna points to, forward on the drone: the targets have that heading. Without it the autopilot
-    /// chooses the heading
+    /// Neighbour that a directional antenna points to. It points forward on the drone, so the targets have a heading.
+    /// Without it the autopilot chooses the heading
     #[arg(long, value_name = "SIDE", value_enum, requires = "autopilot")]
     antenna: Option<Antenna>,
     #[command(flatten)]
     sites: SiteOptions,
-    /// Maximum position error of a hovering drone, m, 0 to 1000. Two drones may come closer to each other than the separation by twice
-    /// this error
+    /// Maximum position error of a hovering drone, m, 0 to 1000. Two drones may come closer to each other than the
+    /// separation by twice this error
     #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = number([0.0, 1_000.0]))]
     position_error: f32,
     #[command(flatten)]
     mission: MissionOptions,
-    /// Method of finding positions; with --field only `align`. The first relay's setting counts, with --field the last relay's
+    /// Placement method; with --field only `align`. The setting of the first relay applies, with --field that of the
+    /// last relay
     #[arg(long, value_name = "M", value_enum, default_value_t = Method::Align)]
     method: Method,
-    /// Interference as a function of the position along the line, instead of --interferer. Each point has X (m, -1e7 to 1e7, in
-    /// ascending order) and Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32)
+    /// Interference as a function of the position along the line, instead of --interferer. Each point has X (m, -1e7
+    /// to 1e7, in ascending order) and Upsilon = E[1/interference power] (1/W, 1e-9 to 1e32)
     #[arg(long, value_name = "X:UPSILON,X:UPSILON,..", conflicts_with = "interferer", allow_hyphen_values = true, value_parser = field)]
     field: Option<Field>,
     #[command(flatten)]
@@ -135,12 +137,12 @@ pub(crate) struct Options {
     #[command(flatten)]
     pub(crate) battery: BatteryOptions,
     /// Unix socket that answers each connection with one JSON object of all counters, and closes it. The commands
-    /// `leave` and `stay` order the relay to leave the chain, or to stay. `clear-lost N` reports that the lost relay N has landed, so
-    /// that this relay need not keep clear of it
+    /// `leave` and `stay` order the relay to leave the chain, or to stay. `clear-lost N` reports that the lost relay
+    /// N has landed, so that this relay need not keep clear of it
     #[arg(long, value_name = "SOCKET", help_heading = "Log")]
     pub(crate) status_socket: Option<PathBuf>,
-    /// Write every frame of the neighbour ports to a pcapng capture, for `cargo decode` and Wireshark. If FILE exists, FILE-2,
-    /// FILE-3 and so on is written instead. It grows throughout the flight
+    /// Write every frame of the neighbour ports to a pcapng capture, for `cargo decode` and Wireshark. If FILE
+    /// exists, FILE-2, FILE-3 and so on is written instead. It grows throughout the flight
     #[arg(long, value_name = "FILE", help_heading = "Log")]
     pub(crate) capture: Option<PathBuf>,
     #[command(flatten)]
@@ -151,18 +153,20 @@ pub(crate) struct Options {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Listening")]
 struct ListenOptions {
-    /// Locate the interferer from measurements of the relays. RADIO_STATUS of a SiK radio on the link of --autopilot, or lines with
-    /// a power in the FIFO of --positions. --interferer is then an initial guess, or `unknown`. Give it to all relays or to none
+    /// Locate the interferer from measurements of the relays. They come from RADIO_STATUS of a SiK radio on the link
+    /// of --autopilot, or from lines with a power in the FIFO of --positions. --interferer is then an initial guess,
+    /// or `unknown`. Give it to all relays or to none
     #[arg(long, conflicts_with = "field")]
     listen: bool,
     /// Track a moving interferer: estimate its velocity, too, and forget measurements sooner
     #[arg(long, requires = "listen")]
     following: bool,
-    /// Time from an agreement to the next collection of measurements by the first relay, s, 0.01 to 1e5. Default 5, with
-    /// --following 1
+    /// Time from an agreement to the next collection of measurements by the first relay, s, 0.01 to 1e5. Default 5,
+    /// with --following 1
     #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e5]))]
     listen_every: Option<f32>,
-    /// Half-life of the weight of a measurement, s, 0.01 to 1e12. Default 60, with --following 16 over the number of relays
+    /// Half-life of the weight of a measurement, s, 0.01 to 1e12. Default 60; with --following 16 divided by the
+    /// number of relays
     #[arg(long, value_name = "S", requires = "listen", allow_negative_numbers = true, value_parser = number([0.01, 1e12]))]
     listen_half_life: Option<f32>,
     /// Relative error of one measurement, 0.001 to 1; default 0.03, for a SiK radio rather 0.1
@@ -190,13 +194,13 @@ impl ListenOptions {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Battery")]
 pub(crate) struct BatteryOptions {
-    /// Reserve of the remaining time of flight, s, 0 to 3600. With it the relay asks to leave the chain by itself when the time left
-    /// is the way home, this reserve, and twelve times --dead-after-ms, at most 240 s, for the replacement. Without it the time left
-    /// is only shown
+    /// Reserve of the remaining flight time, s, 0 to 3600. With it the relay asks to leave the chain by itself. It
+    /// does so when the remaining time is the way home, this reserve and the time for its replacement. The last is
+    /// twelve times --dead-after-ms, at most 240 s. Without this option the remaining time is only shown
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = number([0.0, 3_600.0]))]
     reserve: Option<f32>,
-    /// Shortest time of flight with a full battery, s, 1 to 21600. It is for an autopilot that reports a percentage but no time left,
-    /// as ArduCopter does. Without it such an endurance is unknown
+    /// Shortest flight time with a full battery, s, 1 to 21600. It is for an autopilot that reports a percentage but
+    /// no remaining time, as ArduCopter does. Without it such an endurance is unknown
     #[arg(long, value_name = "S", requires = "autopilot", allow_negative_numbers = true, value_parser = number([1.0, 21_600.0]))]
     flight_time: Option<f32>,
     /// Speed at which the autopilot returns home, m/s, 0.1 to 20
@@ -222,8 +226,7 @@ impl BatteryOptions {
         self.reserve.map(micros)
     }
 
-    /// Checks that the program can know the time of flight, and that a full battery lasts long enough. A full battery
-    /// must last longer than the reserve and a replacement.
+    /// Checks that the flight time can be known, and that a full battery outlasts reserve plus replacement.
     fn check(&self, dead_after_ms: u64, has_source: bool) -> Result<(), String> {
         if let Some(reserve) = self.reserve.filter(|_| !has_source) {
             return Err(format!(
@@ -244,7 +247,7 @@ impl BatteryOptions {
     }
 }
 
-/// Direction of a directional antenna.
+/// Neighbour that a directional antenna points to.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Antenna {
     /// The neighbour toward the transmitter.
@@ -262,11 +265,11 @@ pub(crate) struct Plan {
     pub(crate) key: Option<SigningKey>,
     pub(crate) autopilot: Option<AutopilotPlan>,
     pub(crate) overrides: Vec<Override>,
-    /// Planned position of this relay; `None` without a plan in the file.
+    /// Planned position of this relay, if the file has a plan.
     pub(crate) planned: Option<Placement>,
 }
 
-/// Reads and checks the command line. The error is the exit status after help or a mistake was printed.
+/// Reads and checks the command line. The error is the exit status after help or a mistake.
 pub(crate) fn read() -> Result<Plan, ExitCode> {
     let (options, beyond) = command::read(section)?;
     plan(options, beyond).map_err(|line| command::refuse(&line))
@@ -281,7 +284,7 @@ fn micros(seconds: f32) -> Duration {
     Duration::from_micros((f64::from(seconds) * 1e6) as u64)
 }
 
-/// Adds the options that the file's sections `[network]` and `[companion]` give.
+/// Adds the options of the file's sections `[network]` and `[companion]`.
 fn section(deployment: &Deployment, given: &mut FileOptions) {
     config::network(deployment, given);
     let own = &deployment.companion;
@@ -402,7 +405,7 @@ fn autopilot(options: &Options) -> Result<Option<AutopilotPlan>, String> {
     }))
 }
 
-/// Returns the load of the shared radio channel, and checks that the channel can carry all relays.
+/// Returns the load of the shared radio channel. Its data rate must suffice for all relays.
 fn channel_load(options: &Options) -> Result<ChannelLoad, String> {
     let load = ChannelLoad::of_radios(options.of);
     load.carried(options.baud, Duration::from_millis(options.probe_after_ms))
@@ -459,8 +462,7 @@ fn mission(options: &Options, file_only: &FileOnlySettings) -> Result<Mission, S
     mission::mission(config, "--")
 }
 
-/// Parses the interference's distribution along x. The memory of its points is never freed, because the mission refers
-/// to them until the program ends.
+/// Parses the interference along x. Its points are leaked, because the mission refers to them until exit.
 fn field(text: &str) -> Result<Field, String> {
     let point = |text: &str| {
         let (x, upsilon) = text

@@ -1,4 +1,4 @@
-//! Ttys of either wiring.
+//! Ttys of a relay: one for each neighbour, or one for a shared radio.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use crate::options::Options;
 use uav_relay_linux::log::Log;
 use uav_relay_linux::replug::Replug;
 
-/// Serial port toward a neighbour; `None` at an end of the chain, where there is no neighbour.
+/// Serial port toward a neighbour; `None` at an end of the chain.
 #[derive(Debug)]
 pub(crate) struct End(Option<Replug>);
 
@@ -52,8 +52,9 @@ impl Ports {
         Ok(Self::Pair(Box::new(Pair::new(upstream, downstream))))
     }
 
-    /// Exchanges bytes between ports and relay. Before the relay sends, its changed votes are passed to `store`.
-    /// Returns the time by which the next call is due.
+    /// Exchanges bytes between ports and relay. Returns the time by which the next call is due.
+    ///
+    /// Changed votes are passed to `store` before the relay sends.
     pub(crate) fn poll(
         &mut self,
         now: Instant,
@@ -66,7 +67,7 @@ impl Ports {
         }
     }
 
-    /// Reopens lost ttys when it is time. Returns the time of the next attempt, if any.
+    /// Reopens lost ttys. Returns the time of the next attempt, if any.
     pub(crate) fn tend(&mut self, now: Instant, log: &Log) -> Option<Instant> {
         self.ttys()
             .filter_map(|tty| {

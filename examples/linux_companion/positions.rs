@@ -1,6 +1,8 @@
-//! Positions of the drone, read from a FIFO. Each line is `x_m y_m altitude_m`, optionally followed by the interference measured
-//! there, `1.2e-12` in W or `-95 dBm`; or `receiver POWER`, measured at the ground receiver; or `endurance SECONDS HOME`, the remaining time of flight and the time of the
-//! way home.
+//! Positions of the drone, read from a FIFO.
+//!
+//! A line has one of three forms. `x_m y_m altitude_m` is a position; the interference measured there may follow, as
+//! `1.2e-12` in W or as `-95 dBm`. `receiver POWER` is the interference at the ground receiver. `endurance SECONDS
+//! HOME` has the remaining flight time and the time to fly home.
 
 use std::os::fd::BorrowedFd;
 use std::path::Path;
@@ -20,7 +22,7 @@ pub(crate) struct Positions {
 }
 
 impl Positions {
-    /// Opens the FIFO `path` with the drone's positions. `listens` permits lines with a measured interference power.
+    /// Opens the FIFO `path`. `listens` permits lines with a measured interference.
     pub(crate) fn open(path: &Path, listens: bool) -> Result<Self, String> {
         Ok(Self {
             fifo: Fifo::open("--positions", path)?,
@@ -34,11 +36,10 @@ impl Positions {
         self.fifo.fd()
     }
 
-    /// Returns the newest position and the newest times of the drone since the last call. Each is `None` if none was
-    /// received.
+    /// Returns the newest position and the newest times since the last call; `None` if not received.
     ///
-    /// The times are the remaining time of flight and the time of the way home, s. Invalid times are NaN. Passes
-    /// measurements to `on_sample` and logs the first invalid line. Work: that of one call of [`Fifo::read`].
+    /// The times are the remaining flight time and the time to fly home, s; NaN if invalid. Passes measurements to
+    /// `on_sample`, and logs the first invalid line. Work: that of one call of [`Fifo::read`].
     pub(crate) fn newest(
         &mut self,
         now: Instant,
@@ -96,7 +97,7 @@ impl Positions {
     }
 }
 
-/// Logs whether this relay keeps its drone apart from other drones in flight. This requires the drone's `positions`.
+/// Logs if drones are kept apart in flight. This requires `positions`.
 pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     let now = Instant::ZERO;
     if let Some(Positions { fifo, .. }) = positions {
@@ -110,19 +111,17 @@ pub(crate) fn started(log: &Log, positions: Option<&Positions>) {
     }
 }
 
-/// Parsed line: a position and a measurement, or the drone's remaining times, s. The times are the remaining time of
-/// flight, and the time of the way home.
+/// Parsed line: a position and a measurement, or the remaining flight time and the time to fly home, s.
 ///
-/// A time that is no number is NaN.
+/// An invalid time is NaN.
 enum Line {
     Position(Option<Placement>, Option<Sample>),
     Endurance([f32; 2]),
 }
 
-/// Parses a line. Three forms are valid: a position with or without a power; the word `receiver` and a power; the word
-/// `endurance` and two times.
+/// Parses a line: position with or without power, `receiver` and power, or `endurance` and two times.
 ///
-/// Returns the reason as an error if the line is invalid, or if it has a power although `listens` is false.
+/// Returns the reason as an error if the line is invalid, or has a power although `listens` is false.
 fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
     let words = lines::words(text)?;
     let number = |word: &str| {
@@ -141,7 +140,7 @@ fn parse_line(text: &[u8], listens: bool) -> Result<Line, String> {
         let power_w = measured_w(power)?;
         return Ok(Line::Position(None, Some(Sample::Receiver { power_w })));
     }
-    // An invalid time counts as unknown, which is an event of the relay.
+    // An invalid time counts as unknown; the relay reports this as an event.
     if let ["endurance", times @ ..] = words.as_slice() {
         let time = |word: &str| word.parse().unwrap_or(f32::NAN);
         return Ok(Line::Endurance(match times {

@@ -1,9 +1,9 @@
-//! Records that survive a restart in flight: the relay's votes on views, and its newest upload.
+//! Records that survive a restart in flight: the relay's votes on views, and the newest upload.
 //!
-//! A vote is on the disk before it is sent, because a relay that forgets a promise could split the chain into two views. While a
-//! separate thread writes it nothing is sent; everything else continues. Remove the file before another flight.
+//! A vote is on the disk before it is sent, because a relay that forgets a promise could split the chain. While a
+//! thread writes it, nothing is sent; everything else continues. Remove the file before another flight.
 //!
-//! Without a valid upload a relay starts with the mission of its options; the chain sends it the newer one.
+//! Without a valid upload a relay starts with the mission of its options, and receives the newer one from the chain.
 
 use std::path::Path;
 
@@ -16,12 +16,11 @@ use crate::relay::Refusal;
 const VIEWS: &str = "--view-file";
 const UPLOADS: &str = "--upload-file";
 
-/// Restores the relay's votes of an earlier start into `relay`. Returns the file of votes, and true if the file had
-/// votes.
+/// Restores the votes of an earlier start into `relay`. Returns their file, and true if it had votes.
 ///
 /// # Errors
-/// One line that names the file, the fault and the remedy: a relay that has lost its votes must not vote again in the
-/// same flight.
+/// One line with the file, the fault and the remedy: a relay that has lost its votes must not vote again in the same
+/// flight.
 pub(crate) fn resume_views(
     file: &Path,
     relay: &mut Relay,
@@ -48,8 +47,9 @@ pub(crate) fn resume_views(
     Ok((StoredFile::new(VIEWS, file, stored)?, stored.is_some()))
 }
 
-/// Restores a mission that was uploaded before this start into `relay`. Returns true if such a mission was restored.
-/// `mission` is the mission of the relay's options, on which the upload is based.
+/// Restores an uploaded mission of an earlier start into `relay`; returns true if there was one.
+///
+/// `mission` is that of the relay's options, on which the upload is based.
 ///
 /// An unusable file is logged and ignored.
 pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, log: &Log) -> bool {
@@ -72,7 +72,7 @@ pub(crate) fn resume_upload(file: &Path, mission: &Mission, relay: &mut Relay, l
     })
 }
 
-/// Reads a mission that was uploaded before this start; `None` without such a mission.
+/// Reads an uploaded mission of an earlier start, if any.
 ///
 /// # Errors
 /// A line that names the file and the fault.
@@ -92,13 +92,12 @@ pub(crate) fn load_upload(file: &Path, mission: &Mission) -> Result<Option<Uploa
     Ok(Some(upload))
 }
 
-/// Starts the thread that writes uploaded missions to `file`. The thread writes nothing until [`store_upload`] is
-/// called.
+/// Starts the thread that writes uploaded missions to `file`, once [`store_upload`] is called.
 pub(crate) fn uploads(file: &Path) -> Result<StoredFile, String> {
     StoredFile::new(UPLOADS, file, None)
 }
 
-/// Begins to store an uploaded mission. If storing fails, the relay flies the mission all the same.
+/// Begins to store an uploaded mission. If that fails, the relay flies the mission all the same.
 pub(crate) fn store_upload(file: &mut StoredFile, upload: &Upload) {
     let mut bytes = [0; Upload::LENGTH];
     // The buffer has room for every upload.

@@ -21,7 +21,7 @@ use uav_relay_linux::service::Service;
 use uav_relay_linux::stored::{StoredFile, next_epoch};
 use uav_relay_linux::{config, tap};
 
-/// Time between two checks of a relay that waits for the endurance of its drone.
+/// Time between two checks while the relay waits for its drone's endurance.
 const WAIT: Duration = Duration::from_millis(100);
 
 struct Flight {
@@ -31,7 +31,7 @@ struct Flight {
     ports: Ports,
     positions: Option<Positions>,
     autopilot: Option<Companion>,
-    /// File with the relay's votes on the chain's membership.
+    /// File with the relay's votes.
     views: Option<StoredFile>,
     /// File with the newest uploaded mission.
     uploads: Option<StoredFile>,
@@ -45,8 +45,9 @@ struct Flight {
 #[derive(Debug)]
 pub(crate) struct Refusal {
     pub(crate) line: String,
-    /// True if a restart of the program would fail for the same reason. Somebody then has to change the configuration
-    /// or the hardware. False for a port that may come back by itself.
+    /// True if a restart would fail for the same reason, until somebody changes configuration or hardware.
+    ///
+    /// False for a port that may come back by itself.
     pub(crate) is_final: bool,
 }
 
@@ -110,7 +111,7 @@ impl Flight {
         let views = options.view_file.as_deref();
         let views = views.map(|file| records::resume_views(file, &mut relay, now));
         let (mut views, has_votes) = views.transpose()?.unzip();
-        // Last of the steps that may fail, so that repeated failing starts leave no files.
+        // Last of the steps that may fail, so that failed starts leave no files.
         if let Some(asked) = &options.capture {
             tap::attach(&log, env!("CARGO_BIN_NAME"), asked, ports.ttys())?;
         }
@@ -134,7 +135,7 @@ impl Flight {
         if has_votes == Some(true) {
             report.votes_restored();
         } else if let Some(views) = &mut views {
-            // Written at once, so that a failure of the disk is reported before flight.
+            // Written at once, so that a disk failure is reported before flight.
             views.store(&relay.view_record().to_bytes());
         }
         Ok(Self {
@@ -154,7 +155,7 @@ impl Flight {
         })
     }
 
-    /// Runs the main loop once; returns false when the program must end.
+    /// Runs one cycle of the main loop; returns false when the program must end.
     fn turn(&mut self) -> bool {
         let time = self.service.now();
         let Self { service, relay, .. } = self;
@@ -258,14 +259,14 @@ impl Flight {
         })
     }
 
-    /// Sleeps until input or a timer needs work; returns false after a signal to end.
+    /// Sleeps until input or a timer; returns false after a signal to end.
     fn sleep(&mut self, wake: Option<Instant>) -> bool {
         let fifo = self.positions.as_ref().map(Positions::fd);
         let files = [&self.views, &self.uploads].into_iter().flatten();
         let files = files.map(StoredFile::fd);
         let others = fifo.into_iter().chain(files);
         let mut others: Vec<_> = others.map(|fd| (fd, PollFlags::IN)).collect();
-        // The autopilot is the last entry, if there is one.
+        // The autopilot is the last entry, if any.
         let autopilot = self.autopilot.as_ref().and_then(Companion::interest);
         others.extend(autopilot);
         let has_autopilot = autopilot.is_some();
@@ -297,7 +298,9 @@ impl Flight {
     }
 }
 
-/// Returns the key with a new epoch for this start; `None` without a key. The epoch is stored and never used again.
+/// Returns the key with a new epoch for this start; `None` without a key.
+///
+/// The epoch is stored and never reused.
 pub(crate) fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     let (Some(SigningKey(key)), Some(file)) = (plan.key, &plan.options.epoch_file) else {
         return Ok(None);
@@ -308,7 +311,7 @@ pub(crate) fn auth(plan: &Plan) -> Result<Option<Auth>, String> {
     }))
 }
 
-/// Returns a random number, taken from the random seed of std's hash maps.
+/// Returns a random number, from the seed of std's hash maps.
 pub(crate) fn seed() -> u32 {
     let [a, b, c, d, ..] = RandomState::new().build_hasher().finish().to_le_bytes();
     u32::from_le_bytes([a, b, c, d])

@@ -1,5 +1,6 @@
-//! Log lines of the relay. Each f32 is also printed as its bits, so that two relays, or a relay and a simulation, can be compared
-//! exactly.
+//! Log lines of the relay.
+//!
+//! Each f32 is also printed as its bits, so that two relays, or relay and simulation, can be compared exactly.
 
 use std::fmt;
 
@@ -30,8 +31,7 @@ impl fmt::Display for Exact {
 pub(crate) struct Report {
     log: Log,
     identity: Identity,
-    /// Number of relays in the mission that this program was started with. Relays keep their numbers when some are
-    /// lost.
+    /// Number of relays in the mission at the start. Relays keep their numbers when others are lost.
     relays: u16,
     digest: u16,
     fence: Option<Geofence>,
@@ -39,8 +39,7 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Creates the report, which writes to `log`. `flies` is true if this program itself sends setpoints to an
-    /// autopilot.
+    /// Creates the report. `flies` is true if this program sends setpoints to an autopilot.
     pub(crate) fn new(
         log: Log,
         identity: Identity,
@@ -58,8 +57,7 @@ impl Report {
         }
     }
 
-    /// Logs the relay's identity, its ports, and the digest of its mission. Relays with the same mission have the
-    /// same digest.
+    /// Logs the relay's identity, ports and mission digest. The same mission has the same digest.
     pub(crate) fn started(&self, ttys: &[String], baud: u32) {
         let Identity { network, index } = self.identity;
         let (relays, digest) = (self.relays, self.digest);
@@ -81,7 +79,7 @@ impl Report {
         );
     }
 
-    /// Logs the signing epoch, a number that rises at every start. `None` means that frames are not signed.
+    /// Logs the signing epoch; `None` means that frames are not signed.
     pub(crate) fn signing(&self, epoch: Option<u32>) {
         match epoch {
             Some(epoch) => self.log.signed(epoch),
@@ -93,7 +91,7 @@ impl Report {
         }
     }
 
-    /// Logs that the relay flies a mission uploaded before this start.
+    /// Logs that the relay flies an uploaded mission of an earlier start.
     pub(crate) fn resumed(&self, relay: &Relay) {
         let version = relay.version();
         self.log.event(
@@ -104,7 +102,7 @@ impl Report {
         );
     }
 
-    /// Logs that the relay's votes on the chain's membership were restored from an earlier start.
+    /// Logs that the relay's votes were restored from an earlier start.
     pub(crate) fn votes_restored(&self) {
         self.log.line(
             Instant::ZERO,
@@ -176,8 +174,9 @@ impl Report {
         }
     }
 
-    /// Logs a new setpoint, or the drone's arrival at its agreed position, if it is time for a line. `drone` is the
-    /// drone's present position. Returns the time of the next check.
+    /// Logs a new setpoint or the drone's arrival, if due. Returns the time of the next check.
+    ///
+    /// `drone` is the drone's position.
     pub(crate) fn log_movement(
         &mut self,
         now: Instant,
@@ -191,7 +190,7 @@ impl Report {
         again
     }
 
-    /// Logs a rejected upload, with the allowed range if it violates the geofence.
+    /// Logs a rejected upload. If it violates the geofence, the line has the permitted range.
     fn refused(&self, now: Instant, why: LineError) {
         const EVENT: &str = "upload refused";
         let range_m = match (why, self.fence) {
@@ -297,13 +296,14 @@ impl Report {
         );
     }
 
-    /// Returns the relay's own number, which never changes when other relays are lost.
+    /// Returns the relay's own number, which never changes.
     pub(crate) const fn index(&self) -> u16 {
         self.identity.index
     }
 
-    /// Returns the name of a node for the log. `node` is its number before flight: 0 is the transmitter, N + 1 the
-    /// receiver.
+    /// Returns the name of a node for the log.
+    ///
+    /// `node` is its number at the start: 0 is the transmitter, N + 1 the receiver.
     pub(crate) fn name(&self, node: u16) -> String {
         match node {
             0 => "the transmitter".to_owned(),
@@ -312,7 +312,7 @@ impl Report {
         }
     }
 
-    /// Returns the digest of the mission that the relay flies, uploaded or given at the start.
+    /// Returns the digest of the relay's present mission.
     fn mission_digest(&self, relay: &Relay) -> u16 {
         match relay.upload() {
             Some(upload) if relay.version() == upload.version() => upload.id().digest,
@@ -320,7 +320,7 @@ impl Report {
         }
     }
 
-    /// Logs that the chain flies a new mission, and the Tx and Rx positions, if the mission has its own.
+    /// Logs that the chain flies a new mission, and its Tx and Rx positions, if any.
     fn adopted(&self, now: Instant, relay: &Relay) {
         let version = relay.version();
         let fields = json!({ "version": version });
@@ -331,7 +331,7 @@ impl Report {
     }
 
     fn view_accepted(&self, now: Instant, relay: &Relay) {
-        // The number of a drone never changes; its place in the chain does when a relay before it is lost.
+        // A drone keeps its number, but not its place in the chain: that changes when a relay before it is lost.
         let (place, relays) = (relay.index(), relay.mission().relays());
         let view = relay.view().number();
         self.log.event(
@@ -357,7 +357,7 @@ impl Report {
         }
     }
 
-    /// Logs begin and end of the relay's fitted slots, as shares of the frame.
+    /// Logs when the relay's fitted slots begin and end, as fractions of the frame.
     fn log_slots(&self, now: Instant, slots: SlotShares) {
         let said = |name: &str, [begin, end]: [f32; 2]| {
             format!("{name} {:.6} to {:.6}", Exact(begin), Exact(end))
@@ -409,7 +409,7 @@ impl Report {
     }
 }
 
-/// Returns the direction of the neighbours on `side`, for the log.
+/// Returns the direction toward `side`, for the log.
 pub(crate) const fn direction(side: Side) -> &'static str {
     match side {
         Side::Upstream => "upstream (toward Tx)",

@@ -11,7 +11,7 @@ pub(crate) fn at(place: Placement) -> Value {
     json!({ "x_m": place.x_m, "y_m": place.y_m, "altitude_m": place.altitude_m })
 }
 
-/// Returns begin and end of the relay's fitted slots as JSON, as shares of the frame.
+/// Returns the begin and end of the relay's fitted slots as JSON, as fractions of the frame.
 pub(crate) fn slots(of: SlotShares) -> Value {
     json!({
         "from_tx": of.from_tx, "to_rx": of.to_rx, "from_rx": of.from_rx, "to_tx": of.to_tx,
@@ -19,7 +19,7 @@ pub(crate) fn slots(of: SlotShares) -> Value {
     })
 }
 
-/// Returns the relay's state as JSON. `index` is the relay's number before flight.
+/// Returns the relay's state as JSON. `index` is the relay's number at the start.
 pub(crate) fn of_relay(
     relay: &Relay,
     index: u16,

@@ -1,26 +1,26 @@
-//! Reports an autopilot that does not answer after a start, once for each kind of fault. No bytes, no MAVLink, no autopilot.
+//! Reports an autopilot that does not answer after a start: no bytes, no MAVLink, or no autopilot.
+//!
+//! Each of these faults is reported once.
 
 use uav_relay::{Duration, Instant};
 
-/// Time without a HEARTBEAT after which a missing autopilot is reported. An autopilot sends one every second.
+/// Time without a HEARTBEAT, which an autopilot sends every second, until it is reported as missing.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(3_000);
 
-/// Kind of the data received from the autopilot's port since the start. The kinds are ordered from no data to MAVLink
-/// frames.
+/// Kind of data received from the autopilot's port since the start, in ascending order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Received {
-    /// No byte has been received from the autopilot's port.
+    /// No bytes.
     Nothing,
-    /// Bytes were received, but no intact MAVLink 2 frame.
+    /// Bytes, but no intact MAVLink 2 frame.
     Noise,
-    /// MAVLink 2 frames were received, but no frame from a known autopilot.
+    /// MAVLink 2 frames, but none from a known autopilot.
     Others,
 }
 
 #[derive(Debug)]
 pub(crate) struct AnswerMonitor {
-    /// Kind of data received so far from the autopilot's port, and the time since then. If several kinds were received,
-    /// it is the most advanced kind. `None` once the autopilot is found.
+    /// Kind of the received data, and the time since when; `None` once the autopilot is found.
     newest: Option<(Received, Instant)>,
     reported: Option<Received>,
 }
@@ -33,8 +33,9 @@ impl AnswerMonitor {
         }
     }
 
-    /// Handles the kind of data received so far, `received`; `None` means that the autopilot is found. Returns the kind
-    /// of fault if it has to be reported. Each kind is reported once.
+    /// Handles the received kind of data. Returns the kind of fault to report; each one is returned once.
+    ///
+    /// `received` is `None` once the autopilot is found.
     pub(crate) fn check(&mut self, now: Instant, received: Option<Received>) -> Option<Received> {
         let (answer, since) = self.newest?;
         let Some(heard) = received else {
@@ -52,7 +53,7 @@ impl AnswerMonitor {
         self.reported
     }
 
-    /// Returns the kind of fault that was reported. `None` if no fault was reported, or if the autopilot is found.
+    /// Returns the reported kind of fault, if any, until the autopilot is found.
     pub(crate) fn missing(&self) -> Option<Received> {
         self.newest.and(self.reported)
     }

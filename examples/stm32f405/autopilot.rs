@@ -1,6 +1,8 @@
-//! Link to the drone's autopilot, a PX4 or ArduCopter, at USART1. TX PA9, RX PA10, 115 200 baud, MAVLink 2.
+//! Link to the drone's autopilot, PX4 or ArduCopter: MAVLink 2 at 115 200 baud.
 //!
-//! It flies drones whose block has sites; without them the port is never opened.
+//! It uses USART1: TX PA9, RX PA10.
+//!
+//! Used if the block has Tx and Rx positions; otherwise the port is never opened.
 
 use core::cell::RefCell;
 
@@ -23,8 +25,7 @@ use crate::firmware::config::{self, Sites};
 use crate::firmware::port::{self, OUTGOING, Port, Queues, Slot};
 use crate::firmware::{board, chip, log};
 
-/// Capacity of the receive queue, bytes: 44 ms of traffic. It must hold an autopilot's bursts while the main loop is
-/// busy with a long message.
+/// Capacity of the receive queue, bytes: 44 ms of traffic, for bursts while the main loop is busy.
 const RECEIVED: usize = 512;
 
 /// Maximum position error of a hovering drone, m.
@@ -33,7 +34,7 @@ const POSITION_ERROR_M: f32 = 1.5;
 /// Length of the longest frame to send, bytes.
 const LONGEST: usize = Link::LONGEST_FRAME;
 
-/// Pause before the next attempt to write to a full port. In this time 115 bytes are sent.
+/// Pause before another attempt to write to a full port: 115 bytes are sent meanwhile.
 const PAUSE: Duration = Duration::from_millis(10);
 
 static AUTOPILOT: Slot<USART1> = Mutex::new(RefCell::new(None));
@@ -50,8 +51,7 @@ pub(crate) struct Autopilot {
 }
 
 impl Autopilot {
-    /// Returns the guard's configuration `of` with this drone's position error and stopping time. The guard prevents
-    /// collisions.
+    /// Returns the guard's settings `of` with this drone's position error and stopping time.
     #[expect(
         clippy::unnecessary_wraps,
         reason = "an image that does not fly has none"
@@ -64,9 +64,10 @@ impl Autopilot {
         })
     }
 
-    /// Creates the autopilot link for the line between the Tx and Rx positions `sites`, in static RAM. `None` if the
-    /// mission cannot be flown along that line.
-    #[inline(never)] // its stack frame is released
+    /// Creates the autopilot link in static RAM, for the line between `sites`.
+    ///
+    /// `None` if the mission does not fit the line.
+    #[inline(never)] // frees its stack frame
     pub(crate) fn begin(
         uart: Uart,
         sites: &Sites,
@@ -79,8 +80,9 @@ impl Autopilot {
         Self::along(&course, uart, now)
     }
 
-    /// Creates the autopilot link for a course, which is a line on earth and a speed limit. The caller computes the
-    /// course, to save stack here.
+    /// Creates the autopilot link for a course: a line on earth and a speed limit.
+    ///
+    /// The caller computes the course, to save stack here.
     #[inline(never)]
     fn along(course: &Course, uart: Uart, now: Instant) -> Option<&'static mut Self> {
         let port = open(uart)?;
@@ -91,20 +93,21 @@ impl Autopilot {
         autopilot.link.set_seed(board::seed());
         sign(&mut autopilot.link, now).ok()?;
         if chip::was_hung() {
-            // The empty queue has room for the line.
+            // The queue is still empty, so it has room for this text.
             let _ = autopilot.link.send_text("relay: restarted by its watchdog");
         }
         Some(autopilot)
     }
 
-    /// Processes bytes from the autopilot, and exchanges data with the relay. The frames that the relay sends after
-    /// this call contain the drone's newest position.
+    /// Processes bytes from the autopilot, and exchanges data with the relay.
+    ///
+    /// The relay's next frames contain the drone's newest position.
     pub(crate) fn listen(&mut self, now: Instant, relay: &mut Relay) {
         self.receive(now);
         self.link.exchange(relay, now);
     }
 
-    #[inline(never)] // its stack frame is released
+    #[inline(never)] // frees its stack frame
     fn receive(&mut self, now: Instant) {
         let mut bytes = [0; 64];
         // Bytes that arrive meanwhile wake the main loop again.
@@ -115,21 +118,22 @@ impl Autopilot {
                     let bytes = bytes.get(..count).unwrap_or_default();
                     self.link.handle_bytes(now, bytes);
                 }
-                // A lost byte fails the frame's checksum.
+                // A lost byte makes the frame's checksum wrong.
                 Err(_) => {}
             }
         }
     }
 
-    /// Shows an event of the relay on the ground station of the autopilot's operator.
+    /// Shows an event of the relay to the autopilot's operator.
     pub(crate) fn handle_event(&mut self, event: Event) {
         self.link.handle_event(event);
     }
 
-    /// Sends frames with the relay's setpoint to the autopilot. Returns the time by which the next call is due. `now`
-    /// must be the time passed to the last call of [`listen`](Self::listen).
+    /// Sends frames with the relay's setpoint to the autopilot. Returns the time by which the next call is due.
+    ///
+    /// `now` must be that of the last call of [`listen`](Self::listen).
     pub(crate) fn fly(&mut self, now: Instant, relay: &mut Relay) -> Instant {
-        // Its ports have been served since the last exchange: the newest setpoint is sent in this turn.
+        // The ports have been served since the last exchange, so this sends the newest setpoint without delay.
         self.link.exchange(relay, now);
         while let Some(event) = self.link.poll_event() {
             log::autopilot(event);
@@ -147,8 +151,9 @@ impl Autopilot {
     }
 }
 
-/// Opens the autopilot's port, served by its interrupt. The queues are built on the stack before they are moved to
-/// static RAM. The function is not inlined, so that this stack is released.
+/// Opens the autopilot's port, served by its interrupt.
+///
+/// The queues are built on the stack before they are moved to static RAM. Not inlined, so that this stack is freed.
 #[inline(never)]
 fn open(uart: Uart) -> Option<Port> {
     Some(port::open(
@@ -159,11 +164,10 @@ fn open(uart: Uart) -> Option<Port> {
     ))
 }
 
-/// Error: an autopilot signing key is configured, but this image cannot sign.
+/// Error: the block has an autopilot key, but this image cannot sign.
 struct CannotSign;
 
-/// Enables signing to the autopilot if the configuration block has a key. The board has no clock, so the link takes
-/// the time from the timestamps that it receives.
+/// Enables signing to the autopilot if the block has a key. Without a clock, received timestamps give the time.
 #[cfg(feature = "mavlink-signing")]
 #[expect(clippy::unnecessary_wraps, reason = "as where it cannot")]
 fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
@@ -174,7 +178,7 @@ fn sign(link: &mut Link, now: Instant) -> Result<(), CannotSign> {
     Ok(())
 }
 
-/// Returns an error if the block has an autopilot signing key, because this image cannot sign.
+/// Returns an error if the block has an autopilot key: this image cannot sign.
 #[cfg(not(feature = "mavlink-signing"))]
 fn sign(_: &mut Link, _: Instant) -> Result<(), CannotSign> {
     if config::autopilot_key(board::block()).is_none() {

@@ -1,4 +1,4 @@
-//! Minimal executor for `uav_relay::asynch`: one task, time and sleep, with all its unsafe code.
+//! Minimal executor for `uav_relay::asynch`: one task, time and sleep. All its unsafe code is here.
 
 use core::cell::{Cell, RefCell};
 use core::future::{Future, poll_fn};
@@ -10,8 +10,7 @@ use uav_relay::Instant;
 use crate::firmware::chip;
 use crate::firmware::clock::{self, Clock};
 
-/// Clock of the board, and the earliest time at which the task has requested to be polled. The time is `None` without a
-/// request.
+/// Clock of the board, and the earliest time at which the task must be polled, if any.
 pub(crate) struct Time {
     clock: RefCell<Clock>,
     next: Cell<Option<Instant>>,
@@ -46,8 +45,9 @@ impl uav_relay::asynch::Clock for Time {
     }
 }
 
-/// Runs `task` forever. Polls the task after each interrupt, after a wake-up, and at the time that the task has
-/// requested. Calls `also` after every poll.
+/// Runs `task` forever: polls it after each interrupt or wake-up, and at the requested time.
+///
+/// Calls `also` after every poll.
 pub(crate) fn run<F: Future>(mut task: Pin<&mut F>, time: &Time, mut also: impl FnMut()) -> ! {
     let waker = waker();
     let mut cx = Context::from_waker(&waker);

@@ -4,13 +4,13 @@
 //! cargo build --profile firmware --target thumbv7em-none-eabihf --example stm32f405
 //! cargo run   --profile firmware --target thumbv7em-none-eabihf --example stm32f405     # flashes, with probe-rs
 //! ```
-//! Every drone gets the same image. The index and the mission are in a configuration block with a flash sector of its own,
-//! written once and preserved by updates (relay 3 of 5, for instance):
+//! Every drone gets the same image. Index and mission are in a configuration block with a flash sector of its own. It
+//! is written once, and updates preserve it (here for relay 3 of 5):
 //! ```text
 //! cargo provision --uavs 5 --index 3 --network 7 --out relay3.bin
 //! probe-rs download --chip STM32F405RGTx --binary-format bin --base-address 0x080E0000 relay3.bin
 //! ```
-//! A drone without a block takes no part. With `--features defmt` it logs this and all events.
+//! A drone without a block does not join the chain. With `--features defmt` it logs this and all events.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -53,7 +53,7 @@ fn main() -> ! {
     let Some((mut clock, links, uart)) = connect() else {
         board::stop()
     };
-    // A drone without a valid configuration sleeps for good.
+    // A drone without a valid configuration sleeps forever.
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };
@@ -62,7 +62,7 @@ fn main() -> ! {
 
 /// Creates the clock, the links to both neighbours and the autopilot's UART.
 ///
-/// The links are in static RAM. The function is not inlined, so that its stack frame is released.
+/// The links are in static RAM. Not inlined, so that its stack frame is freed.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(firmware::clock::Clock, &'static mut Links, autopilot::Uart)> {

@@ -1,9 +1,10 @@
-//! The relay of `stm32f405` on asynchronous ports. Same wiring, drone and log, but run by `uav_relay::asynch` on an executor of 30
-//! lines.
+//! Relay of `stm32f405` on asynchronous ports, run by `uav_relay::asynch` on an executor of 30 lines.
 //!
-//! It serves for comparison with the polled one (`cargo cost`), and for the emulator (`cargo test --test qemu`), where Embassy
-//! would wait for good for a clock that QEMU lacks. For a board of your own begin with `examples/embassy`. It has no autopilot
-//! link: a drone whose block has sites takes no part.
+//! Wiring, drone and log are the same.
+//!
+//! It is for comparison with the polled one (`cargo cost`), and for the emulator (`cargo test --test qemu`). Embassy
+//! would wait forever for a clock that QEMU lacks. For your own board begin with `examples/embassy`. It has no
+//! autopilot link: a drone whose block has Tx and Rx positions does not join the chain.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -35,7 +36,7 @@ fn main() -> ! {
     let Some((mut clock, upstream, downstream, uart)) = wires::start() else {
         board::stop()
     };
-    // A drone without a valid configuration sleeps for good.
+    // A drone without a valid configuration sleeps forever.
     let Some(drone) = drone::begin(Wiring::Pair, uart, clock.now()) else {
         board::stop()
     };

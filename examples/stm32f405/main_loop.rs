@@ -14,8 +14,9 @@ use crate::firmware::log;
 use crate::firmware::persistent;
 
 pub(crate) trait Links {
-    /// Exchanges bytes between ports and relay. The relay's changed votes are stored after receiving and before
-    /// sending. Returns the time by which the next call is due.
+    /// Exchanges bytes between ports and relay. Returns the time by which the next call is due.
+    ///
+    /// Changed votes are stored after receiving and before sending.
     fn poll(&mut self, now: Instant, drone: &mut Drone) -> Option<Instant>;
 
     fn log_counters(&self);
@@ -58,7 +59,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
         let relay = &mut *drone.relay;
         while let Some(event) = relay.poll_event() {
             log::event(event, relay);
-            // Control of the no-panic proof: with this panic the image must not link.
+            // This panic tests the no-panic proof: with it the image must not link.
             #[cfg(panic_on_purpose)]
             assert!(
                 relay.setpoint().is_none_or(|place| place.x_m < 1e6),
@@ -76,7 +77,7 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
             log::counters(relay);
             links.log_counters();
         }
-        // After the links, so that it uses the newest state of the neighbours.
+        // After the links, for the newest state of the neighbours.
         let soon = drone.autopilot.as_mut();
         let soon = soon.map(|autopilot| autopilot.fly(now, relay));
         let now = clock.now();
@@ -86,12 +87,11 @@ pub(crate) fn fly<L: Links>(mut clock: Clock, links: &mut L, mut drone: Drone) -
     }
 }
 
-/// Returns no measurement. If the relay measures the interference, replace this function by one that returns the newest
-/// measurement of your receiver.
+/// Returns no measurement. Replace it by one that returns the newest measurement of your receiver.
 ///
-/// To estimate the interferer, the relay also needs the drone's position. If the mission gives the interference as a
-/// distribution along x, call `Relay::restart` at the leader after enough samples. The chain then agrees on positions
-/// for the measured interference.
+/// To estimate the interferer, the relay also needs the drone's position. If the mission has the interference as a
+/// function of x, call `Relay::restart` at the leader after enough samples. The chain then agrees on positions for
+/// the measured interference.
 const fn measured() -> Option<Sample> {
     None
 }

@@ -1,11 +1,10 @@
-//! Firmware of a relay on an STM32F405 that shares one radio channel with all relays. `stm32f405` with one serial port to the
-//! radio.
+//! Firmware of a relay on an STM32F405 that shares one radio channel with all relays.
 //!
 //! ```text
 //! cargo run --profile firmware --target thumbv7em-none-eabihf --example stm32f405_radio     # flashes, with probe-rs
 //! ```
-//! The radio, or the transceiver of a bus, is at USART2. PA1 is the driver enable, if the radio has one: high while this relay sends.
-//! Everything else, and the configuration of a drone, is that of `main.rs`.
+//! The radio, or the transceiver of a bus, is at USART2. PA1 is its driver enable, if it has one: high while this
+//! relay sends. Everything else is as in `main.rs`.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -25,7 +24,7 @@ fn main() -> ! {
     let Some((mut clock, channel, uart)) = connect() else {
         board::stop()
     };
-    // A drone without a valid configuration sleeps for good.
+    // A drone without a valid configuration sleeps forever.
     let Some(drone) = drone::begin(Wiring::Shared, uart, clock.now()) else {
         board::stop()
     };
@@ -34,7 +33,7 @@ fn main() -> ! {
 
 /// Creates the clock, the radio channel and the autopilot's UART.
 ///
-/// The channel is in static RAM. The function is not inlined, so that its stack frame is released.
+/// The channel is in static RAM. Not inlined, so that its stack frame is freed.
 #[cfg(target_os = "none")]
 #[inline(never)]
 fn connect() -> Option<(

@@ -1,4 +1,6 @@
-//! Replacement of `autopilot.rs` without the feature `flight`. A drone whose block has sites does not fly with such an image.
+//! Replacement of `autopilot.rs` without the feature `flight`.
+//!
+//! A drone whose block has Tx and Rx positions does not fly with such an image.
 
 use stm32f4xx_hal::gpio::{PA9, PA10};
 use stm32f4xx_hal::pac::USART1;
@@ -19,12 +21,11 @@ pub(crate) fn uart(_: USART1, _: PA9, _: PA10, _: u32, _: &mut Rcc) -> Option<Ua
     Some(Uart)
 }
 
-/// Placeholder type for the autopilot link, which this image lacks. The enum has no variants, so no value of it can
-/// exist.
+/// Placeholder for the autopilot link, which this image lacks. It has no values.
 pub(crate) enum Autopilot {}
 
 impl Autopilot {
-    /// Returns `None`: an image without an autopilot link needs no guard (collision avoidance).
+    /// Returns `None`: an image without an autopilot needs no guard (collision avoidance).
     pub(crate) const fn guard(_: &Sites, _: GuardConfig) -> Option<GuardConfig> {
         None
     }

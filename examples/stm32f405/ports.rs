@@ -1,5 +1,6 @@
-//! Asynchronous halves of an interrupt-driven port. They need no waker, because the executor polls its task after every received
-//! byte.
+//! Asynchronous halves of an interrupt-driven port.
+//!
+//! They need no waker, because the executor polls its task after every received byte.
 
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -13,7 +14,7 @@ use uav_relay::serial::SerialPort as _;
 use crate::executor::Time;
 use crate::firmware::port::Port;
 
-/// Pause before the next attempt to write to a full port. In this time 11 bytes are sent.
+/// Pause before another attempt to write to a full port: 11 bytes are sent meanwhile.
 const PAUSE: Duration = Duration::from_millis(1);
 
 pub(crate) struct Rx<'p>(&'p RefCell<Port>);

@@ -1,6 +1,6 @@
 //! Board with a serial port to each neighbour.
 //!
-//! The port toward the transmitter is that of `firmware/pins.rs`; the one toward the receiver is USART3, with TX at PB10 and RX at
+//! The port toward the transmitter is in `firmware/pins.rs`. The port toward the receiver is USART3: TX PB10, RX
 //! PB11.
 
 use core::cell::RefCell;

@@ -1,7 +1,9 @@
-//! Bench of relays in virtual time, with ground stations at the ends. A test can see, delay, change and drop every frame.
+//! Test bench: relays in virtual time, with ground stations at the ends.
 //!
-//! Nodes are numbered as in the protocol: 0 is the transmitter, then come the relays, and the receiver is last. The bench is for
-//! tests of the protocol; drones, radios and recorded timelines are in `uav-relay-sim`.
+//! A test can see, delay, change and drop every frame.
+//!
+//! Nodes are numbered as in the protocol: 0 is the transmitter, then come the relays, and the receiver is last. The
+//! bench tests the protocol only; drones, radios and recorded timelines are in `uav-relay-sim`.
 
 use std::collections::VecDeque;
 
@@ -15,8 +17,9 @@ use uav_relay::{
 
 use crate::fixtures::NETWORK;
 
-/// Limit of the number of frames that the bench delivers at one instant. Above it the relays seem to send without
-/// end, and the bench panics.
+/// Maximum number of frames delivered at one instant.
+///
+/// With more, the relays seem to send without end, and the bench panics.
 const MOST_STEPS: u32 = 400_000;
 
 /// Frame in transit between two nodes of the test bench.
@@ -24,11 +27,11 @@ const MOST_STEPS: u32 = 400_000;
 pub struct Frame {
     /// Time at which the frame arrives at the node.
     pub at: Instant,
-    /// Node that sends the frame: 0 is the transmitter, then come the relays, and last the receiver.
+    /// Sending node: 0 is the transmitter, then come the relays, and last the receiver.
     pub from: usize,
-    /// Node that receives the frame: 0 is the transmitter, then come the relays, and last the receiver.
+    /// Receiving node, numbered like the sender.
     pub to: usize,
-    /// Port of the receiving node at which the frame arrives.
+    /// Port of the receiving node.
     pub port: Port,
     pub bytes: Vec<u8>,
 }
@@ -44,13 +47,12 @@ impl Frame {
     }
 }
 
-/// Function that decides whether a frame from one node reaches another, and at which port.
+/// Function that chooses the receiving port of a frame; `None` if the frame does not arrive.
 ///
-/// It takes the sender's index, its port, and the receiver's index, from 1. `None` means that the frame does not
-/// arrive.
+/// It takes the sender's index, its port, and the receiver's index; indices are from 1.
 pub type Route = Box<dyn Fn(usize, Port, usize) -> Option<Port>>;
 
-/// Function that can change an arriving frame, and returns true if the frame is to be delivered.
+/// Function that may change an arriving frame. It returns true if the frame is delivered.
 pub type Delivery = Box<dyn FnMut(&mut Frame) -> bool>;
 
 /// Test bench in virtual time: relays, ground stations, and the frames between them.
@@ -62,11 +64,11 @@ pub struct Bench {
     pub relays: Vec<Relay>,
     /// Ground stations at the transmitter and at the receiver; `None` where there is none.
     pub grounds: [Option<Box<Ground>>; 2],
-    /// Index in the chain, from 1, of each relay in `relays`. A duplicate of a relay has the same index.
+    /// Index in the chain of each relay, from 1. A duplicate of a relay has the same index.
     places: Vec<usize>,
     pub now: Instant,
     pub flying: VecDeque<Frame>,
-    /// Events that the relays have raised, each with the position of the relay in `relays`, from 0.
+    /// Events of the relays, each with the relay's position in `relays`, from 0.
     pub events: Vec<(usize, Event)>,
     pub latency: Duration,
     pub route: Route,
@@ -94,9 +96,9 @@ impl Bench {
         bench
     }
 
-    /// Creates a bench with all relays of `mission`. `settings` returns the settings of the relay with an index.
+    /// Creates a test bench with all relays of `mission`. `settings` returns the settings of a relay by its index.
     ///
-    /// The seed of a relay's random numbers is its index.
+    /// The random seed of a relay is its index.
     ///
     /// # Panics
     /// A relay rejects its settings.
@@ -121,15 +123,15 @@ impl Bench {
 
     /// Returns the ground station at `end`; the first call creates it.
     ///
-    /// `base` is the mission loaded into it before flight, `auth` authenticates its frames.
+    /// `base` is its mission loaded before flight; `auth` authenticates its frames.
     pub fn ground(&mut self, base: &Mission, end: Side, auth: Auth) -> &mut Ground {
         let ground = || Box::new(Ground::new(base, end, NETWORK, Wiring::Pair, auth));
         self.grounds[end as usize].get_or_insert_with(ground)
     }
 
-    /// Processes the next event of the bench. It delivers an arrived frame, or advances the time to the next event.
+    /// Delivers an arrived frame, or advances the time to the next event. Then all nodes handle timers and send.
     ///
-    /// Then all nodes handle their timers and send. Returns false if nothing is left to do up to `until`.
+    /// Returns false if nothing is left to do up to `until`.
     pub fn step(&mut self, until: Instant) -> bool {
         let arrived = self
             .flying
@@ -173,7 +175,7 @@ impl Bench {
         self.run(self.now + span);
     }
 
-    /// Runs the bench until `done` returns true, and returns the virtual time taken. `None` if `limit` passes first.
+    /// Runs the bench until `done` returns true. Returns the virtual time taken; `None` after `limit`.
     pub fn run_until(&mut self, limit: Duration, done: impl Fn(&Self) -> bool) -> Option<Duration> {
         let begun = self.now;
         while !done(self) {
@@ -196,7 +198,7 @@ impl Bench {
         }
     }
 
-    /// Lets all relays and ground stations handle their timers, and puts their pending frames in transit.
+    /// Lets all nodes handle their timers, and puts their frames in transit.
     fn drain(&mut self) {
         let (now, last) = (self.now, self.relays.len() + 1);
         for at in 0..self.relays.len() {
@@ -240,7 +242,7 @@ impl Bench {
         });
     }
 
-    /// Returns true if every relay has its agreed position and all are in the same view (membership).
+    /// Returns true if all relays have agreed positions and the same view (membership of the chain).
     pub fn holds(&self) -> bool {
         let view = self.relays[0].view();
         let holds = |relay: &Relay| relay.phase() == Phase::Holding && relay.view() == view;
@@ -251,15 +253,15 @@ impl Bench {
         self.relays.iter().map(Relay::setpoint).collect()
     }
 
-    /// Returns true if the relay at position `at` of `relays`, from 0, has raised `event`.
+    /// Returns true if the relay at `at` in `relays`, from 0, has raised `event`.
     pub fn has_raised(&self, at: usize, event: Event) -> bool {
         self.events.contains(&(at, event))
     }
 }
 
-/// Routes frames to neighbours only: by wires, or by a radio channel with a range of one relay.
+/// Routes frames to neighbours only: by wires, or by a radio with a range of one relay.
 ///
-/// Returns the receiver's port; `None` if relay `to` is not a neighbour of `from` at that port.
+/// Returns the receiver's port; `None` if `to` is not a neighbour of `from` at that port.
 pub fn between_neighbours(from: usize, port: Port, to: usize) -> Option<Port> {
     match port {
         Port::Shared => (from.abs_diff(to) == 1).then_some(port),
@@ -283,7 +285,7 @@ pub fn events(relay: &mut Relay) -> impl Iterator<Item = Event> {
     std::iter::from_fn(|| relay.poll_event())
 }
 
-/// Returns the positions on which the relays of `mission` agree over links without faults.
+/// Returns the positions that the relays of `mission` agree on over faultless links.
 ///
 /// # Panics
 /// They do not agree within five seconds of virtual time.

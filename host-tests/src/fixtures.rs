@@ -6,12 +6,12 @@ use uav_relay_oracle::reference::Link;
 use uav_relay_scenario::Scenario;
 use uav_relay_scenario::mission;
 
-/// Network number of the relays in these tests. A relay ignores frames with another network number.
+/// Network number of the relays in these tests.
 pub const NETWORK: u16 = 7;
 
-/// Returns the mission of the paper's chain with `relays` relays, without a minimum separation.
+/// Returns the mission of the paper's chain with `relays` relays and no minimum separation.
 ///
-/// Its path losses are as in the f64 reference model.
+/// Its path losses are those of the f64 reference model.
 ///
 /// # Panics
 /// No mission has this number of relays.
@@ -30,7 +30,7 @@ pub fn paper(relays: u16) -> MissionConfig {
     *mission.config()
 }
 
-/// Creates relay `index` of `mission`, started at time 0; the index is also its random seed.
+/// Creates relay `index` of `mission`, started at time 0. The index is also its random seed.
 ///
 /// # Panics
 /// The mission has no such relay, or the relay rejects the settings.
@@ -42,17 +42,17 @@ pub fn relay(mission: Mission, index: u16, settings: Settings) -> Relay {
     Relay::new(mission, identity, settings, u32::from(index), Instant::ZERO).unwrap()
 }
 
-/// Returns the stored record of a relay that has agreed on view `number`, proposed by relay 1.
+/// Returns the stored votes of a relay that has agreed on view `number`, proposed by relay 1.
 ///
-/// The view (membership of the chain) has `relays` relays. `member` is true if the relay with this record is one of them. `base` is the
-/// digest of the mission loaded before flight.
+/// The view (membership of the chain) has `relays` relays; `member` is true if this relay is one of them. `base` is
+/// the digest of the mission loaded before flight.
 ///
 /// # Panics
 /// No relay can have such a record.
 pub fn voted(base: u16, relays: u16, number: u32, member: bool) -> ViewRecord {
     let id = (number << 10 | 1).to_le_bytes();
     let relays = relays.to_le_bytes();
-    // Promised and nothing accepted since: in the format no proposal, and the agreed view.
+    // Promised, but nothing accepted since: no proposal, and the agreed view.
     let mut bytes = [&[1][..], &base.to_le_bytes(), &id, &relays].concat();
     bytes.push(u8::from(member));
     bytes.extend([&id[..], &[0], &[0; 4], &id, &relays].concat());

@@ -1,4 +1,4 @@
-//! Common flights of tests: eight drones in a row, heavy faults, and settings for the end of a run.
+//! Simulated flights shared by tests: eight drones in a row, heavy faults, and ends of a run.
 
 use rand::RngExt;
 use uav_relay::{Band, Duration, GuardConfig, Instant, Mission, MissionConfig, Profile};
@@ -16,9 +16,9 @@ pub const fn seconds(seconds: u64) -> Instant {
     Instant::from_millis(1_000 * seconds)
 }
 
-/// Makes a simulated run continue at least until `at`, even if the chain has settled before then.
+/// Makes a simulated run continue at least until `at`, even if the chain has settled.
 pub fn go_on_until(setup: &mut Setup, at: Instant) {
-    // A partition behind the last relay separates no relays, but keeps the run going.
+    // A partition behind the last relay separates no relays, but prolongs the run.
     setup.partitions.push(Partition {
         after: setup.mission.relays(),
         from: at,
@@ -26,13 +26,13 @@ pub fn go_on_until(setup: &mut Setup, at: Instant) {
     });
 }
 
-/// Makes a simulated run end exactly at `at`, even if the chain has settled before then.
+/// Makes a simulated run end exactly at `at`, even if the chain has settled.
 pub fn end_at(setup: &mut Setup, at: Instant) {
     go_on_until(setup, at);
     setup.deadline = at;
 }
 
-/// Runs `setup` and checks that at the end all relays have agreed positions for the same target SIR.
+/// Runs `setup` and checks that all relays end with agreed positions for one target SIR.
 ///
 /// # Panics
 /// The chain does not settle, or a setpoint was outside its limits.
@@ -45,8 +45,8 @@ pub fn settle(setup: Setup) -> Outcome {
 
 /// Runs `setup` without faults and with [`Faults::BAD_DAY`], and checks that both runs end alike.
 ///
-/// The faults must change neither the kind of ending nor a bit of the positions. Returns the run with faults, whose
-/// random numbers come from `seed`.
+/// The kind of ending and the bits of the positions must be the same. Returns the run with faults, with random
+/// numbers from `seed`.
 ///
 /// # Panics
 /// The runs differ, a setpoint was outside its limits, or a round of Algorithm 2 has lowered the chain's SIR.
@@ -74,7 +74,7 @@ pub fn eight_apart(separation_m: f32) -> Mission {
     Mission::try_new(config).unwrap()
 }
 
-/// Returns random start positions, m, of eight drones, rising in x and at least `gap_m` apart.
+/// Returns random start positions of eight drones, m, in ascending x and at least `gap_m` apart.
 pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
     let mut x_m = 0.0;
     let start = (0..8).map(|_| {
@@ -86,7 +86,7 @@ pub fn in_a_row(rng: &mut impl RngExt, gap_m: f64) -> Vec<Point> {
 
 /// Returns eight drones that start in a row at least `gap_m` apart, with random speeds.
 ///
-/// The positions that the drones report have no errors.
+/// Their reported positions have no errors.
 pub fn exact(rng: &mut impl RngExt, gap_m: f64) -> FlightSpec {
     let start = in_a_row(rng, gap_m);
     let speed_mps = (0..8).map(|_| rng.random_range(0.5..15.0)).collect();
@@ -98,7 +98,7 @@ pub const SEPARATION_M: f32 = 5.0;
 
 /// Smallest distance of two drones that the tests permit, m.
 ///
-/// It is 2 mm below the separation, because positions are f32 of up to 1 km.
+/// It is 2 mm less than the separation, because of the rounding of f32 positions up to 1 km.
 pub const APART_M: f64 = SEPARATION_M as f64 - 2e-3;
 
 /// Adds a collision guard to `setup`, and eight drones that start at least the separation apart.
@@ -108,8 +108,7 @@ pub fn guard(setup: &mut Setup, rng: &mut impl RngExt) {
     setup.flight = Some(exact(rng, f64::from(SEPARATION_M) + 0.01));
 }
 
-/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else an empty list. Without a
-/// profile of its own, a relay has the mission's common profile.
+/// Returns random profiles (power, altitude) of eight relays in 30 % of the calls, else none.
 pub fn own_profiles(rng: &mut impl RngExt) -> Vec<(u16, Profile)> {
     if !rng.random_bool(0.3) {
         return Vec::new();
@@ -136,7 +135,7 @@ pub fn bad_day(rng: &mut impl RngExt) -> Faults {
     }
 }
 
-/// Returns `config` as a mission with the altitude and lateral limits of `corridor`; `None` if invalid.
+/// Returns `config` as a mission with the altitude and lateral ranges of `corridor`, if valid.
 pub fn with_room(config: &MissionConfig, corridor: Corridor) -> Option<Mission> {
     let config = MissionConfig {
         band: Band {

@@ -1,4 +1,4 @@
-//! Random schedules of faults for simulated chains, and the ledger that judges their results.
+//! Random schedules of faults for simulated chains, and checks of the results.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -7,12 +7,12 @@ use uav_relay_sim::simulator::chain::run;
 use uav_relay_sim::simulator::outcome::{Ending, Outcome, RelayEnd};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Time limit from the last event of a schedule to a settled chain, while frames are lost.
+/// Time limit from the last event of a schedule until the chain has settled, with lost frames.
 ///
 /// It is twenty times `dead_after`, the silence after which a relay counts as lost.
 pub const RECOVERY: Duration = Duration::from_millis(300_000);
 
-/// Returns the environment variable `name` as a number, or `usual` if it is not set.
+/// Returns the environment variable `name` as a number; `usual` if it is not set.
 ///
 /// # Panics
 /// The variable is not a number.
@@ -22,8 +22,8 @@ pub fn number(name: &str, usual: u64) -> u64 {
 
 /// Adds losses of up to three random relays to `setup`. `at` returns the time of each loss, ms.
 ///
-/// A lost relay is switched on again later: always if `all_return` is true, otherwise with a probability of one half. The run may last
-/// until [`RECOVERY`] after the last event.
+/// A lost relay returns with probability one half, or always if `all_return` is true. The run may last until
+/// [`RECOVERY`] after the last event.
 pub fn lose_relays(
     setup: &mut Setup,
     rng: &mut ChaCha8Rng,
@@ -36,7 +36,7 @@ pub fn lose_relays(
         let at = at(setup, rng);
         setup.kills.push((relay, Instant::from_millis(at)));
         if all_return || rng.random_bool(0.5) {
-            // Return before the loss is noticed, or after.
+            // The relay returns before its loss is noticed, or after.
             let soon = rng.random_bool(0.5);
             let off = rng.random_range(1..if soon { 2_000 } else { 60_000 });
             setup.boots.push((relay, Instant::from_millis(at + off)));
@@ -47,7 +47,7 @@ pub fn lose_relays(
     setup.deadline = last.unwrap_or(Instant::ZERO) + RECOVERY;
 }
 
-/// Runs `count` random schedules, with the seeds from `first`, and prints their recovery times.
+/// Runs `count` random schedules with seeds from `first` on, and prints their recovery times.
 ///
 /// # Panics
 /// `judge` has found a fault in one of the runs.
@@ -97,7 +97,7 @@ pub fn left(outcome: &Outcome) -> Vec<u16> {
 
 /// Runs a chain of only the surviving relays `left` of `setup`, without faults; returns its result.
 ///
-/// `config` is the mission of the chain.
+/// `config` is the chain's mission.
 ///
 /// # Panics
 /// The chain does not settle.
@@ -119,10 +119,9 @@ pub fn undisturbed(setup: &Setup, left: &[u16], config: MissionConfig) -> Outcom
     outcome
 }
 
-/// Checks that the surviving relays `left` end with the setpoints of an undisturbed chain. The undisturbed chain
-/// consists of only these relays, without faults. Setpoints and target SIR must be bit-identical.
+/// Checks that the surviving relays `left` end as a chain of only these relays without faults.
 ///
-/// `version` and `config` are those of the mission that the relays must have at the end.
+/// Setpoints and target SIR must be bit-identical. `version` and `config` are those of the final mission.
 ///
 /// # Errors
 /// The first difference, a relay with another mission version, or setpoints outside their limits.

@@ -5,11 +5,11 @@
 //! | [`mod@bench`] | relays and ground stations in virtual time, whose frames a test can see, delay, change and drop |
 //! | [`fixtures`], [`flights`] | missions, relays, and simulated flights that several tests use |
 //! | [`ledger`] | random schedules of faults for simulated chains, and the judgement of their results |
-//! | [`placing`] | random scenes of placements, and chains that place themselves |
+//! | [`placing`] | comparison of the crate's positions with the f64 reference |
 //! | [`firmware`] | firmware images, their flash, and emulated drones |
 //! | [`python`] | independent peers in Python |
 
-// Empty on a microcontroller, where no tests run, for `cargo check --target thumbv7em-none-eabihf`.
+// Empty on a microcontroller, where no tests run; for `cargo check --target thumbv7em-none-eabihf`.
 #![cfg_attr(target_os = "none", no_std)]
 
 #[cfg(not(target_os = "none"))]

@@ -1,4 +1,4 @@
-//! Placement by the crate compared with the f64 reference, for chains without and with noise.
+//! Comparison of the crate's positions with the f64 reference, without and with noise.
 
 use chacha20::ChaCha8Rng;
 use rand::{Rng, RngExt, SeedableRng};
@@ -13,25 +13,25 @@ use uav_relay_oracle::reference::joint::Place;
 use uav_relay_sim::report::{hop_sirs, place};
 use uav_relay_sim::simulator::outcome::Outcome;
 
-/// Relative spacing of f32 numbers: the machine epsilon, 2^-23.
+/// Machine epsilon of f32, 2^-23.
 pub const SINGLE: f64 = f32::EPSILON as f64;
 
-/// Returns the profile of relay `index`: its entry in `own` if any, else the common profile.
+/// Returns the profile of relay `index`: its entry in `own`, else the common profile.
 pub fn profile_of(mission: &Mission, own: &[(u16, Profile)], index: u16) -> Profile {
     own.iter()
         .find(|(of, _)| *of == index)
         .map_or(mission.config().common, |(_, profile)| *profile)
 }
 
-/// Returns the agreement that the chain's leader predicts; `None` if the chain can meet no target SIR.
+/// Returns the agreement that the leader predicts; `None` if no target SIR can be met.
 ///
-/// `own` has the relays whose profile differs from the common profile.
+/// `own` has the profiles that differ from the common one.
 pub fn solve(mission: &Mission, own: &[(u16, Profile)]) -> Option<Agreed> {
     let of = |index| profile_of(mission, own, index);
     plan::solve(mission, Schedule::Bracketed, of).ok()
 }
 
-/// Returns the relays' positions for the target SIR `target`, linear.
+/// Returns the relays' positions for the target SIR `target` (linear).
 pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Placement> {
     let of = |index| profile_of(mission, own, index);
     (1..=mission.relays())
@@ -39,7 +39,7 @@ pub fn places(mission: &Mission, own: &[(u16, Profile)], target: f32) -> Vec<Pla
         .collect()
 }
 
-/// Returns the x of each position, its distance from Tx along the line to Rx, m.
+/// Returns the distance of each position from Tx along the line to Rx, m.
 pub fn xs(places: &[Placement]) -> Vec<f64> {
     places.iter().map(|place| f64::from(place.x_m)).collect()
 }
@@ -50,7 +50,7 @@ pub fn setpoints(outcome: &Outcome) -> Vec<Placement> {
     relays.map(|relay| relay.setpoint.unwrap()).collect()
 }
 
-/// Converts a position of the crate, in f32, to a position of the f64 reference model.
+/// Converts a position of the crate (f32) to one of the reference (f64).
 pub fn reference(at: Placement) -> Place {
     Place {
         x_m: f64::from(at.x_m),
@@ -59,9 +59,9 @@ pub fn reference(at: Placement) -> Place {
     }
 }
 
-/// Checks the crate's hop SIRs on 4 000 random chains against the reference, to 1e-6 relative.
+/// Compares the SIRs of the hops of 4 000 random chains with the reference, to 1e-6 relative.
 ///
-/// `draw` draws a chain of the reference model. This function then draws x of its relays, in rising order.
+/// `draw` draws a chain. This function then draws its relays' x, in ascending order.
 pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Link) {
     let mut worst = 0.0_f64;
     for _ in 0..4_000 {
@@ -93,21 +93,22 @@ pub fn hop_sirs_agree(rng: &mut ChaCha8Rng, draw: impl Fn(&mut ChaCha8Rng) -> Li
     assert!(worst < 1e-6, "{worst}");
 }
 
-/// Solution of a chain by the crate, compared with the optimum of the reference.
+/// Solution of a chain by the crate, compared with the reference optimum.
 #[derive(Debug)]
 pub struct Solved {
     /// Distances of the relays from Tx along the line to Rx, m.
     pub x: Vec<f64>,
-    /// Relative shortfall of the SIR from the reference optimum: 1 - SIR / optimum.
+    /// Relative difference of the SIR from the reference optimum: 1 - SIR / optimum.
     pub short: f64,
-    /// Number of passes (messages along the chain) that the solution needs.
+    /// Number of sweeps (messages along the chain) for the solution.
     pub sweeps: u32,
 }
 
-/// Checks that the crate's solution is at most `allowed` (relative) below the optimum, never above.
+/// Checks that the crate's solution is at most `allowed` (relative) below the optimum, and never above.
 ///
-/// All relays of the chain `link` must have the same altitude. Then the crate finds the optimum, because each relay goes as far as the
-/// target SIR allows. If no chain has an SIR above 0, checks that the crate finds no solution, and returns `None`.
+/// All relays of the chain `link` must have the same altitude. Then the crate finds the optimum, because each relay
+/// goes as far as the target SIR permits. Without any chain of an SIR above 0 the crate must find no solution; then
+/// `None` is returned.
 pub fn optimum_is_found(
     link: &Link,
     (mission, own): &(Mission, Vec<(u16, Profile)>),
@@ -133,21 +134,21 @@ pub fn optimum_is_found(
     })
 }
 
-/// Counters over chains whose relays differ in power and altitude.
+/// Results for chains whose relays differ in power and altitude.
 #[derive(Debug, Default)]
 pub struct Mixed {
-    /// Number of chains for which the solver found an agreement.
+    /// Number of chains with an agreement.
     pub solved: u32,
-    /// Number of chains whose SIR is at most 2e-4 (relative) below the optimum of the reference.
+    /// Number of chains with an SIR at most 2e-4 (relative) below the reference optimum.
     pub best: u32,
-    /// Largest number of passes (messages along the chain) that one of the chains needed.
+    /// Largest number of sweeps (messages along the chain) for one chain.
     pub sweeps: u32,
 }
 
 impl Mixed {
-    /// Solves a chain of different relays and counts it. Checks that the chain meets its agreed target SIR.
+    /// Solves a chain of different relays, and counts the result.
     ///
-    /// The SIR must not exceed the optimum.
+    /// Its SIR must be at least the agreed target, and at most the optimum.
     pub fn meet_what_they_agree_on(&mut self, link: &Link) {
         let Some((mission, own)) = of_link(link, 1e-4) else {
             return;
@@ -174,16 +175,16 @@ impl Mixed {
     }
 }
 
-/// Hop of a random chain, with the position of the hop's sender.
+/// Hop of a random chain.
 #[derive(Debug)]
 pub struct DrawnHop {
-    /// Random chain of 1 to 4 relays that contains the tested hop. Its numbers are rounded to f32, as in the relays.
+    /// Random chain of 1 to 4 relays with the tested hop. Its numbers are rounded to f32, as in relays.
     pub link: Link,
-    /// Tested hop as a value of the crate. The reference computes the same hop from `link`.
+    /// Tested hop in the crate; the reference computes it from `link`.
     pub hop: Hop,
-    /// Index of the relay at the receiving end of the hop, from 1.
+    /// Index of the receiving relay, from 1.
     pub index: u16,
-    /// Distance of the hop's sender from Tx along the line to Rx, m.
+    /// Distance of the sender from Tx along the line to Rx, m.
     pub from: f32,
     /// SIR of the hop without noise, linear, if sender and interferer are equally far from the receiver.
     pub gain: f64,
@@ -225,24 +226,23 @@ pub fn drawn_hop(rng: &mut impl Rng, noisy: bool) -> Option<DrawnHop> {
     })
 }
 
-/// Counters of hops for which the receiver's farthest x that meets a target SIR was tested.
-///
-/// The crate's x is compared with the x of the reference.
+/// Results for the farthest x of a receiver that meets a target SIR, compared with the reference.
 #[derive(Debug, Default)]
 pub struct Reaches {
-    /// Number of hops whose farthest x is short of Rx, because of the target SIR.
+    /// Number of hops whose farthest x is limited by the target SIR, and not by Rx.
     pub inside: u32,
-    /// Number of hops that meet the target SIR at their farthest x, but miss it at some smaller x. The interferer is between these
-    /// positions.
+    /// Number of hops that meet the target SIR at their farthest x, but not at some smaller x.
+    ///
+    /// The interferer is between these positions.
     pub leaps: u32,
-    /// Number of hops that meet their target SIR at no position of the receiver.
+    /// Number of hops that meet their target SIR nowhere.
     pub infeasible: u32,
 }
 
-/// Checks the farthest x of the receiver at which a random hop meets a target SIR, for `count` hops.
+/// Compares the farthest x of a receiver that meets a target SIR with the reference, for `count` hops.
 ///
-/// `target` draws the target of a hop. The crate's x must lie between the exact x for a target 1e-6 (relative) higher and for one 1e-6
-/// lower, with a tolerance of two f32 steps.
+/// `target` draws a target. The crate's x must be between the exact ones for targets 1e-6 (relative) higher and
+/// lower, within two f32 steps.
 pub fn reaches_agree(
     rng: &mut ChaCha8Rng,
     count: usize,
@@ -260,7 +260,7 @@ pub fn reaches_agree(
         let (link, k, from) = (&of.link, usize::from(of.index), f64::from(of.from));
         let exact = |by: f64| link.farthest(k, from, f64::from(target) * by);
         let (low, high) = (exact(1.0 - 1e-6), exact(1.0 + 1e-6));
-        // Each relay behind keeps a millionth of the distance, which is also the shortest hop.
+        // The crate keeps a millionth of the distance for each relay behind, and as the shortest hop.
         let spare = link.distance_m * 1.1e-6;
         let room = spare * f64::from(of.relays - of.index + 1);
         let Some(place) = of.hop.reach(target, of.from).map(f64::from) else {
@@ -282,7 +282,7 @@ pub fn reaches_agree(
         );
         if place < link.distance_m - room {
             seen.inside += 1;
-            // Positions in between that miss the target: the reach is beyond the interferer.
+            // If a position in between misses the target, the farthest x is beyond the interferer.
             seen.leaps += u32::from((1..40).any(|part| {
                 let x = from + f64::from(part) / 40.0 * (place - from);
                 link.sir_relay(k, from, x).unwrap() < f64::from(target) * 0.999
@@ -293,7 +293,7 @@ pub fn reaches_agree(
     seen
 }
 
-/// Returns a random generator, seeded with the environment variable `SEED`, or with `usual`.
+/// Returns a random generator with the seed in the environment variable `SEED`, or `usual`.
 pub fn generator(usual: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(random::seed(usual))
 }

@@ -1,4 +1,4 @@
-//! Python interpreter for tests against independent peers.
+//! Python interpreter for tests with independent peers.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ const PACKAGES: &str = include_str!("../python.txt");
 
 /// Returns the Python interpreter of a virtual environment with the packages of `python.txt`.
 ///
-/// The first call installs the environment under `target/`.
+/// The first call installs it under `target/`.
 ///
 /// # Panics
 /// There is no Python, or no package index.
@@ -18,7 +18,7 @@ pub fn interpreter() -> PathBuf {
     let target = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target");
     std::fs::create_dir_all(&target).unwrap();
     let home = target.join("python");
-    // Tests run in several processes; one installs for all.
+    // Tests run in several processes, and one of them installs for all.
     let lock = std::fs::File::create(target.join("python.lock")).unwrap();
     flock(&lock, FlockOperation::LockExclusive).unwrap();
     let (python, done) = (home.join("bin/python"), home.join("installed.txt"));

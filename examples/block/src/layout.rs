@@ -1,4 +1,4 @@
-//! Bytes of a block as a structure, and the checks of its groups of numbers.
+//! Bytes of a block as a structure, and range checks of its numbers.
 
 use uav_relay::{
     Adjust, Band, Duration, Field, FieldPoint, Interference, Interferer, Listen, Local, Measure,
@@ -24,15 +24,16 @@ pub(super) struct Layout {
     pub(super) distance_m: F32,
     pub(super) min_separation_m: F32,
     pub(super) tx_power_w: F32,
-    /// Altitude (m) and transmit power (W) of the relays without own values.
+    /// Altitude (m) and transmit power (W) of a relay without its own values.
     pub(super) common: [F32; 2],
     pub(super) own: [F32; 2],
     /// Interferer's power (W), x and y (m). All are 0 if the interferer is unknown, or if the block gives the
     /// interference as a distribution along x.
     pub(super) interferer: [F32; 3],
     pub(super) tolerance: F32,
-    /// Carrier frequency (Hz), excess losses with and without line of sight (factors), and a weight. The weight, 0 to
-    /// 1, is the share of the line-of-sight loss in the path loss between drone and ground.
+    /// Channel: carrier frequency (Hz), two excess losses (factors), and the line-of-sight weight (0 to 1).
+    ///
+    /// The excess losses are with and without line of sight.
     pub(super) channel: [F64; 4],
     pub(super) band: [F32; 2],
     pub(super) lateral: [F32; 2],
@@ -119,8 +120,7 @@ impl Layout {
         }
     }
 
-    /// Returns the surveyed positions of Tx and Rx, and the speed limit of the drone. `None` if all are 0: then there
-    /// is no autopilot.
+    /// Returns the Tx and Rx positions and the drone's speed limit. `None` if all are 0: there is no autopilot.
     pub(super) fn sites(&self) -> Result<Option<Sites>, ConfigError> {
         let ends = self.ends.map(|site| site.map(I32::get));
         let speed_m_s = self.speed_m_s.get();
@@ -135,10 +135,10 @@ impl Layout {
         }
     }
 
-    /// Returns the interference that the block gives. If the block has points of a distribution along x, the result is
-    /// this distribution, and the points are stored in `storage`. Otherwise the result is the block's interferer. If
-    /// all numbers of the interferer are 0 and `listens` is true, the result is `Unknown`: the relays estimate the
-    /// interferer.
+    /// Returns the interference in the block.
+    ///
+    /// With points along x, these are copied to `storage` and used. Otherwise the interferer is used. If its numbers
+    /// are all 0 and `listens` is true, the interference is `Unknown`: the relays estimate it.
     pub(super) fn interference(
         &self,
         listens: bool,

@@ -1,7 +1,7 @@
-//! Configuration block of a drone, written once and separately from the image: index, mission and keys.
+//! Configuration block of a drone: index, mission and keys. It is written once, separately from the firmware.
 //!
-//! The block has a flash sector of its own, which firmware updates do not touch: [`ADDRESS`] on an STM32F405. `cargo provision`
-//! writes it from a scenario. All numbers are little-endian, floats IEEE 754:
+//! The block has a flash sector of its own, which firmware updates do not touch: [`ADDRESS`] on an STM32F405. `cargo
+//! provision` writes it from a scenario. All numbers are little-endian, floats IEEE 754:
 //!
 //! | byte | type | content |
 //! | --- | --- | --- |
@@ -20,7 +20,7 @@
 //! | 32 | f32 | common power of the relays, W |
 //! | 36 | f32 | altitude of this relay, m |
 //! | 40 | f32 | power of this relay, W |
-//! | 44 | f32 | power of the interferer, W; 0 with a field, and for relays that listen without an initial guess |
+//! | 44 | f32 | power of the interferer, W; 0 with interference points, or if relays listen without an initial guess |
 //! | 48 | f32 | x of the interferer, m; 0 likewise |
 //! | 52 | f32 | y of the interferer, m; 0 likewise |
 //! | 56 | f32 | tolerance |
@@ -32,12 +32,12 @@
 //! | 96 | f32 | highest altitude of the band, m |
 //! | 100 | f32 | left limit of the lateral range, y in m: 0 or less |
 //! | 104 | f32 | right limit of the lateral range, y in m: 0 or more |
-//! | 108 | f32 | adjust: largest altitude change of a relay in one turn, m; 0 with another method |
+//! | 108 | f32 | adjust: largest altitude change of a relay in one move, m; 0 with another method |
 //! | 112 | u16 | adjust: maximum number of rounds, 1 to 65535; 0 with another method |
-//! | 114 | u16 | points of the field, 1 to [`MAX_POINTS`]; 0 without a field |
+//! | 114 | u16 | points of the interference along x, 1 to [`MAX_POINTS`]; 0 without |
 //! | 116 | f32 | largest measurable interference, W; 0 without samples |
 //! | 120 | u32 | samples at each position; 0 without measurement |
-//! | 124 + 8 k | f32 | x of point k of the field, counted from 0, m; 0 after the last point |
+//! | 124 + 8 k | f32 | x of interference point k, counted from 0, m; 0 after the last point |
 //! | 128 + 8 k | f32 | Upsilon of point k, 1/W; 0 after the last point |
 //! | 252 | u32 | smallest epoch for signing, 1 to 4294967294; 0 without a key |
 //! | 256 | 32 bytes | the network's signing key; all 0 without one |
@@ -47,13 +47,13 @@
 //! | 300 | i32 | latitude of the receiver, 1e-7 degrees |
 //! | 304 | i32 | longitude of the receiver, 1e-7 degrees |
 //! | 308 | i32 | height of the ground at the receiver above the mean sea level, mm |
-//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20; 0 means 5 m/s, and is required without sites |
-//! | 316 | 32 bytes | the autopilot's MAVLink signing key; all 0 without one, and without sites |
+//! | 312 | f32 | maximum speed of the drone, m/s: 0.1 to 20, or 0 for 5 m/s; must be 0 without Tx and Rx positions |
+//! | 316 | 32 bytes | the autopilot's MAVLink signing key; all 0 without one, and without Tx and Rx positions |
 //! | 348 | f32 | noise power at every receiver, W: 0 to 1 |
-//! | 352 | u64 | sensing period of the leader after an agreement, us; this and the next two are 0 if the relays do not listen |
+//! | 352 | u64 | time from an agreement to the next sensing, us; this and the next two are 0 if relays do not listen |
 //! | 360 | u64 | half-life of a measurement's weight, us |
 //! | 368 | f32 | relative error of one measurement, 1e-3 to 1 |
-//! | 372 | u32 | silence until a neighbour is probed, ms, at most 1200000; it is lost after three times as long. 0 means 5000 |
+//! | 372 | u32 | silence until a neighbour is probed, ms, to 1200000; it is lost after three times this. 0 means 5000 |
 //! | 376 | f32 | SIR needed on the way back from Rx to Tx, relative to that on the way there: 0 (one direction) to 1 |
 //! | 380 | f32 | power of the receiver on the way back, W; without effect if the number before is 0 |
 //! | 384 | f32 | SNR gap of fitted slots, linear: 1 to 1000, with method 1 and without sensing; 0 for equal slots |
@@ -90,10 +90,10 @@ pub use write::write;
 /// Address of the configuration block: the last flash sector of an STM32F405.
 pub const ADDRESS: u32 = 0x080E_0000;
 
-/// Bit rate of every port of the firmware, bit/s. The configuration block cannot change it.
+/// Bit rate of every port of the firmware, bit/s. It is fixed.
 pub const BAUD: u32 = 115_200;
 
-/// First bytes of every configuration block, which identify it.
+/// First bytes of every configuration block.
 pub const MAGIC: [u8; 4] = *b"UAVR";
 
 /// Version of the configuration block's format.
@@ -102,13 +102,13 @@ pub const VERSION: u16 = 11;
 /// Length of a configuration block, bytes.
 pub const LEN: usize = 392;
 
-/// Maximum number of points of a configuration block for the distribution of the interference along x.
+/// Maximum number of interference points in a configuration block.
 pub const MAX_POINTS: usize = 16;
 
-/// Number of bytes that the block's CRC covers: all except the CRC itself.
+/// Number of bytes that the CRC covers: all except the CRC itself.
 const CHECKED: usize = LEN - 4;
 
-/// Maximum value of `probe_after_ms` in a block, ms. After this silence a relay requests a heartbeat from a neighbour.
+/// Maximum of `probe_after_ms`, ms. A neighbour that is silent for this time is asked for a heartbeat.
 pub const MAX_PROBE_AFTER_MS: u32 = 1_200_000;
 
 /// Value of the block's length field: [`LEN`] as a `u16`.
@@ -117,24 +117,23 @@ const LEN_FIELD: u16 = 392;
 /// Configuration block as stored in flash.
 pub type Block = [u8; LEN];
 
-/// Storage for the points of a mission's distribution of the interference along x.
+/// Storage for the interference points of a mission.
 pub type FieldStorage = [FieldPoint; MAX_POINTS];
 
-/// Initial content of the storage for the points of a mission's distribution of interference along x.
+/// Initial content of a [`FieldStorage`].
 pub const EMPTY: FieldStorage = [FieldPoint {
     x_m: 0.0,
     upsilon_per_w: 0.0,
 }; MAX_POINTS];
 
-/// Reads and checks a configuration block of arbitrary bytes. If it gives the interference as a distribution along x,
-/// its points are stored in `storage`.
+/// Reads and checks a configuration block. The interference points, if any, are copied to `storage`.
 ///
-/// A relay accepts every returned configuration, with two exceptions: it rejects the joint method for more than 100
-/// relays, and a configuration that needs a feature its build lacks.
+/// The bytes may be arbitrary. A relay accepts every returned configuration, with two exceptions. It rejects the
+/// joint method for more than 100 relays, and a feature that its build lacks.
 ///
 /// # Errors
-/// [`ConfigError`] names the fault, and for a number out of range which one.
-#[inline(never)] // its stack frame is released before the relay needs the space
+/// [`ConfigError`] names the fault, or the number that is out of range.
+#[inline(never)] // frees its stack frame before the relay needs the space
 pub fn read(block: &Block, storage: &'static mut FieldStorage) -> Result<Config, ConfigError> {
     if block.iter().all(|&byte| byte == 0xFF) || block.iter().all(|&byte| byte == 0) {
         return Err(ConfigError::Blank);
@@ -237,7 +236,7 @@ pub fn secret(block: &Block) -> Result<Option<Secret>, ConfigError> {
     }
 }
 
-/// Returns the autopilot's signing key in a block that [`read`] has accepted; `None` without a key.
+/// Returns the autopilot's signing key of a block that [`read`] has accepted; `None` without a key.
 pub fn autopilot_key(block: &Block) -> Option<[u8; 32]> {
     let raw: &Layout = zerocopy::transmute_ref!(block);
     let key = raw.autopilot_key;

@@ -10,7 +10,7 @@ use uav_relay::{
 
 use super::BAUD;
 
-/// Default silence of a neighbour, ms, after which a heartbeat is requested. It applies if the block's value is 0.
+/// Default of `probe_after_ms`, ms. It applies if the block has 0.
 const DEFAULT_PROBE_AFTER_MS: u64 = 5_000;
 
 /// Settings of one relay, decoded from its configuration block and checked.
@@ -22,25 +22,23 @@ pub struct Config {
     pub mission: Mission,
     /// Altitude and transmit power of this relay.
     pub profile: Profile,
-    /// True if the relay keeps its configured altitude when the method chooses altitudes.
+    /// True if the relay keeps its configured altitude although the method chooses altitudes.
     pub hold_altitude: bool,
-    /// Placement method that the leader of the chain runs.
+    /// Placement method.
     pub method: Method,
-    /// Settings for measuring the interference at the relay, if the block gives its distribution along x. `None` for
-    /// no measurement.
+    /// Settings for measuring the interference; `None` for no measurement.
     pub measure: Option<Measure>,
     /// Settings for estimating an unknown interferer from measurements; `None` if it is not estimated.
     pub listen: Option<Listen>,
-    /// Surveyed positions of Tx and Rx, and speed limit of the drone; `None` without an autopilot.
-    /// `uav_relay::flight::course` checks that the positions form a valid line.
+    /// Tx and Rx positions, and the drone's speed limit; `None` without an autopilot. `uav_relay::flight::course`
+    /// checks them.
     pub sites: Option<Sites>,
-    /// Silence of a neighbour after which a heartbeat is requested from it, ms; 0 for the default, 5 s.
+    /// Silence after which a neighbour is asked for a heartbeat, ms; 0 for the default, 5 s.
     pub probe_after_ms: u32,
 }
 
 impl Config {
-    /// Returns the relay's settings for this configuration. The caller has to add the signing key and the guard
-    /// (collision avoidance).
+    /// Returns the relay's settings, without signing key and guard (collision avoidance).
     pub fn settings(&self, wiring: Wiring) -> Settings {
         let common = self.mission.config().common;
         let preset = match wiring {
@@ -52,7 +50,7 @@ impl Config {
             ms => ms.into(),
         };
         Settings {
-            // A profile equal to the common one may change with an upload.
+            // An upload may change a profile that equals the common one.
             profile: Some(self.profile).filter(|own| self.hold_altitude || *own != common),
             hold_altitude: self.hold_altitude,
             method: self.method,
@@ -64,17 +62,17 @@ impl Config {
     }
 }
 
-/// Surveyed positions of transmitter and receiver, and speed limit of a drone with an autopilot.
+/// Tx and Rx positions, and the speed limit of a drone with an autopilot.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sites {
-    /// Positions of transmitter and receiver: latitude and longitude, 1e-7 degrees, and ground height, mm.
+    /// Tx and Rx: latitude and longitude, 1e-7 degrees, and ground height, mm.
     pub ends: [[i32; 3]; 2],
     /// Maximum speed of the drone, m/s: 0.1 to 20, or 0 for the default, 5 m/s.
     pub speed_m_s: f32,
 }
 
 impl Sites {
-    /// Returns the positions of transmitter and receiver in the library's type.
+    /// Returns the positions in the library's type.
     pub fn on_earth(&self) -> uav_relay::Sites {
         let [tx, rx] = self.ends.map(|[lat_e7, lon_e7, amsl_mm]| Geodetic {
             lat_e7,
@@ -85,23 +83,23 @@ impl Sites {
     }
 }
 
-/// Signing key of the network, and the smallest epoch that the relay may sign with.
+/// Signing key of the network, and the smallest epoch that the relay may use.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Secret {
     /// Signing key of the network, not all 0.
     pub key: [u8; 32],
-    /// Smallest epoch that the relay may sign with, 1 to 4294967294. The epoch is a number that rises at every start.
+    /// Smallest permitted epoch, 1 to 4294967294. The relay raises its epoch at every start.
     pub epoch: u32,
 }
 
 impl core::fmt::Debug for Secret {
-    /// Prints `Secret(..)` instead of the key, which does not belong in logs.
+    /// Prints `Secret(..)`, so that the key is not logged.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str("Secret(..)")
     }
 }
 
-/// Channel parameters as stored in a configuration block. A [`Channel`] does not keep these numbers.
+/// Channel parameters as stored in a configuration block.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ChannelNumbers {
     /// Carrier frequency of the radio channel, Hz.
@@ -115,8 +113,7 @@ pub struct ChannelNumbers {
 }
 
 impl ChannelNumbers {
-    /// Returns the channel with these parameters. A weight of exactly 1 or 0 gives bit-identical [`AirGround::Los`]
-    /// or [`AirGround::Nlos`].
+    /// Returns the channel. A weight of exactly 1 or 0 gives bit-identical [`AirGround::Los`] or [`AirGround::Nlos`].
     ///
     /// # Errors
     /// [`ChannelError`] names the number that is out of range.
@@ -130,7 +127,7 @@ impl ChannelNumbers {
     }
 }
 
-/// Fault because of which a configuration block is rejected.
+/// Reason why a configuration block is rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConfigError {
     /// The configuration block is blank: all bits one, as after an erase, or all zero.
@@ -145,40 +142,35 @@ pub enum ConfigError {
     Index,
     /// The altitude or power of this relay is out of range.
     Profile,
-    /// The flag for keeping this relay's altitude is neither 0 nor 1.
+    /// The altitude flag is neither 0 nor 1.
     Hold,
-    /// The placement method is unknown. Or it is not align although the block gives the interference as a distribution
-    /// along x.
+    /// The placement method is unknown, or not `align` with interference points.
     Method,
     /// The parameters of the method adjust are out of range, or not 0 with another method.
     Adjust,
-    /// The settings for measuring the interference are out of range. Or they give a maximum power but no number of
-    /// samples.
+    /// The measurement settings are out of range, or have a maximum power without a number of samples.
     Measure,
-    /// The settings for estimating an unknown interferer are out of range. Or they are given although the block has the
-    /// interference as a distribution along x.
+    /// The settings for estimating an interferer are out of range, or combined with interference points.
     Listen,
-    /// The block combines three things that exclude each other. They are the joint method, an unknown interferer, and
-    /// traffic from receiver to transmitter.
+    /// The joint method, an unknown interferer and traffic in both directions cannot be combined.
     Reverse,
-    /// The block requests fitted slots, but lacks the joint method or a known interferer. Fitted slots are time slots
-    /// as long as each hop needs.
+    /// Fitted slots (as long as each hop needs) require the joint method and a known interferer.
     Fitted,
-    /// The block has both an interferer and the interference as a distribution along x.
+    /// The block has both an interferer and interference points.
     Interferer,
-    /// The interference's distribution along x has more points than a block can have.
+    /// The block has more interference points than fit.
     Points,
-    /// Bytes after the last point of the interference's distribution along x are not 0.
+    /// Bytes after the last interference point are not 0.
     Unused,
     /// The block has a signing key without an epoch, an epoch without a key, or the epoch 4294967295.
     Secret,
     /// The maximum speed is out of range, or given without the positions of transmitter and receiver.
     Speed,
-    /// The block has a signing key for the autopilot, but no autopilot: it lacks the Tx and Rx positions.
+    /// The block has an autopilot key, but no Tx and Rx positions, so no autopilot.
     AutopilotKey,
-    /// The silence of a neighbour after which a heartbeat is requested exceeds its maximum.
+    /// `probe_after_ms` exceeds its maximum.
     Silence,
-    /// A parameter of the interference's distribution along x is out of range.
+    /// An interference point is out of range.
     Field(FieldError),
     /// A parameter of the channel is out of range.
     Channel(ChannelError),

@@ -7,11 +7,11 @@ use zerocopy::{FromZeros as _, IntoBytes as _};
 use super::layout::Layout;
 use super::{Block, CHECKED, ChannelNumbers, Config, LEN_FIELD, MAGIC, Secret, VERSION, crc};
 
-/// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the parameters of the
-/// mission's channel.
+/// Returns the configuration block of `config`, `secret` and the autopilot's key. `numbers` are the channel
+/// parameters.
 ///
-/// Two configurations are not read back as they were written. The grid search of the method adjust becomes the fine
-/// search. If the interference's distribution along x has more than `MAX_POINTS` points, reading rejects the block.
+/// Two configurations do not read back unchanged. `adjust` with a grid search becomes `adjust` with the fine search.
+/// A block with more than `MAX_POINTS` interference points is rejected.
 pub fn write(
     config: &Config,
     numbers: &ChannelNumbers,

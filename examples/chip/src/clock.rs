@@ -8,8 +8,9 @@
 //! | PLL from the HSI | 168 MHz | 42 MHz | 84 MHz |
 //! | HSI | 16 MHz | 16 MHz | 16 MHz |
 //!
-//! Every wait is bounded. A failed attempt is undone before the next one. The PLL's input is 2 MHz, as RM0090 6.3.2 recommends;
-//! both cores need five flash wait states above 150 MHz at 2.7 to 3.6 V (RM0090 table 10, RM0390 table 5).
+//! Every wait is bounded. A failed attempt is undone before the next one. The input of the PLL is 2 MHz, as RM0090
+//! 6.3.2 recommends. Above 150 MHz at 2.7 to 3.6 V the flash needs five wait states (RM0090 table 10, RM0390 table
+//! 5).
 
 use crate::crystal::{self, Crystal, HSI_HZ};
 use crate::registers::{Register, Registers};
@@ -23,8 +24,7 @@ pub struct ClockHardware {
     pub over_drive: bool,
 }
 
-/// Board with an STM32F405 and a crystal of 8 MHz. With another crystal, or none, the chip runs from its internal
-/// oscillator.
+/// Board with an STM32F405 and a crystal of 8 MHz. With another crystal, or none, it runs from the HSI.
 pub const STM32F405: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -33,7 +33,7 @@ pub const STM32F405: ClockHardware = ClockHardware {
     over_drive: false,
 };
 
-/// Board NUCLEO-F446RE. Its debug probe (ST-LINK) supplies a clock of 8 MHz at the chip's pin OSC_IN.
+/// Board NUCLEO-F446RE: its ST-LINK supplies 8 MHz at the pin OSC_IN.
 pub const NUCLEO_F446RE: ClockHardware = ClockHardware {
     crystal: Some(Crystal {
         hz: 8_000_000,
@@ -90,10 +90,9 @@ const PLL_INPUT_HZ: u32 = 2_000_000;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Pll {
     over_drive: bool,
-    /// Multiplier PLLN of the PLL. The core's frequency is this number times 1 MHz; the PLL's input has 2 MHz.
+    /// Multiplier of the PLL (PLLN): the core's frequency in MHz.
     plln: u32,
-    /// Divisor for the PLL's 48 MHz output (PLLQ), which feeds USB. The output is allowed to be slower, as USB is not
-    /// used.
+    /// Divisor of the PLL's USB output (PLLQ): at most 48 MHz. USB is not used.
     pllq: u32,
 }
 
@@ -117,7 +116,7 @@ const PLL_ON: u32 = 1 << 24;
 /// Bit PLLRDY of the register RCC_CR: PLL ready.
 const PLL_READY: u32 = 1 << 25;
 
-/// Mask of the fields of RCC_PLLCFGR that are set: PLLM, PLLN, PLLP, PLLSRC and PLLQ.
+/// Mask of the PLL settings in RCC_PLLCFGR.
 const PLL_FIELDS: u32 = 0x3F | 0x1FF << 6 | 0b11 << 16 | PLL_FROM_CRYSTAL | 0xF << 24;
 /// Bit PLLSRC of RCC_PLLCFGR: the crystal oscillator is the PLL's input.
 const PLL_FROM_CRYSTAL: u32 = 1 << 22;
@@ -130,9 +129,9 @@ const SWITCH_PLL: u32 = 0b10;
 const SWITCHED: u32 = 0b11 << 2;
 /// Value of the field SWS of RCC_CFGR: PLL.
 const SWITCHED_PLL: u32 = 0b10 << 2;
-/// Mask of the prescalers of core and buses in RCC_CFGR.
+/// Mask of the prescalers in RCC_CFGR.
 const PRESCALERS: u32 = 0xF << 4 | 0b111 << 10 | 0b111 << 13;
-/// Prescaler bits of RCC_CFGR: bus APB1 at a quarter of the core's clock, APB2 at half.
+/// Prescalers in RCC_CFGR: APB1 at a quarter of the core's clock, APB2 at half.
 const APB_BY_4_AND_2: u32 = 0b101 << 10 | 0b100 << 13;
 
 /// Bit PWREN of RCC_APB1ENR: clock of the power controller.
@@ -144,11 +143,9 @@ const SCALE_1: u32 = 1 << 14;
 const SCALE_1_OF_TWO_BITS: u32 = 0b11 << 14;
 /// Bit of PWR_CSR that is set once the voltage scale is reached.
 const SCALE_READY: u32 = 1 << 14;
-/// Bit of the over-drive, at the same place in two registers. In PWR_CR the bit enables the over-drive; in PWR_CSR it
-/// shows that the over-drive is ready.
+/// Over-drive bit: enable in PWR_CR, ready in PWR_CSR.
 const OVER_DRIVE: u32 = 1 << 16;
-/// Bit of the switch to the over-drive, at the same place in two registers. In PWR_CR the bit switches the core to the
-/// over-drive; in PWR_CSR it shows that the over-drive is in use.
+/// Over-drive switch bit: switch in PWR_CR, in use in PWR_CSR.
 const OVER_DRIVE_SWITCH: u32 = 1 << 17;
 
 /// Mask of the flash wait states in the register FLASH_ACR.
@@ -163,12 +160,13 @@ const CACHES: u32 = 0b11 << 9;
 /// Chip ID of an STM32F405 of revision A, whose flash prefetch is defective (ES0182).
 const NO_PREFETCH: u32 = 0x1000_0413;
 
-/// Maximum number of reads of a register while a PLL, a voltage or a clock switch settles. The reads take some 10 ms at
-/// 16 MHz; by the data sheets, the chip needs at most 0.3 ms.
+/// Maximum number of reads while a PLL, voltage or clock switch settles: about 10 ms at 16 MHz. The data sheets give
+/// at most 0.3 ms.
 const POLLS: u32 = 20_000;
 
-/// Sets up the clocks of a board, and returns the frequencies reached. Call it once after a reset, with interrupts
-/// off. It takes at most 0.2 s.
+/// Sets up the clocks of a board, and returns the frequencies reached. Takes at most 0.2 s.
+///
+/// Call it once after a reset, with interrupts off.
 pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     if !back_to_hsi(chip) {
         // An emulator without a clock tree.
@@ -201,8 +199,10 @@ pub fn start(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     Clocks::HSI
 }
 
-/// Returns the frequencies that [`start`] reaches, and leaves the core on the oscillator HSI. Some HALs set up the
-/// clocks themselves and wait for them without a time limit. The result tells such a HAL which clocks work.
+/// Returns the frequencies that [`start`] reaches, and switches back to the HSI.
+///
+/// Some HALs set up the clocks themselves, and wait for them without a limit. Such a HAL can be told to use only
+/// clocks that work.
 pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     let clocks = start(chip, hardware);
     if clocks.pll.is_some() && back_to_hsi(chip) {
@@ -212,7 +212,7 @@ pub fn probe(chip: &mut impl Registers, hardware: &ClockHardware) -> Clocks {
     clocks
 }
 
-/// Sets the flash's wait states and enables its caches; returns true once the wait states apply.
+/// Sets the flash's wait states and enables its caches; returns true on success.
 fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     let prefetch = if chip.read(Register::ChipId) & 0xFFFF_0FFF == NO_PREFETCH {
         0
@@ -227,13 +227,13 @@ fn cache(chip: &mut impl Registers, wait_states: u32) -> bool {
     chip.wait(Register::FlashAccess, LATENCY, wait_states, POLLS)
 }
 
-/// Enables the flash caches, in case the HAL (driver library) has left them off. The wait states do not change.
+/// Enables the flash caches, which a HAL may have left off. The wait states do not change.
 pub fn cache_flash(chip: &mut impl Registers) {
     let wait_states = chip.read(Register::FlashAccess) & LATENCY;
     cache(chip, wait_states);
 }
 
-/// Runs the core from the internal oscillator (HSI), undivided; returns false if that fails.
+/// Switches the core to the undivided HSI; returns false if that fails.
 fn back_to_hsi(chip: &mut impl Registers) -> bool {
     chip.modify(Register::ClockControl, 0, HSI_ON);
     if !chip.wait(Register::ClockControl, HSI_READY, HSI_READY, POLLS) {
@@ -259,8 +259,9 @@ fn off(chip: &mut impl Registers) -> bool {
     chip.wait(Register::ClockControl, PLL_READY, 0, POLLS)
 }
 
-/// Starts the PLL, which must be off, at the settings of `speed`; returns false if that fails. `divisor` divides the
-/// source's frequency to 2 MHz. `scale` has the bits of PWR_CR that select the core's voltage.
+/// Starts the PLL, which must be off; returns false if that fails.
+///
+/// `divisor` divides the source's frequency to 2 MHz. `scale` is the voltage scale in PWR_CR.
 fn pll(chip: &mut impl Registers, source: Source, divisor: u32, speed: Pll, scale: u32) -> bool {
     chip.modify(Register::PowerControl, scale, scale);
     let from = match source {
@@ -306,7 +307,7 @@ mod tests {
             .flat_map(|bits| [8, 12, 16, 25].map(|mhz| Faults::of(bits, mhz * 1_000_000)))
     }
 
-    /// Returns the clock frequencies that [`start`] should reach on `hardware` with the simulated `faults`.
+    /// Returns the frequencies that [`start`] should reach with `faults`.
     fn expected(hardware: &ClockHardware, faults: Faults) -> Clocks {
         let is_crystal =
             !faults.crystal_dead && !faults.timer_dead && faults.crystal_hz == 8_000_000;
@@ -333,8 +334,7 @@ mod tests {
         }
     }
 
-    /// Checks the clocks under every combination of faults. The mock panics at a write that the reference manuals
-    /// forbid.
+    /// Checks the clocks for every combination of faults. The mock panics at every forbidden write.
     #[test]
     fn the_clocks_are_correct_under_all_combinations_of_faults() {
         let none = ClockHardware {

@@ -23,11 +23,10 @@ const HSE_READY: u32 = 1 << 17;
 /// Bit HSEBYP of the register RCC_CR: external clock in place of a crystal.
 const HSE_BYPASS: u32 = 1 << 18;
 
-/// Maximum number of reads of RCC_CR while a crystal starts. They take some 100 ms at 16 MHz; a crystal usually takes
-/// 2 ms.
+/// Maximum number of reads of RCC_CR while a crystal starts: about 100 ms at 16 MHz. A crystal usually takes 2 ms.
 const START_POLLS: u32 = 200_000;
 
-/// Divisor of the crystal's clock HSE before its period is measured: field RTCPRE of RCC_CFGR.
+/// Divisor of the crystal's clock for the measurement: field RTCPRE of RCC_CFGR.
 const DIVISOR: u32 = 31;
 const DIVIDED: u32 = DIVISOR << 16;
 
@@ -36,11 +35,12 @@ const EDGES: u32 = 8;
 /// Bit TIM11EN of RCC_APB2ENR: clock of timer 11.
 const TIMER_ON: u32 = 1 << 18;
 
-/// Maximum number of reads of the timer's status while waiting for edges of the crystal's clock.
+/// Maximum number of status reads of the timer per capture.
 const EDGE_POLLS: u32 = 1_000;
 
-/// Starts the crystal; returns true if its frequency is right within 10 %, else turns it off again. The core must run from the
-/// HSI. Bounded work: at most 100 ms.
+/// Starts the crystal; returns true if its frequency is right within 10 %, else turns it off again.
+///
+/// The core must run from the HSI. Takes at most 100 ms.
 pub fn start(chip: &mut impl Registers, crystal: Crystal) -> bool {
     chip.modify(Register::ClockControl, HSE_ON, 0);
     let bypass = if crystal.bypass { HSE_BYPASS } else { 0 };
@@ -61,8 +61,7 @@ pub fn stop(chip: &mut impl Registers) {
     chip.modify(Register::ClockControl, HSE_ON, 0);
 }
 
-/// Returns the period of the divided crystal clock, measured by timer 11 in periods of the HSI. `None` if no edges
-/// come.
+/// Returns the period of the divided crystal clock, in HSI periods; `None` without edges.
 fn period(chip: &mut impl Registers) -> Option<u32> {
     chip.modify(Register::ClockConfig, 0x1F << 16, DIVIDED);
     chip.modify(Register::Apb2Enable, 0, TIMER_ON);

@@ -9,8 +9,8 @@
 //! | [`watchdog`] | independent watchdog, and the rules for feeding it |
 //! | [`reset`] | cause of the last reset |
 //!
-//! The tests run on a mock of the registers in RAM, with the rules of RM0090 and RM0390 and every combination of faults. **Not
-//! tested on hardware yet**: the emulator of the tests has no clock tree and no watchdog.
+//! The tests run on a mock of the registers in RAM, with the rules of RM0090 and RM0390, for every combination of
+//! faults. **Not tested on hardware yet**: the emulator of the tests has no clock tree and no watchdog.
 #![no_std]
 
 pub mod baud;

@@ -11,7 +11,7 @@ use crate::registers::{Register, Registers};
 #[expect(clippy::struct_excessive_bools, reason = "each fails by itself")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Faults {
-    /// True if all registers read 0, as in the emulator QEMU. The internal oscillator (HSI) then never seems ready.
+    /// True if all registers read 0, as in QEMU. The HSI then never seems ready.
     pub(crate) hsi_hidden: bool,
     pub(crate) crystal_dead: bool,
     pub(crate) timer_dead: bool,
@@ -238,8 +238,8 @@ impl Registers for MockRegisters {
         }
     }
 
-    /// Simulates a wait by a single read, because further reads return the same value. The exception is the timer's
-    /// status, which changes from read to read.
+    /// Reads the register once, because more reads would return the same value. Only the timer's status changes from
+    /// read to read.
     fn wait(&mut self, register: Register, mask: u32, value: u32, polls: u32) -> bool {
         if register == Register::Timer11Status {
             return (0..polls).any(|_| self.read(register) & mask == value);

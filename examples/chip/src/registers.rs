@@ -50,7 +50,7 @@ pub enum Register {
     DebugFreeze = 0xE004_2008,
 }
 
-/// Access to the chip's registers, or to a mock of them in RAM.
+/// Access to the chip's registers, real or simulated.
 pub trait Registers {
     /// Returns the value of the hardware register `register`.
     fn read(&mut self, register: Register) -> u32;
@@ -78,13 +78,15 @@ pub struct Chip;
 #[cfg(target_arch = "arm")]
 impl Registers for Chip {
     fn read(&mut self, register: Register) -> u32 {
-        // SAFETY: an aligned register of every STM32F405 and STM32F446, whose read has no side effect that matters to memory.
+        // SAFETY: an aligned register of every STM32F405 and STM32F446. Reading it has no side effect that matters to
+        // memory.
         unsafe { core::ptr::read_volatile(register as u32 as *const u32) }
     }
 
     fn write(&mut self, register: Register, value: u32) {
-        // SAFETY: as above. None of these registers moves memory or lets a peripheral write to it. There is no other writer: this
-        // crate's functions run before interrupts are enabled, except for the watchdog's key, which is a single write.
+        // SAFETY: as above. None of these registers moves memory or lets a peripheral write to it. There is no other
+        // writer: this crate's functions run before interrupts are enabled, except for the watchdog's key, which is a
+        // single write.
         unsafe { core::ptr::write_volatile(register as u32 as *mut u32, value) }
     }
 }

@@ -32,7 +32,7 @@ impl Reset {
     }
 
     /// Returns the most specific cause in `status`, a value of RCC_CSR. Several bits can be set: every reset also
-    /// sets the bit of the reset pin, and a power-up also sets the bit of the brownout.
+    /// sets the bit of the reset pin, and a power-up that of the brownout.
     fn of(status: u32) -> Self {
         let is = |bit: u32| status >> bit & 1 != 0;
         match status {
@@ -65,8 +65,7 @@ mod tests {
     use crate::mock::MockRegisters;
     use crate::registers::{Register, Registers as _};
 
-    /// Checks that RCC_CSR gives the right reset cause, and that reading it clears the reset flags. The register
-    /// values are from the reference manuals.
+    /// Checks the reset cause for values of RCC_CSR from the reference manuals, and that reading clears it.
     #[test]
     fn the_reset_cause_is_read_once() {
         for (status, cause) in [

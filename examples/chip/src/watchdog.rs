@@ -1,28 +1,30 @@
 //! Independent watchdog: it has an oscillator of its own, and resets the chip unless it is fed.
 //!
-//! The relay's loop feeds it once a turn, after serving ports and timers; no interrupt does. So a hanging loop, a panic, a hard
-//! fault or a stopped clock restarts the chip. A sleep takes [`TURN_MS`] at most.
+//! The relay's main loop feeds it once per cycle, after serving ports and timers; no interrupt does. So a hanging
+//! loop, a panic, a hard fault or a stopped clock restarts the chip. The loop sleeps for at most [`TURN_MS`].
 
 use crate::registers::{Register, Registers};
 
-/// Prescaler setting of the watchdog: division by 64. With the typical 32 kHz of its oscillator LSI the watchdog counts
-/// 500 times a second.
+/// Prescaler setting: division by 64. The watchdog then counts about 500 times a second.
 const PRESCALER: u32 = 0b100;
 const RELOAD: u32 = 2_999;
 
-/// Time from the last feeding of the watchdog to the reset, ms: typical, shortest and longest. These times are for 32,
-/// 47 and 17 kHz of the watchdog's oscillator LSI. Each is enough for an erase of a flash sector of 128 KiB, which
-/// stops the core for at most 2 s.
+/// Time from the last feeding to the reset, ms: typical, shortest and longest.
+///
+/// These are for a watchdog oscillator of 32, 47 and 17 kHz. Each is enough for an erase of a flash sector of 128
+/// KiB, which stops the core for at most 2 s.
 pub const TIMEOUT_MS: [u32; 3] = [6_000, 4_085, 11_294];
 
-/// Maximum time for which the relay's main loop sleeps, ms. The loop feeds the watchdog before it sleeps.
+/// Maximum sleep of the relay's main loop, ms. The loop feeds the watchdog before it sleeps.
 pub const TURN_MS: u64 = 500;
 
-/// Delay of the relay's timer, ms, from which on the main loop must no longer feed the watchdog.
+/// Delay of the relay's timer, ms, from which on the watchdog must not be fed.
 pub const LATE_MS: u64 = 1_000;
 
-/// Returns true if the main loop may feed the watchdog at `now_us`. The relay's next timer expires at `due_us`;
-/// `None` means that no timer is set. The timer must be less than [`LATE_MS`] late.
+/// Returns true if the main loop may feed the watchdog at `now_us`.
+///
+/// `due_us` is when the relay's next timer expires; `None` means no timer. The timer must be less than [`LATE_MS`]
+/// late.
 pub const fn may_feed(now_us: u64, due_us: Option<u64>) -> bool {
     match due_us {
         Some(due_us) => now_us < due_us.saturating_add(1_000 * LATE_MS),
@@ -37,8 +39,7 @@ const UNLOCK: u32 = 0x5555;
 /// Value of the watchdog's key register that feeds it.
 const FEED: u32 = 0xAAAA;
 
-/// Maximum number of status reads until the watchdog's settings take effect. That takes five LSI periods, at most 0.3
-/// ms.
+/// Maximum number of status reads until the settings take effect, which takes at most 0.3 ms.
 const POLLS: u32 = 10_000;
 
 /// Starts the watchdog, which nothing but a reset can stop. It pauses while a debugger halts the core. Bounded work.
@@ -48,7 +49,8 @@ pub fn start(chip: &mut impl Registers) {
     chip.write(Register::WatchdogKey, UNLOCK);
     chip.write(Register::WatchdogPrescaler, PRESCALER);
     chip.write(Register::WatchdogReload, RELOAD);
-    // If not ready in time it first counts from its reset value, 0.5 s, and uses the new value from this feeding on.
+    // If the settings are late, the watchdog first counts from its reset value, 0.5 s, and uses the new one after
+    // this feeding.
     let _ = chip.wait(Register::WatchdogStatus, 0b11, 0, POLLS);
     feed(chip);
 }

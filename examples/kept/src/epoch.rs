@@ -1,28 +1,28 @@
-//! Epoch: a number that increases at every start and never falls.
+//! Epoch: a number that rises at every start.
 //!
-//! Each start appends an entry to a [`Journal`] of its own, so that a loss of power at any moment preserves the largest epoch
-//! ever used. An entry cut short by a loss of power is invalid, and its epoch has not been used, because an epoch is used only
-//! after its entry has been read back. A sector of 128 KiB holds 10 922 starts.
+//! Each start appends an entry to a [`Journal`], so a loss of power at any moment preserves the largest epoch ever
+//! used. An epoch is used only after its entry has been read back, so an entry cut short has not been used. A sector
+//! of 128 KiB holds 10 922 starts.
 //!
-//! An entry that can not be written is tried at the next places. If all fail, the epoch is used all the same: it is larger than
-//! all stored ones, so the neighbours accept it, whereas they would reject an older one throughout the flight. But the next start
-//! may get the same epoch and be rejected until the neighbours are restarted. So the failure is logged as an error, and the drone
-//! must not fly again before its block has a larger epoch and its flash is sound.
+//! A failed write is retried at the next places. If all fail, the epoch is used all the same. It is larger than all
+//! stored ones, so the neighbours accept it; they would reject an older one throughout the flight. But the next start
+//! may get the same epoch and be rejected until the neighbours restart. So the failure is logged as an error. The
+//! drone must not fly again before its block has a larger epoch and its flash is sound.
 
 use crate::journal::{Flash, Journal, WhenFull};
 
-/// Addresses of the two flash sectors that store epochs: sectors 9 and 10 of an STM32F405.
+/// Addresses of the two flash sectors for epochs: sectors 9 and 10 of an STM32F405.
 pub const SECTORS: [u32; 2] = [0x080A_0000, 0x080C_0000];
 
-/// Payload length of a journal record that stores an epoch, words.
+/// Length of an epoch in the journal, words.
 pub const WORDS: usize = 1;
 
-/// Key of the journal that stores the epochs. A journal ignores records with another key. The epoch must rise at every
-/// start. So this key is a constant: with a key computed from the configuration block, a changed block would reset the
-/// epoch.
+/// Key of the journal for epochs: a constant.
+///
+/// With a key that depends on the configuration block, a changed block would reset the epoch, which must never fall.
 pub const KEY: u32 = 0;
 
-/// Returns the epoch of this start (a number that rises at every start), and true if it was stored.
+/// Returns the epoch of this start, and true if it was stored.
 ///
 /// It is at least `floor`. `None` once the last epoch, 4294967294, has been used.
 pub fn begin<F: Flash>(log: &mut Journal<F>, floor: u32) -> Option<(u32, bool)> {

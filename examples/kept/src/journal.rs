@@ -6,22 +6,22 @@
 //! | between | payload |
 //! | last | CRC-32C of these words and of the journal's key |
 //!
-//! Records are appended to the sector with the newest one until it is full, then to the other one. The previous record therefore
-//! stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has another key fails
-//! its CRC and is ignored.
+//! Records are appended to the sector with the newest one until it is full, then to the other. So the previous record
+//! stays intact until a newer one has been read back. A record that was cut short, lies in worn flash or has another
+//! key fails its CRC and is ignored.
 //!
-//! An erase stops the CPU. [`Journal::tidy`] erases at a start; in flight [`Journal::append`] erases only with [`WhenFull::Erase`].
+//! An erase stops the CPU. [`Journal::tidy`] erases at a start. In flight [`Journal::append`] erases only with
+//! [`WhenFull::Erase`].
 
 use uav_relay::CRC_32C;
 
 /// Value of an erased word.
 pub const BLANK: u32 = u32::MAX;
 
-/// Number of words of a record in addition to its payload: its sequence number and its CRC.
+/// Number of words of a record besides its payload: sequence number and CRC.
 pub const OVERHEAD: usize = 2;
 
-/// Maximum number of attempts to write one journal record. Each attempt is at another place in the flash, because
-/// flash cells may be worn.
+/// Maximum number of attempts to write a record, each at another place in the flash.
 const TRIES: usize = 4;
 
 /// Access to two flash sectors, numbered 0 and 1, possibly of different lengths.
@@ -29,10 +29,10 @@ pub trait Flash {
     /// Returns the number of words in a sector; 0 if there is no such sector.
     fn words(&self, sector: usize) -> usize;
 
-    /// Returns the number of words in use in a sector: up to the last word that is not [`BLANK`].
+    /// Returns the number of words in use: up to the last word that is not [`BLANK`].
     fn used(&mut self, sector: usize) -> usize;
 
-    /// Returns the word number `word` of a sector; [`BLANK`] after the sector's end.
+    /// Returns a word of a sector; [`BLANK`] after the sector's end.
     fn read(&mut self, sector: usize, word: usize) -> u32;
 
     /// Erases a sector.
@@ -69,7 +69,7 @@ impl<F: Flash> Flash for &mut F {
 pub enum WhenFull {
     /// The new record is refused.
     Refuse,
-    /// The sector without the newest record is erased, and the new record is stored in it.
+    /// The sector without the newest record is erased, and then takes the new one.
     Erase,
 }
 
@@ -84,12 +84,12 @@ pub struct Journal<F> {
 #[derive(Clone, Copy)]
 struct Found {
     newest: Option<Newest>,
-    /// Number of records in the sector, valid or not, up to the last record that is not blank.
+    /// Number of records in the sector, valid or not.
     used: usize,
     room: usize,
 }
 
-/// Newest valid record of a sector. Ordered by the record's sequence number, which rises with every record.
+/// Newest valid record of a sector. The order is that of the sequence numbers.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Newest {
     number: u32,
@@ -97,7 +97,9 @@ struct Newest {
 }
 
 impl<F: Flash> Journal<F> {
-    /// Creates a journal whose records have `payload_words` words of payload. Records stored under another `key` are ignored.
+    /// Creates a journal whose records have `payload_words` words of payload.
+    ///
+    /// Records stored under another `key` are ignored.
     pub const fn new(flash: F, payload_words: usize, key: u32) -> Self {
         Self {
             flash,
@@ -106,11 +108,9 @@ impl<F: Flash> Journal<F> {
         }
     }
 
-    /// Returns the payload of the newest record; `None` if there is no valid record. `WORDS` must be the payload's
-    /// length, words.
+    /// Returns the payload of the newest valid record, if any. `WORDS` must be the payload's length, words.
     ///
-    /// Work: linear in the words of the sectors, and a CRC for the newest valid record and each record stored after
-    /// it.
+    /// Work: linear in the words of the sectors, plus CRCs of the newest valid record and of all later ones.
     pub fn newest<const WORDS: usize>(&mut self) -> Option<[u32; WORDS]> {
         let mut payload = [BLANK; WORDS];
         self.read_newest(&mut payload)?;
@@ -128,8 +128,7 @@ impl<F: Flash> Journal<F> {
         Some(())
     }
 
-    /// Erases the used sectors that do not have the newest record. Called at a start, so that in flight a whole
-    /// sector of records can be stored before the next erase.
+    /// Erases the used sectors without the newest record. Called at a start, to delay the erase in flight.
     pub fn tidy(&mut self) {
         let found = self.found();
         let any = found.iter().any(|found| found.newest.is_some());
@@ -193,8 +192,7 @@ impl<F: Flash> Journal<F> {
         is_whole.then(|| self.flash.read(sector, first))
     }
 
-    /// Returns the CRC of the record that begins at word `first`. The CRC covers all words of the record except the
-    /// last, which stores the CRC, and then the journal's key.
+    /// Returns the CRC of the record that begins at word `first`: over all words but its last, and the key.
     #[inline(never)] // called from two places
     fn sum(&mut self, sector: usize, first: usize) -> u32 {
         let mut crc = CRC_32C.digest();

@@ -1,4 +1,4 @@
-//! State of a flashed relay that survives a reboot, for any board: two sectors of flash for each kind.
+//! State of a relay that survives a reboot, in two flash sectors for each kind; for any board.
 //!
 //! | file | content |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! Two sectors of a flash behind the traits of `embedded-storage`. Drivers of Embassy and many HALs implement them.
+//! Two sectors of a flash, accessed through the traits of `embedded-storage`. Most HALs implement them.
 
 use core::ops::Range;
 
@@ -8,17 +8,17 @@ use crate::journal::{BLANK, Flash};
 
 const WORD: usize = 4;
 
-/// Number of words per read or write of the flash. Larger pieces save time: each call of the driver takes longer than
-/// the transfer of a word, and some flashes write a whole page at each call.
+/// Number of words per read or write of the flash. A driver call takes longer than the transfer of a word.
 const PIECE: usize = 16;
 
-/// Two sectors of a NOR flash, given by their offsets; each consists of one or more erase units. The flash must read
-/// and write whole words.
+/// Two sectors of a NOR flash, given by their offsets. Each consists of one or more erase units.
+///
+/// The flash must read and write whole words.
 #[derive(Debug)]
 pub struct Nor<F> {
     flash: F,
     sectors: [Range<u32>; 2],
-    /// Cached part of the flash, read last: sector, number of the first word, and the words.
+    /// Cache of the last read: sector, number of the first word, and the words.
     last: Option<(usize, usize, [[u8; WORD]; PIECE])>,
 }
 
@@ -35,8 +35,7 @@ impl<F: NorFlash> Nor<F> {
         }
     }
 
-    /// Returns the flash offset of a sector's word `first`. `None` if `words` words from there exceed the
-    /// sector.
+    /// Returns the flash offset of word `first` of a sector, if `words` words from there fit.
     fn place(&self, sector: usize, first: usize, words: usize) -> Option<u32> {
         let start = self.sectors.get(sector)?.start;
         let end = first.checked_add(words)?;

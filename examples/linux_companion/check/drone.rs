@@ -1,4 +1,4 @@
-//! Autopilot of the drone: heard, mode, position, and the parameters that its bundle has.
+//! Check of the drone's autopilot: mode, position, and the parameters of its bundle.
 //!
 //! It sends HEARTBEAT, SET_MESSAGE_INTERVAL and PARAM_REQUEST_READ, and never a target.
 
@@ -15,30 +15,30 @@ use super::Line;
 use crate::autopilot::{AutopilotPlan, Port, SigningKey, port, stamp};
 use crate::options::Plan;
 
-/// Link number of the check in MAVLink signatures. In flight the program uses another link number.
+/// Link number of the check in MAVLink signatures; in flight another one is used.
 const LINK: u8 = 1;
 
 /// Silence after which the autopilot, or its position, counts as missing.
 const SILENT: Duration = Duration::from_millis(3_000);
 
-/// Time between two heartbeats, and between two requests for the missing data.
+/// Time between two heartbeats, and between two requests.
 const EVERY: Duration = Duration::from_millis(1_000);
 
-/// Number of parameters that are requested at a time.
+/// Number of parameters requested at a time.
 const AT_A_TIME: usize = 6;
 
-/// Names of the parameter with the autopilot's own MAVLink system number.
+/// Names of the parameter with the autopilot's MAVLink system number.
 const SYSTEM: [&str; 2] = ["MAV_SYS_ID", "SYSID_THISMAV"];
 
-/// Parameters that ArduCopter 4.7 has renamed: old name, new name, and a factor. The factor is the old unit divided by
-/// the new unit. An autopilot has only one of the two names.
+/// Parameters that ArduCopter 4.7 has renamed: old name, new name, and old unit divided by new unit.
+///
+/// An autopilot has only one of the two names.
 const NEW_NAMES: [(&str, &str, f64); 2] = [
     ("RTL_ALT", "RTL_ALT_M", 100.0),
     ("SYSID_THISMAV", "MAV_SYSID", 1.0),
 ];
 
-/// Parameter of the bundle's parameter file: the value in the file, and the autopilot's value. The autopilot's value is
-/// `None` until the autopilot has answered.
+/// Parameter of the bundle's file: the file's value, and the autopilot's, `None` until received.
 #[derive(Debug)]
 struct Parameter {
     name: String,
@@ -46,7 +46,7 @@ struct Parameter {
     found: Option<f64>,
 }
 
-/// State of the autopilot, as reported in its last HEARTBEAT.
+/// Autopilot's state in its last HEARTBEAT.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     at: Instant,
@@ -63,8 +63,7 @@ pub(super) struct Drone {
     parser: Parser,
     signing: Option<Signing>,
     axis: Axis,
-    /// Planned position of this drone; `None` if the configuration has no plan. `within_m` is the permitted distance
-    /// from it.
+    /// Planned position of this drone, if any. `within_m` is the permitted distance from it.
     planned: Option<Placement>,
     within_m: f32,
     /// Folder with the parameter files.
@@ -110,13 +109,14 @@ impl Drone {
         })
     }
 
-    /// Returns true once the autopilot has reported that it is disarmed and not in the air. Until then the check sends
-    /// nothing to the neighbours.
+    /// Returns true once the autopilot has reported that it is disarmed and not in the air.
+    ///
+    /// Until then the check sends nothing to the neighbours.
     pub(super) fn is_disarmed(&self) -> bool {
         self.heard.is_some() && !self.is_armed()
     }
 
-    /// Returns true if the autopilot is armed or in the air. The check then sends nothing to the neighbours.
+    /// Returns true if the autopilot is armed or in the air. Then the check sends nothing to the neighbours.
     pub(super) fn is_armed(&self) -> bool {
         self.is_in_air || self.heard.is_some_and(|heard| heard.is_armed)
     }
@@ -212,8 +212,9 @@ impl Drone {
         }
     }
 
-    /// Stores the value of a received PARAM_VALUE. Its payload is the value (4 bytes), count and index (2 bytes each),
-    /// the name (16 bytes) and the type.
+    /// Stores the value of a received PARAM_VALUE.
+    ///
+    /// Payload: value (4 bytes), count and index (2 bytes each), name (16 bytes), type.
     fn take_value(&mut self, kind: Kind, frame: &[u8]) {
         let length = usize::from(frame.get(1).copied().unwrap_or(0));
         let mut payload = frame
@@ -226,7 +227,7 @@ impl Drone {
         };
         let is_integer = payload.get(24).is_some_and(|kind| *kind < 9);
         let found = match kind {
-            // The bytes of an integer, and not its value.
+            // PX4 sends an integer's bytes in the place of a float.
             Kind::Px4 if is_integer => f64::from(i32::from_le_bytes(*value)),
             _ => f64::from(f32::from_le_bytes(*value)),
         };
@@ -279,7 +280,7 @@ impl Drone {
                 self.send(now, request(name, from, to, self.sequence));
             }
         }
-        // The next ones are requested if the first are not answered.
+        // If the first are not answered, the next ones are requested.
         if let Some(Ok((_, all))) = &mut self.file {
             let missing = all.iter().filter(|it| it.found.is_none()).count();
             let (mut open, answered): (Vec<_>, Vec<_>) =
@@ -458,8 +459,7 @@ impl Drone {
     }
 }
 
-/// Returns true if two values of a parameter differ by more than rounding errors. These come from the f32 format and
-/// from a conversion of units.
+/// Returns true if two values differ by more than rounding and unit conversion can cause.
 fn differ(found: f64, wanted: f64) -> bool {
     (found - wanted).abs() > 1e-4 * wanted.abs().max(1.0)
 }
@@ -468,7 +468,7 @@ fn differ(found: f64, wanted: f64) -> bool {
 fn request(name: &str, from: Address, to: Address, sequence: u8) -> FrameBytes {
     let [a, b, c, _] = id::PARAM_REQUEST_READ.to_le_bytes();
     let mut frame = FrameBytes::new();
-    // Index -1: the name counts.
+    // Index -1: the parameter is requested by its name.
     let head = [
         MAGIC,
         20,
@@ -490,7 +490,7 @@ fn request(name: &str, from: Address, to: Address, sequence: u8) -> FrameBytes {
         .iter_mut()
         .zip(name.bytes())
         .for_each(|(to, byte)| *to = byte);
-    // A frame to sign has room for both.
+    // The frame has room for both.
     let _ = frame.extend_from_slice(&head);
     let _ = frame.extend_from_slice(&padded);
     if let (Some(known), Some(covered)) = (find_known(id::PARAM_REQUEST_READ), frame.get(1..)) {
@@ -500,7 +500,7 @@ fn request(name: &str, from: Address, to: Address, sequence: u8) -> FrameBytes {
     frame
 }
 
-/// Reads the parameter file of an autopilot in `folder`, the folder of the configuration.
+/// Reads the autopilot's parameter file in `folder`, the folder of the configuration.
 fn parameters(folder: Option<&Path>, kind: Kind) -> Result<(PathBuf, Vec<Parameter>), String> {
     let name = match kind {
         Kind::Px4 => "px4.params",
@@ -534,7 +534,7 @@ fn parameters(folder: Option<&Path>, kind: Kind) -> Result<(PathBuf, Vec<Paramet
         })
         .collect();
     let mut all = all?;
-    // The old name stands for both.
+    // A renamed parameter is listed under its old name only.
     all.retain(|it| NEW_NAMES.iter().all(|(_, new, _)| *new != it.name));
     Ok((file.clone(), all))
 }

@@ -6,8 +6,9 @@
 //! | `drone.rs` | autopilot: mode, position, parameters |
 //! | `radio.rs` | neighbours, without taking part in the chain |
 //!
-//! Nothing that the check sends moves a drone. It first listens, and sends nothing to relays while a drone of theirs may fly. To the autopilot it sends HEARTBEAT, message intervals and requests for parameters,
-//! to other relays hellos, heartbeats and handshakes. It uses one epoch, because no epoch may be used twice.
+//! Nothing that the check sends moves a drone. At first it only listens, and it sends nothing to relays while one of
+//! their drones may fly. It sends HEARTBEAT, message intervals and parameter requests to the autopilot, and hellos,
+//! heartbeats and handshakes to relays. It uses up one epoch, because no epoch may be used twice.
 
 mod drone;
 mod radio;
@@ -30,28 +31,29 @@ use crate::relay::{auth, seed};
 use drone::Drone;
 use radio::Radio;
 
-/// Line of the check: its subject, and the finding. An `Err` is red.
+/// Line of the check: subject and finding.
 pub(crate) type Line = (&'static str, Finding);
 
-/// Time for which the check still answers its neighbours after all its lines are green. The neighbours may be running a
-/// check of their own.
+/// Time for which the check still answers its neighbours after its lines are green.
+///
+/// The neighbours may be running a check of their own.
 const LINGER: Duration = Duration::from_millis(5_000);
 
-/// Pause between two turns of the main loop.
+/// Pause between two cycles of the main loop.
 const TURN: Span = Span::from_millis(20);
 
-/// Least free space of a disk for the files of a flight, bytes.
+/// Minimum free space for the files of a flight, bytes.
 const FREE: u64 = 64 << 20;
 
-/// Seconds from 1970 to 2024. A clock that shows an earlier time is not set.
+/// Seconds from 1970 to 2024. A clock with an earlier time is not set.
 const YEAR_2024_S: u64 = 1_704_067_200;
 
-/// Name of the file with the bundle's udev rules. The file is in the folder of the configuration, or installed in
-/// /etc/udev/rules.d.
+/// Name of the bundle's udev rules, in the folder of the configuration or in /etc/udev/rules.d.
 const RULES: &str = "70-uav-relay.rules";
 
-/// Checks this computer, then the autopilot and the neighbours for at most `limit`. At first it only receives. Prints
-/// all lines; returns true if all are green.
+/// Checks this computer, then the autopilot and the neighbours for at most `limit`.
+///
+/// At first it only receives. Prints all lines; returns true if all are green.
 pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     let options = &plan.options;
     let (mut lines, ports) = ports(plan);
@@ -132,7 +134,7 @@ pub(crate) fn run(plan: &Plan, limit: Duration) -> bool {
     red == 0
 }
 
-/// Exchanges messages with the drone and the neighbours until all lines stay green, or for `limit`.
+/// Exchanges messages with autopilot and neighbours until all lines stay green, or for `limit`.
 fn watch(
     plan: &Plan,
     now: impl Fn() -> Instant,
@@ -188,7 +190,7 @@ fn print((subject, finding): &Line) {
     let _ = writeln!(std::io::stdout(), "{colour:<6} {subject:<11} {text}");
 }
 
-/// Opens the ports toward other relays. Returns a line for each, and the ports if all are open.
+/// Opens the ports toward other relays. Returns a line for each; the ports only if all are open.
 fn ports(plan: &Plan) -> (Vec<Line>, Option<Vec<(Port, Tty)>>) {
     let options = &plan.options;
     let named = [
@@ -232,7 +234,7 @@ fn clock(now: SystemTime) -> Result<String, String> {
     Ok(text.to_string())
 }
 
-/// Returns the free space for `file`, bytes, after a test write in its folder.
+/// Returns the free space for `file`, bytes. A test file is written to its folder.
 fn space(file: &Path) -> Result<u64, String> {
     let failed = |error: std::io::Error| format!("cannot be written: {error}");
     let folder = file
@@ -252,7 +254,7 @@ fn space(file: &Path) -> Result<u64, String> {
             return Ok(FREE);
         }
     }
-    // Root may write everywhere, the unit's user may not.
+    // Root may write everywhere, but the unit's user may not.
     let owner = folder.metadata().map_or(0, |about| about.uid());
     if geteuid().is_root() && owner != 0 {
         return Err(format!(
@@ -275,7 +277,7 @@ fn space(file: &Path) -> Result<u64, String> {
     Ok(free)
 }
 
-/// Checks the records of earlier starts.
+/// Checks the stored records of earlier starts.
 fn records(plan: &Plan) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(file) = &plan.options.view_file {
@@ -321,7 +323,7 @@ fn records(plan: &Plan) -> Vec<Line> {
     lines
 }
 
-/// Checks the udev rules of the bundle. `None` if there is no file with rules and no port needs one.
+/// Checks the bundle's udev rules; `None` if there are none and no port needs one.
 fn rules(plan: &Plan) -> Option<Line> {
     let options = &plan.options;
     let ports = [&options.upstream, &options.downstream, &options.shared];

@@ -1,11 +1,11 @@
-//! Neighbours of this relay: heard both ways, with the same mission, network and key.
+//! Check of this relay's neighbours: heard in both directions, with the same mission, network and key.
 //!
-//! A relay of the library answers the handshakes, but only hellos, claims, heartbeats and handshakes pass between it and the ports. So it
-//! receives no proposal and no vote, and sends none: it can not become a member of the chain. On a shared channel its hellos say, too,
-//! that it is outside.
+//! A relay of the library answers the handshakes, but only hellos, claims, heartbeats and handshakes pass between it
+//! and the ports. So it receives and sends no proposal and no vote, and cannot become a member of the chain. On a
+//! shared channel its hellos also state that it is not a member.
 //!
-//! Relays of a flying chain would all the same take it for one that has restarted. So it sends nothing before it has listened for a
-//! period of the lease renewals, and then only while no relay flies:
+//! A flying chain would still take it for a relay that has restarted. So it first only listens, for one period of the
+//! lease renewals, and then sends only while no relay flies:
 //!
 //! | heard from a relay | the relay |
 //! | --- | --- |
@@ -29,43 +29,42 @@ use super::Line;
 use crate::options::Plan;
 use crate::relay::seed;
 
-/// Silence of a neighbour after which the check requests a heartbeat from it.
+/// Silence after which a neighbour is asked for a heartbeat.
 const PROBE_AFTER: Duration = Duration::from_millis(2_000);
 
-/// Number of own frames that are remembered, to recognise their echoes.
+/// Number of remembered own frames, to recognise their echoes.
 const REMEMBERED: usize = 64;
 
-/// Number of damaged frames from which on the check suspects a wrong data rate.
+/// Number of damaged frames from which on a wrong data rate is suspected.
 const DAMAGED: u32 = 5;
 
-/// Age from which on the check ignores data received from a neighbour.
+/// Age from which on received data are ignored.
 const OLD: Duration = Duration::from_millis(10_000);
 
-/// Margin of the time in which the check only listens. This time is the longest period of the lease renewals, plus the
-/// margin.
+/// Margin of the listening time, which is the longest lease-renewal period plus this margin.
 const RESERVE: Duration = Duration::from_millis(2_000);
 
-/// Maximum change of a drone's reported position, m, for the drone to count as on the ground.
+/// Maximum change of a reported position, m, for a drone on the ground.
 const STANDS_WITHIN_M: f32 = 5.0;
 
-/// Data about a neighbour, from received frames that name the neighbour's number as their sender.
+/// Data about a neighbour, from frames that name it as their sender.
 #[derive(Clone, Copy, Debug, Default)]
 struct Heard {
-    /// Time of the neighbour's last frame in this network, addressed to any relay.
+    /// Time of its last frame in this network, to any relay.
     received: Option<Instant>,
-    /// Time of the neighbour's last frame to this relay with a correct authentication tag.
+    /// Time of its last frame to this relay with a correct authentication tag.
     verified: Option<Instant>,
-    /// Time of the neighbour's last message that states that the neighbour receives this relay.
+    /// Time of its last message that confirms reception of this relay.
     hears: Option<Instant>,
-    /// True if the neighbour's drone flies.
+    /// True if its drone flies.
     flies: bool,
-    /// True once a lease renewal was received from the neighbour: its chain then has agreed positions.
+    /// True once it sent a lease renewal: its chain has agreed positions.
     takes_part: bool,
-    /// First position that the neighbour reported while its relay did not fly the drone. `None` before this report.
+    /// First position that it reported while its relay did not fly the drone, if any.
     stands: Option<Placement>,
-    /// Digest of the neighbour's mission; `None` if not received yet.
+    /// Digest of its mission; `None` if not received yet.
     mission: Option<u16>,
-    /// Number of frames with another key. The next fields count frames without a signature, name the other network of a
+    /// Number of frames with another key.
     /// frame, and count frames of an old epoch.
     forged: u32,
     unsigned: u32,
@@ -73,7 +72,7 @@ struct Heard {
     replayed: u32,
 }
 
-/// Port toward neighbours. `received` is the incomplete frame received so far, `outgoing` the bytes not sent yet.
+/// Port toward neighbours. `received` is an incomplete frame; `outgoing` are bytes not sent yet.
 struct Wire {
     port: Port,
     tty: Tty,
@@ -92,7 +91,7 @@ pub(super) struct Radio {
     epoch: Option<u32>,
     heard: BTreeMap<u16, Heard>,
     sent: VecDeque<Vec<u8>>,
-    /// Number of frames received from another node that uses this relay's number.
+    /// Number of frames from another node with this relay's number.
     twins: u32,
     damaged: u32,
     sends_from: Instant,
@@ -136,28 +135,29 @@ impl Radio {
             sent: VecDeque::new(),
             twins: 0,
             damaged: 0,
-            // The longest period of the lease renewals is a quarter of the time.
+            // The longest period of the lease renewals is a quarter of `dead_after`.
             sends_from: now
                 + Duration::from_micros(plan.settings.dead_after.as_micros() / 4)
                 + RESERVE,
         })
     }
 
-    /// Returns the time from which on the check may send. Before this time it only listens.
+    /// Returns the time from which on the check may send.
     pub(super) const fn sends_from(&self) -> Instant {
         self.sends_from
     }
 
-    /// Returns the numbers of the relays that may fly. A relay may fly if it reports so, or if it is in a chain and has
-    /// not reported that its drone is on the ground.
+    /// Returns the numbers of the relays that may fly.
+    ///
+    /// It may fly if it reports so. A relay in a chain may also fly if it has not reported that its drone is on the
+    /// ground.
     fn flying(&self) -> Vec<String> {
         let flies = |heard: &Heard| heard.flies || heard.takes_part && heard.stands.is_none();
         let flying = self.heard.iter().filter(|(_, heard)| flies(heard));
         flying.map(|(node, _)| node.to_string()).collect()
     }
 
-    /// Receives frames from the neighbours and sends frames to them. Sends nothing if `may_send` is false, or while a
-    /// relay may fly.
+    /// Receives frames from the neighbours, and sends to them if `may_send` is true and no relay may fly.
     pub(super) fn exchange(&mut self, now: Instant, may_send: bool) {
         for at in 0..self.wires.len() {
             for (port, frame) in self.read(at) {
@@ -165,7 +165,7 @@ impl Radio {
             }
         }
         let may_send = may_send && now >= self.sends_from && self.flying().is_empty();
-        // It comes back inside when no view without it is agreed on.
+        // Without an agreement on a view without it, this relay is a member again. Then it leaves once more.
         if self.relay.departure(now) != Departure::Outside {
             self.relay.stay(now);
             self.relay.leave(now, None);
@@ -180,7 +180,7 @@ impl Radio {
         }
         let mut frame = [0; MAX_FRAME];
         loop {
-            // Its votes go nowhere, so they are not stored either.
+            // Its votes are not sent, so they are not stored either.
             self.relay.persist(|_| true);
             let Some(transmit) = self.relay.poll_transmit(now, &mut frame) else {
                 break;
@@ -222,7 +222,7 @@ impl Radio {
             frames.push((wire.port, wire.received.drain(..=end).collect()));
         }
         if wire.received.len() > 2 * MAX_FRAME {
-            // Noise without any delimiter.
+            // Noise without a delimiter.
             frames.push((wire.port, std::mem::take(&mut wire.received)));
         }
         frames
@@ -261,7 +261,7 @@ impl Radio {
         let after = self.relay.stats();
         let more = |of: fn(&Stats) -> u32| of(after).saturating_sub(of(&before));
         if !self.sent.is_empty() {
-            // Before, its frames are for an earlier start of this relay.
+            // Until this relay has sent, such frames are for its earlier start.
             heard.forged += more(|stats| stats.forged);
         }
         heard.replayed += more(|stats| stats.replayed);
@@ -290,7 +290,7 @@ impl Radio {
         }
     }
 
-    /// Returns the findings about the chain, the neighbours and this relay's number.
+    /// Returns the findings about chain, neighbours and this relay's number.
     pub(super) fn lines(&self, now: Instant) -> Vec<Line> {
         let flying = self.flying();
         let mut lines = vec![(
@@ -385,7 +385,7 @@ impl Radio {
 }
 
 impl Heard {
-    /// Records whether the sender of a message flies and whether its chain has agreed positions.
+    /// Records if the sender of a message flies, and if its chain has agreed positions.
     fn observe(&mut self, content: &Content) {
         let Content::Message(message) = content else {
             return;
@@ -406,13 +406,13 @@ impl Heard {
 
 /// Content of an intact frame.
 enum Content {
-    /// Handshake. The number is the receiver's epoch, as far as the sender knows it.
+    /// Handshake with the receiver's epoch, as far as the sender knows it.
     Handshake(u32),
     Message(Message),
 }
 
 impl Content {
-    /// Returns true for messages that take no part in an agreement. The check sends only such messages.
+    /// Returns true for messages without influence on any agreement. Only such messages pass.
     const fn is_harmless(&self) -> bool {
         use Message::{Claim, Heartbeat, Hello};
         matches!(
@@ -436,7 +436,7 @@ fn decoded(frame: &[u8]) -> Option<(Header, Content)> {
     }
     let opened = open(deframer.push(*last)?.ok()?).ok()?;
     let content = if opened.handshake {
-        // After the sender's nonce; the upper half of the receiver's is its epoch.
+        // After the sender's nonce follows the receiver's, whose upper half is its epoch.
         let epoch = opened.body.get(12..16).and_then(<[u8]>::first_chunk);
         Content::Handshake(u32::from_le_bytes(*epoch?))
     } else {
@@ -451,7 +451,7 @@ mod tests {
 
     use super::is_in_air;
 
-    /// Checks every control state, without and with the flag that another node has the relay's number.
+    /// Checks every control state, with and without the flag for a duplicate relay number.
     #[test]
     fn a_report_says_if_the_drone_is_in_the_air() {
         let states = [false, false, false, true, true, true, true];

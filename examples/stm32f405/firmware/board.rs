@@ -15,17 +15,16 @@ pub(crate) fn block() -> &'static Block {
     unsafe { &*(config::ADDRESS as *const Block) }
 }
 
-/// Enables an interrupt. The caller must have installed the driver that serves the interrupt.
+/// Enables an interrupt. Its driver must be in place.
 pub(crate) fn unmask(interrupt: Interrupt) {
     // SAFETY: no critical section of this program relies on a single interrupt being masked.
     unsafe { NVIC::unmask(interrupt) };
 }
 
-/// Returns a seed that differs between boards and between starts.
+/// Returns a seed that differs between boards and starts.
 ///
-/// After power-up the seed is a hash of the noise in the RAM, which is specific to the chip. After a reset it is a hash
-/// of the RAM's content, which includes the last seed. The function does not use the chip's unique number, because the
-/// emulator has no such number at its address.
+/// After power-up it is a hash of the noise in the RAM. After a reset it is a hash of the RAM's content, which
+/// includes the last seed. It does not use the chip's unique number, because the emulator has none.
 pub(crate) fn seed() -> u32 {
     const WORDS: usize = 64;
     #[unsafe(link_section = ".uninit.leftover")]
@@ -41,8 +40,9 @@ pub(crate) fn seed() -> u32 {
     seed
 }
 
-/// Feeds the watchdog and sleeps forever, for a drone that cannot join the chain. If no clock wakes the chip, the
-/// watchdog restarts it.
+/// Feeds the watchdog and sleeps, forever. For a drone that cannot join the chain.
+///
+/// If no clock wakes the chip, the watchdog restarts it.
 pub(crate) fn stop() -> ! {
     loop {
         chip::feed();
@@ -50,8 +50,9 @@ pub(crate) fn stop() -> ! {
     }
 }
 
-/// Panic handler that makes the linker fail if it is used. So a successful `cargo cost` proves that no panic is
-/// reachable.
+/// Panic handler that makes the link fail if it is used.
+///
+/// So `cargo cost` proves that no panic is reachable.
 #[cfg(prove_no_panic)]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -65,13 +66,13 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
 #[cfg(not(prove_no_panic))]
 use panic_halt as _;
 
-// defmt's linker script sorts the strings of the log, so it is linked only with a log. As a library name it is found in defmt's
-// build directory.
+// defmt's linker script sorts the strings of the log, so it is linked only with a log. It is linked as a library,
+// because the linker finds that in defmt's build directory.
 #[cfg(feature = "defmt")]
 #[link(name = "defmt.x", kind = "dylib", modifiers = "+verbatim")]
 unsafe extern "C" {}
 
-/// Logger of this program that sends defmt frames over a UART, not through the debug probe (RTT).
+/// Logger that sends defmt frames over a UART, not through the debug probe (RTT).
 #[cfg(all(feature = "defmt", not(feature = "rtt")))]
 mod defmt_frames {
     use core::sync::atomic::{AtomicBool, Ordering};
@@ -84,12 +85,11 @@ mod defmt_frames {
     #[defmt::global_logger]
     struct Logger;
 
-    /// True if interrupts were enabled before the log frame began. They are then enabled again at the end of the log
-    /// frame.
+    /// True if interrupts were enabled before the log frame: then its end enables them again.
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-    // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame, which no
-    // `Format` of this program makes, would garble only the text of both. No method logs.
+    // SAFETY: interrupts are off from `acquire` to `release`, so frames are written one at a time. A nested frame,
+    // which no `Format` of this program makes, would garble only the text of both. No method logs.
     unsafe impl defmt::Logger for Logger {
         fn acquire() {
             let on = primask::read().is_active();

@@ -17,8 +17,9 @@ pub(crate) struct Begun {
     pub(crate) reset: Reset,
 }
 
-/// Starts the watchdog, and then the clocks. If the start of the clocks hangs, the watchdog restarts the chip. Call it
-/// once after a reset, before anything that depends on a clock.
+/// Starts the watchdog, and then the clocks. If the clocks hang, the watchdog restarts the chip.
+///
+/// Call it once after a reset, before anything that depends on a clock.
 pub(crate) fn begin() -> Begun {
     let reset = Reset::take(&mut Chip);
     WAS_HUNG.store(reset == Reset::Watchdog, Ordering::Relaxed);
@@ -37,7 +38,7 @@ pub(crate) fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// Ends a turn of the main loop at `now`: feeds the watchdog unless a timer of `relay` is overdue.
+/// Ends a cycle of the main loop: feeds the watchdog unless a timer of `relay` is overdue.
 pub(crate) fn end_turn(relay: &Relay, now: Instant) {
     let due = relay.poll_timeout().map(Instant::as_micros);
     if watchdog::may_feed(now.as_micros(), due) {
@@ -45,7 +46,7 @@ pub(crate) fn end_turn(relay: &Relay, now: Instant) {
     }
 }
 
-/// Returns the time until which the main loop may sleep: `wake`, but at most [`TURN`] after `now`.
+/// Returns when the main loop must wake up: at `wake`, but at most [`TURN`] after `now`.
 pub(crate) fn latest(now: Instant, wake: Option<Instant>) -> Instant {
     let turn = now + TURN;
     wake.map_or(turn, |wake| wake.min(turn))

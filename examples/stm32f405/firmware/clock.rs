@@ -1,4 +1,4 @@
-//! Time since the start, and sleep until a time or an input.
+//! Time since the start, and sleep until a time or received bytes.
 
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -10,12 +10,12 @@ use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::exception;
 use uav_relay::Instant;
 
-/// Number of `SysTick` cycles in a microsecond. `SysTick` interrupts every 1000 microseconds.
+/// Number of `SysTick` cycles in a microsecond. `SysTick` interrupts every millisecond.
 static MICRO: AtomicU32 = AtomicU32::new(1);
 
 /// Milliseconds since the start. The 64 bits never overflow.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
-/// True if bytes have arrived since the main loop's last sleep.
+/// True if bytes have arrived since the last sleep.
 static INPUT: AtomicBool = AtomicBool::new(false);
 
 pub(crate) struct Clock {
@@ -23,8 +23,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts the clock, which counts the `SysTick` interrupts of each millisecond. The core runs at `core_hz`, a
-    /// multiple of 1 MHz.
+    /// Starts the clock, which counts the milliseconds of `SysTick`. `core_hz` is a multiple of 1 MHz.
     pub(crate) fn start(mut tick: SYST, core_hz: u32) -> Self {
         let micro = core_hz / 1_000_000;
         MICRO.store(micro, Ordering::Relaxed);
@@ -44,7 +43,7 @@ impl Clock {
         self.last
     }
 
-    /// Sleeps until the time `wake`, or until bytes arrive. If `wake` is `None`, there is no time limit.
+    /// Sleeps until the time `wake`, if any, or until bytes arrive.
     pub(crate) fn sleep(&mut self, wake: Option<Instant>) {
         while wake.is_none_or(|wake| self.now() < wake) {
             // An interrupt after this check of INPUT stays pending, and `wfi` returns for it.
@@ -71,14 +70,14 @@ pub(crate) fn micros() -> u64 {
         let ticks = TICKS.borrow(cs).get();
         let count = SYST::get_current();
         if SCB::is_pendst_pending() {
-            // The period has ended, and its interrupt is pending until this section ends.
+            // The millisecond is over, but its interrupt waits for the end of this section.
             (ticks.wrapping_add(1), SYST::get_current())
         } else {
             (ticks, count)
         }
     });
     let micro = MICRO.load(Ordering::Relaxed).max(1);
-    // The counter runs down from the period - 1 and begins a period at 0.
+    // The counter runs down to 0 from the cycles of a millisecond, minus 1.
     let tick = micro.saturating_mul(1_000);
     let cycles = tick.wrapping_sub(count) % tick;
     ticks

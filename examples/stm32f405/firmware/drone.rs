@@ -1,4 +1,4 @@
-//! Drone as defined by its configuration block, for either wiring.
+//! Drone as defined by its configuration block, with wires or a radio.
 
 use uav_relay::Auth;
 use uav_relay::GuardConfig;
@@ -13,17 +13,16 @@ use super::flash;
 use super::{board, config, log, persistent};
 use crate::autopilot::{Autopilot, Uart};
 
-/// Relay, state of its stored votes, and the autopilot link if the drone has one. The relay and the link are in static
-/// RAM, to save stack.
+/// Relay, state of its stored votes, and the autopilot link, if any. Relay and link are in static RAM.
 pub(crate) struct Drone {
     pub(crate) relay: &'static mut Relay,
     pub(crate) views: &'static mut persistent::Views,
     pub(crate) autopilot: Option<&'static mut Autopilot>,
 }
 
-/// Creates the drone that the configuration block describes; `None` if it cannot fly.
+/// Creates the drone of the configuration block; `None` if it cannot fly.
 ///
-/// [`switch_on`] and this function are not inlined, so that their stack frames are released.
+/// Neither [`switch_on`] nor this function is inlined, so that their stack frames are freed.
 #[inline(never)]
 pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     let field = cortex_m::singleton!(FIELD: config::FieldStorage = config::EMPTY)?;
@@ -56,8 +55,9 @@ pub(crate) fn begin(wiring: Wiring, uart: Uart, now: Instant) -> Option<Drone> {
     }
 }
 
-/// Creates the relay in static RAM, to save stack. `None` if the relay rejects the configuration: this image lacks a
-/// feature, or the joint method is configured for more than 100 relays.
+/// Creates the relay in static RAM, to save stack; `None` if the relay rejects the configuration.
+///
+/// It rejects a feature that this image lacks, and the joint method for more than 100 relays.
 #[inline(never)]
 fn switch_on(
     config: &config::Config,
@@ -72,7 +72,7 @@ fn switch_on(
         }),
         ..config.settings(wiring)
     };
-    // Most other errors were ruled out by the check of the configuration.
+    // The check of the configuration has ruled out most other errors.
     let slot = cortex_m::singleton!(RELAY: Option<Relay> = None)?;
     let seed = board::seed();
     Relay::new_in(slot, &config.mission, config.identity, &settings, seed, now)
@@ -80,13 +80,13 @@ fn switch_on(
         .ok()
 }
 
-/// Error: a signing key is configured, but frames cannot be signed.
+/// Error: the block has a signing key, but frames cannot be signed.
 struct CannotSign;
 
 /// Returns the signing key and this start's epoch; `None` if the configuration block has no key.
 ///
-/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored epochs and not below
-/// the block's epoch. But the next start may then use the same epoch once more.
+/// If the flash cannot be written, as in an emulator, the epoch is still larger than all stored ones and not below
+/// the block's. But the next start may reuse it.
 #[cfg(feature = "auth")]
 #[inline(never)]
 fn sign() -> Result<Option<Auth>, CannotSign> {

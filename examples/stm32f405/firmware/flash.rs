@@ -1,4 +1,4 @@
-//! Flash sectors that this program writes, with all the unsafe code for them.
+//! Flash sectors that this program writes. All unsafe code for them is here.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -74,19 +74,19 @@ impl Flash for Sectors {
 }
 
 impl Sector {
-    /// Returns the length of this flash sector in words: 16 KiB or 128 KiB. Sectors of 64 KiB are not in use.
+    /// Returns the length of this sector, words: 16 KiB or 128 KiB. Sectors of 64 KiB are not used.
     const fn len(self) -> usize {
         let bytes = if self.0 < LARGE { 16 * KIB } else { 128 * KIB };
         bytes as usize / 4
     }
 
     const fn words<'a>(self) -> &'a [u32] {
-        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors` that is
-        // borrowed while the slice lives.
+        // SAFETY: a part of the flash, always readable and aligned. Only this file writes there, through a `Sectors`
+        // that is borrowed while the slice lives.
         unsafe { core::slice::from_raw_parts(self.0 as *const u32, self.len()) }
     }
 
-    /// Returns the number by which the flash registers select the sector. The large sectors begin with number 5.
+    /// Returns the sector's number in the flash registers. The large sectors begin with number 5.
     const fn number(self) -> u8 {
         let number = if self.0 < LARGE {
             (self.0 - FLASH_START) / (16 * KIB)
@@ -96,7 +96,7 @@ impl Sector {
         number.to_le_bytes()[0]
     }
 
-    /// Erases the flash sector. The CPU stops for up to 2 s meanwhile, depending on the sector's size.
+    /// Erases the sector. This stops the CPU for up to 2 s, depending on its size.
     #[inline(never)]
     fn erase(self) {
         let flash = unlocked();
@@ -112,15 +112,16 @@ impl Sector {
         flash.cr().modify(|_, w| w.strt().set_bit());
         wait(&flash);
         flash.cr().write(|w| w.lock().set_bit());
-        // The data cache must be reset by hand.
+        // The data cache must be reset explicitly.
         flash.acr().modify(|_, w| w.dcen().clear_bit());
         flash.acr().modify(|_, w| w.dcrst().set_bit());
         flash.acr().modify(|_, w| w.dcrst().clear_bit());
         flash.acr().modify(|_, w| w.dcen().set_bit());
     }
 
-    /// Writes words from word `first` of the sector on; returns true if they are read back correctly. Stops the CPU
-    /// for some 16 microseconds a word.
+    /// Writes words from word `first` on; returns true if they are read back correctly.
+    ///
+    /// Stops the CPU for about 16 microseconds a word.
     #[inline(never)]
     fn write(self, first: usize, words: &[u32]) -> bool {
         let end = first.checked_add(words.len());
@@ -145,8 +146,7 @@ impl Sector {
     }
 }
 
-/// Value of the field PSIZE of the flash's control register: 32 bits are written at once. The board's supply of 3.3 V
-/// permits this.
+/// Value of the field PSIZE in the flash's control register: 32 bits at once, which 3.3 V permit.
 const BY_WORD: u8 = 2;
 
 /// Unlocks the flash registers for writing.
@@ -162,8 +162,7 @@ fn unlocked() -> FLASH {
     flash
 }
 
-/// Waits until the flash is idle, as each command requires. Reads need no such wait, because the hardware delays them
-/// while the flash is busy.
+/// Waits until the flash is idle, as each command requires. The hardware delays reads by itself.
 fn wait(flash: &FLASH) {
     while flash.sr().read().bsy().bit_is_set() {}
 }

@@ -1,6 +1,7 @@
-//! Log lines, with `--features defmt`. Their output is `uart_log.rs` or, with `--features rtt`, the debug probe: `probe-rs run` prints
-//! it. That is written to RAM without blocking; the probe can not request the counters, and frames that it reads too slowly are lost
-//! uncounted.
+//! Log lines, with `--features defmt`. They go to a UART (`uart_log.rs`) or to the debug probe.
+//!
+//! With `--features rtt`, `probe-rs run` prints them. They are then written to RAM without blocking. The probe cannot
+//! request the counters, and frames that it reads too slowly are lost uncounted.
 #![allow(
     clippy::match_same_arms,
     clippy::if_same_then_else,
@@ -32,13 +33,13 @@ use super::uart_log::lost;
 #[cfg(feature = "rtt")]
 use defmt_rtt as _;
 
-/// Returns false. The counters are requested over the log's UART, and this image has no log over a UART.
+/// Returns false: without a log over a UART the counters cannot be requested.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 pub(crate) const fn counters_requested() -> bool {
     false
 }
 
-/// Returns 0. Dropped log frames are counted only in an image that logs over a UART.
+/// Returns 0: dropped log frames are counted only for a UART.
 #[cfg(not(all(feature = "defmt", not(feature = "rtt"))))]
 const fn lost() -> u32 {
     0
@@ -47,7 +48,7 @@ const fn lost() -> u32 {
 #[cfg(feature = "defmt")]
 defmt::timestamp!("{=u64:us}", super::clock::micros());
 
-/// Logs a line at one of defmt's levels, such as `info`. Without `--features defmt` the macro does nothing.
+/// Logs a line at a level of defmt, such as `info`. Does nothing without `--features defmt`.
 macro_rules! line {
     ($level:ident, $text:literal $(, $value:expr)* $(,)?) => {{
         #[cfg(feature = "defmt")]
@@ -270,7 +271,7 @@ pub(crate) fn refused(error: ConfigError) {
     }
 }
 
-/// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
+/// Logs the signing epoch of this start, and whether it was stored.
 #[cfg(feature = "auth")]
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
@@ -298,7 +299,7 @@ pub(crate) fn no_epoch() {
     );
 }
 
-/// Logs that a mission uploaded before this start was restored.
+/// Logs that an uploaded mission was restored after a reboot.
 #[cfg(feature = "upload")]
 pub(crate) fn resumes(version: u16) {
     info!(
@@ -307,7 +308,7 @@ pub(crate) fn resumes(version: u16) {
     );
 }
 
-/// Logs that a mission was uploaded in flight; `is_stored` is true if the flash has stored it.
+/// Logs that a mission was uploaded in flight, and whether it was stored.
 #[cfg(feature = "upload")]
 pub(crate) fn uploaded(version: u16, is_stored: bool) {
     if is_stored {
@@ -320,7 +321,7 @@ pub(crate) fn uploaded(version: u16, is_stored: bool) {
     }
 }
 
-/// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
+/// Logs that votes were found after a reboot, and whether the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's members from before this start were read from flash");
@@ -331,7 +332,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     }
 }
 
-/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
+/// Logs that storing the relay's votes works again (true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
         info!("votes on the chain's members can be stored in flash again");
@@ -349,7 +350,7 @@ pub(crate) fn cannot_sign() {
     );
 }
 
-/// Logs that the relay rejects the configuration. The usual reason is that this image lacks a feature.
+/// Logs that the relay rejects the configuration, usually because this image lacks a feature.
 pub(crate) fn cannot_fly(error: SetupError) {
     error!(
         "configuration refused: not supported by this image: {}",

@@ -1,4 +1,4 @@
-//! Persistent state: the relay's votes on views and, with the feature `upload`, the uploaded mission.
+//! Persistent state: the relay's votes and, with the feature `upload`, the uploaded mission.
 
 use uav_relay::{Instant, Relay, ViewRecord};
 #[cfg(feature = "upload")]
@@ -11,7 +11,7 @@ use super::flash::Sectors;
 use super::uploads;
 use super::{board, flash, log};
 
-/// Restores the mission uploaded before the reboot, if any, into a newly created `relay`.
+/// Restores an uploaded mission from before the reboot into `relay`, if any.
 #[cfg(feature = "upload")]
 #[inline(never)]
 pub(crate) fn resume_upload(relay: &mut Relay) {
@@ -41,16 +41,16 @@ fn uploads() -> Journal<Sectors> {
 pub(crate) struct Views(views::Views);
 
 impl Views {
-    /// Restores the votes from before the reboot into a new `relay`. Call it before any other use of the relay, but
-    /// after a stored upload was restored.
+    /// Restores the votes from before the reboot into a new `relay`.
+    ///
+    /// Call it before any other use of the relay, but after a stored upload was restored.
     #[inline(never)]
     pub(crate) fn resume(relay: &mut Relay, now: Instant) -> Self {
         let log = views::log(flash::VIEWS, block());
         Self(views::Views::resume(relay, now, log, log::votes_restored))
     }
 
-    /// Stores the relay's changed votes on the chain's membership. Returns true even if the write fails, so that the
-    /// relay flies on.
+    /// Stores the relay's votes. Returns true even if the write fails: the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) -> bool {
         if let Some(stored) = self.0.store(record, views::log(flash::VIEWS, block())) {
             log::votes(stored);

@@ -1,9 +1,9 @@
-//! Pins of every image, of either wiring.
+//! Pins of every image, with wires or a radio.
 //!
 //! | function | pins |
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | USART2: TX PA2, RX PA3 |
-//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
+//! | autopilot, if the block has Tx and Rx positions | USART1: TX PA9, RX PA10 |
 //! | log, with `--features defmt` | UART4: TX PC10, RX PC11 |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI; `SysTick` every millisecond |
 
@@ -23,12 +23,12 @@ use crate::autopilot::{self, Uart};
 
 static FIRST: Slot<USART2> = Mutex::new(RefCell::new(None));
 
-/// Board with its clocks running. It has the ports and peripherals that the firmware may use.
+/// Board with running clocks: ports and peripherals.
 pub(crate) struct Pins {
     pub(crate) clock: Clock,
-    /// Port at USART2, to the neighbour toward the transmitter or to the radio.
+    /// Port at USART2: to the neighbour toward the transmitter, or to the radio.
     pub(crate) first: Port,
-    /// UART to which the autopilot is connected.
+    /// UART of the autopilot.
     pub(crate) uart: Uart,
     #[allow(dead_code, reason = "the driver enable of a radio")]
     pub(crate) pa1: PA1,
@@ -45,7 +45,7 @@ pub(crate) struct Second {
     pub(crate) rcc: Rcc,
 }
 
-/// Sets up the board, once: watchdog, clocks, log, the port at USART2, and the UART of the autopilot.
+/// Sets up the board, once: watchdog, clocks, log, port at USART2, and the autopilot's UART.
 pub(crate) fn start() -> Option<Pins> {
     let chip = pac::Peripherals::take()?;
     let core = cortex_m::Peripherals::take()?;

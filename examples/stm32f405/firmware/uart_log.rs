@@ -1,6 +1,6 @@
-//! Log output over UART4 (TX PC10, RX PC11), in frames for `defmt-print`. A received `s` requests the counters.
+//! Log over UART4 (TX PC10, RX PC11), in frames for `defmt-print`. A received `s` requests the counters.
 //!
-//! A frame is queued whole or not at all: logging never blocks, and dropped frames are counted.
+//! A frame is queued whole or dropped and counted, so logging never blocks.
 
 use core::cell::RefCell;
 
@@ -13,7 +13,7 @@ use uav_relay::serial::SerialPort;
 
 use super::port::{self, Port, Queues, RECEIVED, Slot};
 
-/// Buffer of a log frame. Its capacity is the length of the longest log frame, the frame with the relay's counters.
+/// Buffer of a log frame. The frame with the relay's counters is the longest.
 type Frame = Vec<u8, 160>;
 
 /// Capacity of the log's send queue, bytes. A full queue takes 89 ms to send.
@@ -23,7 +23,7 @@ struct Log {
     port: Option<Port>,
     encoder: defmt::Encoder,
     frame: Frame,
-    /// True if the present log frame exceeds its buffer, and must be dropped.
+    /// True if the present log frame exceeds its buffer and must be dropped.
     cut: bool,
     lost: u32,
 }
@@ -94,7 +94,7 @@ pub(crate) fn write(bytes: &[u8]) {
     });
 }
 
-/// Ends the log frame. Queues the whole frame if the queue has room for it; otherwise drops the frame.
+/// Ends the log frame: queues it, or drops it if the queue has no room.
 pub(crate) fn end() {
     with(|log| {
         let Log {

@@ -1,4 +1,4 @@
-//! Passes the linker script of cortex-m-rt and the location of memory.x to the linker.
+//! Passes cortex-m-rt's linker script and the folder of memory.x to the linker.
 
 fn main() {
     let folder = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();

@@ -1,7 +1,7 @@
 //! Writes frames as a pcapng capture, for Wireshark and `cargo decode`.
 //!
-//! A packet is one frame as on the wire, with COBS and delimiter, under LINKTYPE_USER0 (147). A [`Capture`] writes frames;
-//! [`FrameSplitter`] splits the byte stream of a port into frames.
+//! A packet is one frame as on the wire, with COBS and delimiter, under LINKTYPE_USER0 (147). [`Capture`] writes
+//! frames; [`FrameSplitter`] splits the byte stream of a port into frames.
 //!
 //! ```
 //! use std::time::Duration;

@@ -1,15 +1,14 @@
 //! Splits a byte stream into frames at the delimiters.
 
-/// Maximum number of bytes that the splitter stores between two frame delimiters. More bytes cannot be a frame; only
-/// their start is kept.
+/// Maximum number of bytes kept of a piece. A longer one cannot be a frame.
 pub const MOST: usize = 1_024;
 
-/// Bytes of a stream from one frame delimiter to the next: usually a frame. The delimiter at the end is included.
+/// Bytes from one frame delimiter to the next, including the latter: usually a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Piece<'a> {
-    /// Bytes of the piece with its delimiter. A piece longer than [`MOST`] is cut after [`MOST`] bytes.
+    /// Bytes of the piece with its delimiter, at most [`MOST`].
     pub bytes: &'a [u8],
-    /// Length of the whole piece, bytes, even if `bytes` is cut.
+    /// Length of the whole piece, bytes. It exceeds `bytes` if those are cut.
     pub len: usize,
 }
 
@@ -21,7 +20,7 @@ pub struct FrameSplitter {
 }
 
 impl FrameSplitter {
-    /// Appends `bytes` to the stream and passes each completed piece to `take`; empty pieces are skipped.
+    /// Appends `bytes` to the stream, and passes each complete piece to `take`. Empty pieces are skipped.
     ///
     /// Work is linear in the number of bytes, memory at most [`MOST`].
     ///
@@ -53,7 +52,7 @@ impl FrameSplitter {
         Ok(())
     }
 
-    /// Returns the incomplete piece at the end of the stream; `None` if the stream ends with a delimiter.
+    /// Returns the incomplete piece at the end of the stream, if any.
     pub fn rest(&self) -> Option<Piece<'_>> {
         (self.len > 0).then_some(Piece {
             bytes: &self.bytes,

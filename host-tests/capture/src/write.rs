@@ -19,18 +19,18 @@ const INTERFACE_DESCRIPTION_TEXT: u16 = 3;
 const INTERFACE_RESOLUTION: u16 = 9;
 const PACKET_FLAGS: u16 = 2;
 
-/// Resolution of the timestamps in a capture, 10^-9 s. A pcapng file states only the exponent, 9.
+/// Resolution of the timestamps in a capture: 10^-9 s. A pcapng file has only the exponent, 9.
 const NANOSECONDS: u8 = 9;
 
-/// Direction of a frame, relative to the node that writes the capture.
+/// Direction of a frame, seen from the node that writes the capture.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Direction {
     /// Frame between other nodes, or of unknown direction.
     #[default]
     Unknown,
-    /// Frame received by the node that writes the capture.
+    /// Received frame.
     In,
-    /// Frame sent by the node that writes the capture.
+    /// Sent frame.
     Out,
 }
 
@@ -55,9 +55,9 @@ pub struct Frame<'a> {
     pub at: Duration,
     /// Bytes of the frame on the wire: COBS, with the final delimiter.
     pub bytes: &'a [u8],
-    /// Length of the whole frame, bytes. It is larger than the length of `bytes` if `bytes` is cut.
+    /// Length of the whole frame, bytes. It exceeds `bytes` if those are cut.
     pub len: usize,
-    /// Direction of the frame, relative to the node that writes the capture.
+    /// Direction of the frame.
     pub direction: Direction,
     /// Comment on the frame in the capture; empty without a comment.
     pub comment: &'a str,
@@ -78,10 +78,9 @@ impl<W: Write> std::fmt::Debug for Capture<W> {
 }
 
 impl<W: Write> Capture<W> {
-    /// Starts a capture in `out`, written by the program `application`. `comment` describes the whole capture; an empty
-    /// comment is left out.
+    /// Starts a capture in `out`. `application` names the program; `comment`, if any, describes the capture.
     ///
-    /// The capture itself buffers no frame: each frame is passed to `out` at once.
+    /// No frame is buffered here: each is passed to `out` at once.
     ///
     /// # Errors
     /// `out` cannot be written to.
@@ -106,7 +105,7 @@ impl<W: Write> Capture<W> {
     /// The capture cannot be written.
     pub fn interface(&mut self, name: &str, description: &str) -> io::Result<Interface> {
         let mut block = Block::new(INTERFACE_DESCRIPTION);
-        // The link type has 16 bits, followed by 16 reserved ones.
+        // The link type has 16 bits, followed by 16 reserved bits.
         block.u32(LINK_TYPE);
         // No limit on the length of packets.
         block.u32(0);
@@ -160,8 +159,7 @@ impl<W: Write> Capture<W> {
     }
 }
 
-/// Block of a pcapng file: type, length, contents, and the length again. Little-endian; contents are padded to four
-/// bytes.
+/// Block of a pcapng file: type, length, contents, length again. Little-endian, padded to four bytes.
 struct Block {
     kind: u32,
     contents: Vec<u8>,

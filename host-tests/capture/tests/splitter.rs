@@ -1,4 +1,4 @@
-//! Splitting does not depend on the reads, and a capture returns the frames written to it.
+//! Tests: splitting does not depend on the reads, and a capture returns the frames written to it.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::convert::Infallible;
@@ -10,8 +10,9 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use uav_relay_capture::{Capture, Direction, Frame, FrameSplitter, MOST};
 
-/// Splits a byte stream at the frame delimiters. `reads` are the portions in which the stream arrives. Returns each
-/// piece with its length, and the length of the incomplete piece at the end.
+/// Splits a byte stream that arrives in the portions `reads`. Returns each piece with its length.
+///
+/// Also returns the length of the incomplete piece at the end.
 fn pieces(reads: &[&[u8]]) -> (Vec<(Vec<u8>, usize)>, usize) {
     let (mut cut, mut all) = (FrameSplitter::default(), Vec::new());
     for read in reads {

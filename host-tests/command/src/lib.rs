@@ -1,4 +1,4 @@
-//! Shared parts of the commands: errors, output and parsing of numbers.
+//! Errors, output and number parsing of the commands.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -7,10 +7,10 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use uav_relay::{ChannelLoad, Duration};
 
-/// Maximum data rate that the commands accept for `--baud`, bit/s.
+/// Maximum of `--baud`, bit/s.
 pub const MOST_BAUD: u32 = 10_000_000;
 
-/// Error of a command: the line that is printed on standard error, and the exit status.
+/// Error of a command: one line for standard error, and the exit status.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Failure {
     /// Exit status: 1 if the request cannot be met, 2 if the input is wrong.
@@ -20,7 +20,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// Creates an error for wrong input, with exit status 2 and the message `line`.
+    /// Creates an error for wrong input (exit status 2).
     pub fn input(line: impl Into<String>) -> Self {
         Self {
             status: 2,
@@ -28,7 +28,7 @@ impl Failure {
         }
     }
 
-    /// Creates an error for a request that cannot be met, with exit status 1 and the message `line`.
+    /// Creates an error for a request that cannot be met (exit status 1).
     pub fn unmet(line: impl Into<String>) -> Self {
         Self {
             status: 1,
@@ -37,7 +37,7 @@ impl Failure {
     }
 }
 
-/// Prints the error of a command, if any, and returns the command's exit status.
+/// Prints the error of a command, if any, and returns the exit status.
 pub fn ended(result: Result<(), Failure>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -48,9 +48,7 @@ pub fn ended(result: Result<(), Failure>) -> ExitCode {
     }
 }
 
-/// Prints the requested help, or the error in the options. Returns the exit status.
-///
-/// For an error the function prints one line, which states the permitted values.
+/// Prints the requested help, or one line about a wrong option. Returns the exit status.
 pub fn usage(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         print(&error.to_string());
@@ -71,7 +69,7 @@ fn wrong(error: &clap::Error) -> String {
             wrong.push_str(missing.trim());
         }
     }
-    // Allowed values and suggestions are listed separately, too.
+    // Permitted values and suggestions are listed separately, too.
     let told = |kind| match error.get(kind) {
         Some(ContextValue::String(one)) => one.clone(),
         Some(ContextValue::Strings(all)) => all.join(", "),
@@ -100,7 +98,7 @@ pub fn print(text: &str) {
     _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// Formats a command-line option with its value, as in `--option value`. `None` if the option is not given.
+/// Formats an option with its value, as in `--option value`, if it is given.
 pub fn given_option(option: &str, value: Option<impl std::fmt::Display>) -> Option<String> {
     value.map(|value| format!("{option} {value}"))
 }
@@ -115,7 +113,7 @@ pub fn json(report: &impl serde::Serialize) -> Result<String, Failure> {
         .map_err(|error| Failure::input(error.to_string()))
 }
 
-/// Writes the picture `drawing`, SVG text, to the file of option `--svg`.
+/// Writes SVG text to the file of the option `--svg`.
 ///
 /// # Errors
 /// The file cannot be written: the message names the file and the reason.
@@ -130,17 +128,16 @@ pub fn write(file: &std::path::Path, drawing: &str) -> Result<(), Failure> {
 
 /// Checks that a radio channel of `baud` bit/s is fast enough for the relays that share it.
 ///
-/// `load` has the number of relays; `probe_after` is the silence after which a relay requests a heartbeat from a
-/// neighbour.
+/// `load` has the number of relays. After the silence `probe_after` a relay asks a neighbour for a heartbeat.
 ///
 /// # Errors
-/// The least sufficient data rate, the number of relays on the channel, and the alternatives.
+/// States the lowest sufficient data rate, the number of relays, and the alternatives.
 pub fn carries(baud: u32, load: ChannelLoad, probe_after: Duration) -> Result<(), String> {
     load.carried(baud, probe_after)
         .map_err(|full| format!("--baud {baud}: {full}"))
 }
 
-/// Parses a number on the command line, which must be within `least` to `most`.
+/// Parses a number in the range `least` to `most`.
 ///
 /// # Errors
 /// The text is not a number in this range; the message states the range.
@@ -154,7 +151,7 @@ pub fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// Returns a parser for whole numbers on the command line, which must be within `least` to `most`.
+/// Returns a parser for whole numbers in the range `least` to `most`.
 pub fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
     T: std::str::FromStr + std::fmt::Display + PartialOrd + Copy + Send + Sync,
@@ -168,7 +165,7 @@ where
     }
 }
 
-/// Parses the name of an output file; `-` is rejected, because the report goes to standard output.
+/// Parses the name of an output file. `-` is rejected, because the report goes to standard output.
 ///
 /// # Errors
 /// The name is empty or `-`; the message names the alternative.

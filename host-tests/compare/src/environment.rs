@@ -1,10 +1,10 @@
-//! Virtual environment of Python with the packages of the other solvers.
+//! Virtual environment of Python with the packages of the other solvers: SciPy and NLopt.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Default folder of the Python virtual environment, inside the target folder.
+/// Default folder of the virtual environment, inside the target folder.
 pub(crate) const USUAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/compare");
 
 const REQUIREMENTS: &str = include_str!("../rivals/requirements.txt");
@@ -12,7 +12,7 @@ const REQUIREMENTS_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/req
 
 pub(crate) fn python(venv: &Path) -> Result<PathBuf, String> {
     let python = venv.join("bin").join("python");
-    // Written last: without it the environment is incomplete, or has other versions.
+    // Written last: without this file the environment is incomplete or outdated.
     let finished = venv.join("requirements.txt");
     if python.exists() && std::fs::read_to_string(&finished).is_ok_and(|text| text == REQUIREMENTS)
     {
@@ -74,7 +74,7 @@ fn succeed(command: &mut Command) -> Result<(), PythonError> {
     said.extend(output.stdout);
     let text = String::from_utf8_lossy(&said);
     let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    // For pip the first error, for other programs the last line.
+    // The first error of pip, or the last line of another program.
     let first = lines.clone().find(|line| line.starts_with("ERROR"));
     let line = first.or_else(|| lines.next_back()).unwrap_or_default();
     Err(PythonError::Failed(line.trim().to_owned()))

@@ -32,10 +32,9 @@ fn processor() -> Option<String> {
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-/// Clock that measures the processor time of this thread, without the time of other programs.
+/// Clock that measures the processor time of this thread, without that of other programs.
 ///
-/// On Linux it is the CPU time that the kernel accounts, with a resolution of some milliseconds. On other systems it
-/// is the wall-clock time.
+/// On Linux its resolution is some milliseconds. On other systems it is the wall-clock time.
 pub(crate) struct Clock {
     started: Instant,
     on_cpu_s: Option<f64>,
@@ -53,7 +52,7 @@ impl Clock {
         let on_cpu_s = on_cpu_s()
             .zip(self.on_cpu_s)
             .map(|(now, before)| now - before);
-        // A kernel without accounting reports 0.
+        // A kernel without CPU accounting reports 0.
         on_cpu_s
             .filter(|time_s| *time_s > 0.0)
             .unwrap_or_else(|| self.started.elapsed().as_secs_f64())

@@ -3,9 +3,9 @@
 //! | file | content |
 //! | --- | --- |
 //! | `problem` | the problems and their true optima |
-//! | `own` | this crate's chains and times |
+//! | `own` | chains and times of this crate |
 //! | `environment` | Python with SciPy and NLopt |
-//! | `rivals` | the other solvers' chains and times |
+//! | `rivals` | chains and times of the other solvers |
 //! | `results` | the results, as printed by `--json` |
 //! | `score` | evaluation of a chain, independent of the solver |
 //! | `table` | the results as markdown |
@@ -32,8 +32,8 @@ use problem::Problem;
 use results::{Results, Solved};
 use rivals::{Rivals, SOLVERS};
 
-/// Places relays with this crate, SciPy and NLopt, and prints what each reached in which time. All run on this machine, one after
-/// the other. The table is markdown.
+/// Places relays with this crate, SciPy and NLopt, and prints what each reached in which time. All run on this
+/// machine, one after the other. The table is markdown.
 #[derive(Parser, Debug)]
 #[command(
     name = "compare",
@@ -79,7 +79,7 @@ fn run(options: &Options) -> Result<String, Failure> {
     table::table(&results).map_err(Failure::input)
 }
 
-/// Comments in RESULTS.md between which the table stands. `--into` replaces the text between them.
+/// Comments in RESULTS.md before and after the table. `--into` replaces the text between them.
 const MARKS: [&str; 2] = [
     "<!-- cargo compare --into examples/RESULTS.md -->\n",
     "<!-- end of that -->\n",
@@ -140,9 +140,9 @@ fn solve(options: &Options) -> Result<Results, Failure> {
     })
 }
 
-/// Solves one problem with this crate, and then with every other solver (rival).
+/// Solves one problem with this crate, and then with every other solver.
 ///
-/// Each other solver reports when it first reaches the SIR of this crate's chain.
+/// Each other solver also reports when it first reaches the SIR of this crate's chain.
 fn by_all(problem: Problem, rivals: &mut Rivals, bar: &ProgressBar) -> Result<Solved, String> {
     let mut runs = own::runs(problem)?;
     let level = table::level(problem, &runs)?;

@@ -1,4 +1,4 @@
-//! Chains of this crate, and their times on this machine.
+//! Chains of this crate, and its computing times on this machine.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -17,17 +17,17 @@ use crate::machine::Clock;
 use crate::problem::{Choice, Problem};
 use crate::results::{Answer, Mark, Run, Solution};
 
-/// Relative tolerance of the target SIR that this crate computes; `cargo chain` has the same tolerance.
+/// Relative tolerance of the target SIR, as in `cargo chain`.
 const TOLERANCE: f64 = 1e-4;
 
-/// Number of timed batches. The result is the median of their times.
+/// Number of timed batches; the result is their median.
 const BATCHES: usize = 5;
-/// Minimum duration of a timed batch. It is far above the resolution of the processor clock, some milliseconds.
+/// Minimum duration of a batch: far above the clock's resolution of some milliseconds.
 const LONG_ENOUGH: Duration = Duration::from_millis(200);
 
-/// Solves `problem` with this crate: first by one computation, then by all relays with messages.
+/// Solves `problem` with this crate: first in one computation, then with relays that exchange messages.
 ///
-/// Other solvers are compared with the first of these runs.
+/// Other solvers are compared with the first result.
 pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
     let briefed = mission::mission(&problem.scenario()?, problem.relays, TOLERANCE);
     let (mission, _) = briefed.map_err(|error| error.to_string())?;
@@ -63,8 +63,7 @@ pub(crate) fn runs(problem: Problem) -> Result<Vec<Run>, String> {
 
 /// Computes the positions of all relays from the mission alone, as the leader of a chain predicts them.
 ///
-/// The cost for N relays: the search for the target SIR evaluates whole chains, at most about fifty. The positions
-/// then cost N^2 / 2 evaluations of one hop.
+/// For N relays the search evaluates whole chains, at most about fifty, and then one hop N^2 / 2 times.
 fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
     let none = || "no target SIR can be met".to_owned();
     let common = |_| mission.config().common;
@@ -74,8 +73,9 @@ fn planned(mission: &Mission) -> Result<Vec<Placement>, String> {
         .collect()
 }
 
-/// Computes the relays' positions from the mission alone by the joint method. It uses all of the method's initial
-/// chains.
+/// Computes the positions of all relays from the mission alone by the joint method.
+///
+/// It tries all initial chains of the method.
 fn alone(mission: &Mission) -> Result<Vec<Placement>, String> {
     let mission = black_box(mission);
     let places = solved(mission, |_| Seat::common(mission));
@@ -91,9 +91,9 @@ fn flown(setup: Setup) -> Result<Vec<Placement>, String> {
         .ok_or_else(|| format!("the chain ended {:?}", outcome.ending))
 }
 
-/// Returns the median processor time of one run of `work`, s, and the result of `work`. The median is over several batches of runs.
+/// Returns the median processor time of one run of `work` over several batches, s, and its result.
 fn timed<T>(work: impl Fn() -> Result<T, String>) -> Result<(f64, T), String> {
-    // Not timed: the first run fills the caches.
+    // Not timed: it fills the caches.
     let result = work()?;
     let mut times = [0.0; BATCHES];
     for time_s in &mut times {

@@ -1,4 +1,4 @@
-//! The problems: relays at a common altitude, with free altitudes, and with lateral room as well.
+//! Problems: relays at one altitude, with free altitudes, and also with free lateral positions.
 
 use std::fmt;
 
@@ -11,22 +11,22 @@ use uav_relay_scenario::{Interference, Scenario};
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Choice {
-    /// Coordinate x alone, along the line from transmitter to receiver. All relays have the same fixed altitude.
+    /// Distance x along the line from transmitter to receiver. All relays have the same altitude.
     Places,
     Altitudes,
     Sides,
 }
 
-/// Placement problem: the best positions of a given number of relays.
+/// Placement problem: find the best positions of a number of relays.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(crate) struct Problem {
     pub(crate) choice: Choice,
     pub(crate) relays: u16,
 }
 
-/// Optima (linear SIR) of the problems, for each kind and number of relays, to nine or ten digits.
+/// True optima (linear SIR) for each kind of problem and number of relays, to nine or ten digits.
 ///
-/// An independent program has computed the values.
+/// An independent program has computed them.
 const OPTIMA: [(Choice, &[(u16, f64)]); 3] = [
     (
         Choice::Places,
@@ -71,7 +71,7 @@ impl fmt::Display for Problem {
 }
 
 impl Problem {
-    /// Returns the true optimum of this problem (linear SIR). `None` for a problem that is not one of [`all`].
+    /// Returns the true optimum (linear SIR); `None` if the problem is not in [`all`].
     pub(crate) fn optimum(self) -> Option<f64> {
         let (_, optima) = OPTIMA.iter().find(|(choice, _)| *choice == self.choice)?;
         let known = optima.iter().find(|(relays, _)| *relays == self.relays)?;
@@ -92,8 +92,7 @@ impl Problem {
         }
     }
 
-    /// Returns the problem as the reference functions and the other solvers need it. The result has the link, and the
-    /// limits of the relays' altitudes and lateral positions.
+    /// Returns link and limits (altitude and lateral position) of the problem, as other solvers use them.
     pub(crate) fn link(self) -> Result<(Link, Corridor), String> {
         let scenario = self.scenario()?;
         let Interference::Sources(sources) = &scenario.interference else {
@@ -117,9 +116,9 @@ impl Problem {
             y_i: source.y_m,
             mu_los,
             mu_nlos: factor(channel.excess_loss_nlos_db),
-            // All scenarios have line of sight between ground and air.
+            // Line of sight between ground and air, as in all scenarios.
             eta: mu_los,
-            // Without noise, like the other solvers.
+            // No noise, as in the other solvers.
             noise_w: 0.0,
             relays: vec![station; usize::from(self.relays)],
         };

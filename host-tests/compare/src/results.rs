@@ -9,7 +9,7 @@ use crate::problem::Problem;
 pub(crate) struct Results {
     pub(crate) machine: Machine,
     pub(crate) versions: Versions,
-    /// Processor time limit of the other solvers for each problem, s.
+    /// Processor time limit of the other solvers per problem, s.
     pub(crate) limit_s: f64,
     pub(crate) problems: Vec<Solved>,
 }
@@ -21,7 +21,7 @@ pub(crate) struct Versions {
     pub(crate) nlopt: String,
 }
 
-/// Placement problem with the results of all solvers; this crate's results come first.
+/// Placement problem with the results of all solvers, this crate's first.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Solved {
     pub(crate) problem: Problem,
@@ -43,24 +43,22 @@ pub(crate) enum Answer {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Solution {
-    /// Total processor time that the solver took, s.
+    /// Processor time of the solver, s.
     pub(crate) time_s: f64,
-    /// Number of chains that the solver evaluated; `None` for solvers that do not evaluate chains.
+    /// Number of evaluated chains; `None` for solvers that do not evaluate chains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) evaluations: Option<u64>,
     /// SIR (linear) of the worst hop, as reported by the solver.
     pub(crate) sir: f64,
-    /// Position of every relay (x, y and altitude, m), from the transmitter on.
+    /// Position of every relay (x, y, altitude; m), from the transmitter on.
     pub(crate) chain: Chain,
-    /// First chain in the solver's run whose SIR is within [`crate::score::GOOD`] of the optimum. `None` if the run has
-    /// no such chain.
+    /// First chain of the run whose SIR is within [`crate::score::GOOD`] of the optimum, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) good: Option<Mark>,
-    /// First chain in the solver's run whose SIR is at least that of this crate's chain. `None` if the run has no such
-    /// chain.
+    /// First chain of the run with at least the SIR of this crate's chain, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) level: Option<Mark>,
-    /// True if the time limit ended the solver's run.
+    /// True if the time limit ended the run.
     pub(crate) cut: bool,
 }
 
@@ -70,5 +68,5 @@ pub(crate) struct Mark {
     pub(crate) chain: Chain,
 }
 
-/// Position of every relay (x, y and altitude, m), from the transmitter on.
+/// Position of every relay (x, y, altitude; m), from the transmitter on.
 pub(crate) type Chain = Vec<[f64; 3]>;

@@ -14,9 +14,9 @@ use crate::score::GOOD;
 
 const PROGRAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/rivals/serve.py");
 
-/// Returns the longest wall-clock time to wait for an answer of the Python process.
+/// Returns the maximum wall-clock time to wait for an answer of the Python process.
 ///
-/// It is far above the processor time limit `limit_s`, s: a busy machine runs the process only part of the time, and
+/// It is far above the processor time limit `limit_s`, s. A busy machine runs the process only part of the time, and
 /// some steps of the solvers cannot be interrupted.
 fn patience(limit_s: f64) -> Duration {
     Duration::from_secs_f64(20.0 * limit_s + 60.0)
@@ -60,13 +60,14 @@ pub(crate) struct Rivals {
 }
 
 impl Rivals {
-    /// Starts the Python process. It solves a small problem with every solver before anything is timed.
+    /// Starts the Python process, which first solves a small problem with every solver, untimed.
     ///
-    /// `limit_s` is the limit of processor time for each later problem, s.
+    /// `limit_s` is the processor time limit per problem, s.
     pub(crate) fn start(python: &Path, limit_s: f64) -> Result<Self, String> {
         let mut child = Command::new(python)
             .args(["-B", "-W", "ignore", PROGRAM])
-            // At this size threads cost more than they gain: with two on a busy machine SciPy's SLSQP took fifteen times as long.
+            // Threads cost more than they gain at this size: with two on a busy machine SciPy's SLSQP took fifteen
+            // times as long.
             .env("OPENBLAS_NUM_THREADS", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -108,7 +109,7 @@ impl Rivals {
         &self.versions
     }
 
-    /// Solves `problem` with `solver`. The solver also reports when its SIR (linear) has first reached `level`.
+    /// Solves `problem` with `solver`. The result has when its SIR (linear) first reached `level`.
     pub(crate) fn run(
         &mut self,
         solver: Solver,
@@ -131,7 +132,7 @@ impl Rivals {
     }
 
     fn ask(&mut self, task: &Value) -> Result<Value, String> {
-        // If the process has died, the missing answer shows it.
+        // If the process has died, no answer comes.
         _ = writeln!(self.tasks, "{task}");
         match self.answers.recv_timeout(patience(self.limit_s)) {
             Ok(line) => serde_json::from_str(&line).map_err(|error| error.to_string()),
@@ -139,7 +140,7 @@ impl Rivals {
         }
     }
 
-    /// Kills the Python process and returns the last line of its standard error, for an error message.
+    /// Kills the Python process, and returns the last line of its standard error.
     fn last_words(&mut self) -> String {
         _ = self.child.kill();
         let mut text = String::new();

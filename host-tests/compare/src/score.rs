@@ -1,4 +1,4 @@
-//! Evaluation of a chain: its SIR by formulas that no solver shares, if it satisfies the constraints.
+//! Evaluation of a solver's chain: its SIR by separate formulas, if it satisfies the constraints.
 
 use std::fmt;
 
@@ -7,33 +7,30 @@ use uav_relay_oracle::reference::joint::{Corridor, Place, sir};
 
 use crate::results::{Mark, Solution};
 
-/// Maximum relative difference from the optimum SIR for a chain to be good enough. The relays' mission has the same
-/// tolerance.
+/// Maximum relative difference from the optimum SIR for a good chain. The mission has the same tolerance.
 pub(crate) const GOOD: f64 = 1e-4;
 
-/// Tolerance of a relay's position in the checks, m: 16 times the rounding error of an f32 near 1000 m.
+/// Tolerance of a position, m: 16 times the rounding error of an f32 near 1000 m.
 const SLACK_M: f64 = 1e-3;
 
-/// Relative tolerance of a solver's reported SIR. It is ten times the rounding error of a relay's f32 formulas.
+/// Relative tolerance of a reported SIR: ten times the rounding error of the relays' f32 formulas.
 const SIR_SLACK: f64 = 1e-5;
 
 /// Reason why a solver's chain does not count.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Refusal {
     Count(usize),
-    /// A relay is not between transmitter and receiver. The fields are the index of the relay, from 1, and its x, m.
+    /// A relay is not between transmitter and receiver: its index, from 1, and its x, m.
     Outside(usize, f64),
-    /// A relay is outside the lateral range. The fields are the index of the relay, from 1, and its y, m.
+    /// A relay is outside the lateral range: its index, from 1, and its y, m.
     Side(usize, f64),
-    /// A relay is outside the range of altitudes. The fields are the index of the relay, from 1, and its altitude, m.
+    /// A relay is outside the altitude range: its index, from 1, and its altitude, m.
     Altitude(usize, f64),
-    /// A relay has a smaller x than the previous relay. The field is the index of the relay, from 1.
+    /// A relay has a smaller x than the previous one: its index, from 1.
     Order(usize),
-    /// A relay is too close to the previous relay. The fields are the index of the relay, from 1, and the distance of
-    /// the two, m.
+    /// A relay is too close to the previous one: its index, from 1, and their distance, m.
     Separation(usize, f64),
-    /// The reported SIR is wrong. The fields are the SIR that the solver has reported, and the SIR computed from its
-    /// chain.
+    /// The reported SIR is wrong: the SIR reported, and the SIR computed from the chain.
     Sir(f64, f64),
 }
 
@@ -55,14 +52,13 @@ impl fmt::Display for Refusal {
 
 /// Checks a chain against the constraints, and returns the SIR (linear) of its worst hop.
 ///
-/// `room` limits the relays' altitudes and lateral positions. Each entry of `chain` is a relay's [x, y, altitude] in
-/// m.
+/// `room` limits altitudes and lateral positions. `chain` has [x, y, altitude] of each relay, m.
 pub(crate) fn judge(link: &Link, room: Corridor, chain: &[[f64; 3]]) -> Result<f64, Refusal> {
     let count = Refusal::Count(chain.len());
     if chain.len() != link.len() {
         return Err(count);
     }
-    // NaN is outside every range.
+    // NaN is never within.
     let within =
         |low: f64, value: f64, high: f64| (low - SLACK_M..=high + SLACK_M).contains(&value);
     for (relay, [x_m, y_m, h_m]) in (1..).zip(chain) {
@@ -103,17 +99,17 @@ fn rounded(chain: &[[f64; 3]]) -> Vec<[f64; 3]> {
 
 pub(crate) struct Score {
     pub(crate) sir: f64,
-    /// SIR (linear) of the worst hop if positions are rounded to f32, as in a relay's setpoints.
+    /// SIR (linear) of the worst hop with positions rounded to f32, as in a relay's setpoints.
     pub(crate) flown: f64,
-    /// Processor time until the first chain that is good enough, s; `None` without such a chain.
+    /// Processor time until the first good chain, s, if any.
     pub(crate) good_after_s: Option<f64>,
-    /// Processor time until the first chain whose SIR is at least that of this crate's chain, s. `None` without such a
-    /// chain.
+    /// Processor time until the first chain with at least the SIR of this crate's chain, s, if any.
     pub(crate) level_after_s: Option<f64>,
 }
 
-/// Scores a solver's result. `level` is the SIR (linear) of this crate's chain. The SIR is computed anew from the
-/// solver's chain; the reported times are not checked.
+/// Scores a solver's result. `level` is the SIR (linear) of this crate's chain.
+///
+/// The SIR is computed from the solver's chain. The reported times are not checked.
 pub(crate) fn score(
     link: &Link,
     room: Corridor,

@@ -113,7 +113,7 @@ fn circumstances(results: &Results) -> String {
     )
 }
 
-/// Returns the SIR (linear) of this crate's chain, the first run. Other solvers are compared with it.
+/// Returns the SIR (linear) of this crate's chain, the first run.
 pub(crate) fn level(problem: Problem, runs: &[Run]) -> Result<f64, String> {
     let (link, room) = problem.link()?;
     match runs.first().map(|own| &own.answer) {
@@ -134,8 +134,7 @@ struct Line {
     all: String,
 }
 
-/// Name of a solver, and its part of the table row. That part is the cells, or the reason why the solver's chain does
-/// not count.
+/// Name of a solver, and its cells in a table row, or why its chain does not count.
 type Entry<'a> = (&'a str, Result<Line, String>);
 
 fn rows(solved: &Solved) -> Result<String, String> {
@@ -159,8 +158,7 @@ fn rows(solved: &Solved) -> Result<String, String> {
     Ok(text)
 }
 
-/// Returns the table rows of all solvers of one problem. Each row has cells, or the reason why the solver's chain does
-/// not count.
+/// Returns the table rows of all solvers of one problem: cells, or why the chain does not count.
 fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
     let problem = solved.problem;
     let optimum = problem
@@ -172,7 +170,7 @@ fn lines(solved: &Solved) -> Result<Vec<Entry<'_>>, String> {
         Answer::Error(_) => None,
     });
     let own_s = own_s.ok_or_else(|| format!("{problem}: nothing to compare with"))?;
-    // Without a valid first chain the others have no reference.
+    // Without a valid first chain there is nothing to compare with.
     let level = level(problem, &solved.runs).unwrap_or(f64::INFINITY);
     let of = |Run { answer, .. }: &Run| match answer {
         Answer::Error(why) => Err(plain(why)),
@@ -201,14 +199,14 @@ fn line(found: &Solution, score: &Score, optimum: f64, own_s: f64) -> Line {
     }
 }
 
-/// Replaces characters that a table cell cannot contain by spaces.
+/// Replaces characters that a table cell cannot contain with spaces.
 fn plain(why: &str) -> String {
     why.replace(['|', '\n'], " ")
 }
 
 /// Formats the relative difference of an SIR from the optimum for a table cell.
 ///
-/// A difference below 1e-8 is written as "less than 1e-8", because the optimum is known only to nine digits.
+/// The optimum is known to nine digits, so a smaller difference is written as "less than 1e-8".
 fn short(by: f64) -> String {
     if by.abs() < 1e-8 {
         "less than 1e-8".to_owned()
@@ -217,7 +215,7 @@ fn short(by: f64) -> String {
     }
 }
 
-/// Formats a time, s, to two digits, followed by its ratio to `own_s`, the time of this crate.
+/// Formats a time, s, with two digits, and its ratio to this crate's time `own_s`.
 fn time(time_s: f64, own_s: f64) -> String {
     let (value, unit) = match time_s {
         ..1e-3 => (time_s * 1e6, "µs"),

@@ -1,6 +1,7 @@
-//! Random messages by the tables. The one generator of the wire tests, the fuzz targets and the dissector's test.
+//! Random messages from the tables, for the wire tests, the fuzz targets and the dissector's test.
 //!
-//! A message is valid, over the whole range of every field with frequent bounds, or arbitrary: well-formed with any numbers.
+//! Valid messages cover the whole range of every field, and often its bounds. Arbitrary messages are well-formed,
+//! with any numbers.
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -12,7 +13,7 @@ use crate::format::{Field, Kind, Layout};
 use crate::range::{Numbers, bounds, has_room, targets};
 use crate::value::{Fields, Value};
 
-/// Message fields with their usual ranges. Half of the values drawn for such a field are within its usual range.
+/// Message fields with their usual range, from which half of the values are drawn.
 const ORDINARY: [(&str, f64, f64); 13] = [
     ("anchor", 0.25, 4.0),
     ("altitude_m", 15.0, 400.0),
@@ -29,10 +30,10 @@ const ORDINARY: [(&str, f64, f64); 13] = [
     ("interferer_y_m", -2e3, 2e3),
 ];
 
-/// Function that can choose the value of a field. If it returns `None`, the generator draws a random value.
+/// Function that may choose the value of a field; with `None` the value is random.
 pub type Hint<'a> = dyn FnMut(&mut Draw<'_>, &Field) -> Option<Value<'static>> + 'a;
 
-/// Generator of random messages, from a source of bytes: a random generator, or the input of a fuzzer.
+/// Generator of random messages from bytes: of a random generator, or of a fuzzer.
 pub struct Draw<'s> {
     source: &'s mut dyn FnMut() -> u8,
 }
@@ -44,7 +45,7 @@ impl std::fmt::Debug for Draw<'_> {
 }
 
 impl<'s> Draw<'s> {
-    /// Creates a generator of random messages. It takes its random bytes from `source`.
+    /// Creates a generator of random messages with the random bytes of `source`.
     pub fn new(source: &'s mut dyn FnMut() -> u8) -> Self {
         Self { source }
     }
@@ -68,13 +69,14 @@ impl<'s> Draw<'s> {
         f64::from(u32::from_le_bytes(self.bytes())) / f64::from(u32::MAX)
     }
 
-    /// Draws the fields of a message. All values are within the permitted ranges.
+    /// Draws the fields of a valid message.
     pub fn valid<'f>(&mut self, layout: &'f Layout) -> Fields<'f> {
         self.hinted(layout, &mut |_, _| None)
     }
 
-    /// Draws random values for all fields of a message. For each number, `hint` can return a value, even a value
-    /// outside the permitted range. If `hint` returns `None`, the value is random and within the range.
+    /// Draws the fields of a message. `hint` may choose a number, even one outside its permitted range.
+    ///
+    /// With `None` the number is random and in range.
     pub fn hinted<'f>(&mut self, layout: &'f Layout, hint: &mut Hint<'_>) -> Fields<'f> {
         let mut fields = self.fields(&layout.fields, hint);
         obey_rules(&layout.name, &mut fields);
@@ -151,7 +153,7 @@ impl<'s> Draw<'s> {
             }
             Kind::F32 if zero && self.chance(3) => Value::Single(0.0),
             Kind::F32 => {
-                // Bounds are the nearest f32.
+                // The bounds are rounded to f32.
                 let (least, most) = (least as f32, most as f32);
                 let (least, most) = (least.max(f32::MIN), most.min(f32::MAX));
                 let number = self.real(&field.name, least.into(), most.into()) as f32;
@@ -177,7 +179,7 @@ impl<'s> Draw<'s> {
             4 => f32::from_bits(1).into(),
             5..8 => least + self.part() * (most - least),
             side => {
-                // Of any magnitude, on one of the sides of 0 that the range has.
+                // Any magnitude, on either side of 0 if the range has it.
                 let bottom = least.max(-most).max(1e-40).log10();
                 let top = most.abs().max(least.abs()).log10();
                 let number = 10_f64.powf(bottom + self.part() * (top - bottom));
@@ -190,8 +192,7 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws the 32-bit name of a proposed view (membership of the chain). The name has the view's number, at least 1,
-    /// and the node number of its proposer.
+    /// Draws the 32-bit name of a proposed view: its number, at least 1, and its proposer's node number.
     fn view(&mut self) -> u32 {
         let most = 0x003F_FFFF;
         let number = match self.byte() % 8 {
@@ -207,7 +208,7 @@ impl<'s> Draw<'s> {
         number << 10 | node
     }
 
-    /// Draws fields with arbitrary numbers, within their ranges or not. The fields can always be encoded.
+    /// Draws fields with arbitrary numbers, in range or not. They can always be encoded.
     pub fn arbitrary<'f>(&mut self, fields: &'f [Field]) -> Fields<'f> {
         let draw = fields.iter().map(|field| (field, self.any(&field.kind)));
         Fields(draw.collect())
@@ -224,7 +225,7 @@ impl<'s> Draw<'s> {
             }
             Kind::Group(fields) => Value::Group(self.arbitrary(fields)),
             Kind::F32 if self.chance(2) => Value::Single((self.part() * 4e3 - 2e3) as f32),
-            // Values without a word are possible, but half of them have one.
+            // In half of the draws the value has a name.
             Kind::Words(words) if self.chance(2) => {
                 let word = usize::from(self.byte()) % words.len().max(1);
                 Value::Word(word as u8, None)
@@ -233,7 +234,7 @@ impl<'s> Draw<'s> {
         }
     }
 
-    /// Draws any number of this type from random bytes, NaN and the infinities included.
+    /// Draws any number of this type, including NaN and the infinities.
     pub fn any_number<'f>(&mut self, kind: &'f Kind) -> Value<'f> {
         let bytes: [u8; 8] = self.bytes();
         let long = u64::from_le_bytes(bytes);
@@ -257,8 +258,7 @@ impl<'s> Draw<'s> {
     }
 }
 
-/// Changes the views in a Decision message so that they ascend, as the format requires. The order is: base view,
-/// accepted view, proposed view.
+/// Reorders the views in a Decision so that they ascend: base, accepted, proposed.
 fn decision(fields: &mut Fields<'_>) {
     let get = |fields: &Fields<'_>, name: &str| Numbers(fields).get(name);
     let (base, view) = (get(fields, "base_view"), get(fields, "proposed_view"));
@@ -276,8 +276,7 @@ fn decision(fields: &mut Fields<'_>) {
     }
 }
 
-/// Changes the fields of a message so that they obey the rules between several fields. [`range`](crate::range) checks
-/// these rules.
+/// Changes fields so that they obey the rules between fields that [`range`](crate::range) checks.
 fn obey_rules<'f>(message: &str, fields: &mut Fields<'f>) {
     let get = |fields: &Fields<'f>, name: &str| Numbers(fields).get(name);
     let single = |fields: &mut Fields<'f>, name: &str, number: f64| {
@@ -376,11 +375,9 @@ fn list<'f>(fields: &mut Fields<'f>, name: &str, change: impl FnOnce(&mut Vec<Va
     }
 }
 
-/// Changes the four views in a Proposal message so that they ascend, as the format requires. A view is a membership of
-/// the chain.
+/// Reorders the four views in a Proposal so that they ascend, as the format requires.
 ///
-/// The order is: the view that was agreed on, the view that the relay accepted after it, the proposal that led to the
-/// accepted view, and the proposed view.
+/// The order: view agreed on, view accepted after it, proposal of the accepted view, proposed view.
 fn proposal(fields: &mut Fields<'_>) {
     let view = |fields: &Fields<'_>, name| Numbers(fields).get(name) as u32;
     let mut order = vec![view(fields, "agreed_view"), view(fields, "proposed_view")];
@@ -391,7 +388,7 @@ fn proposal(fields: &mut Fields<'_>) {
     order.sort_unstable();
     let last = order.pop().unwrap_or_default();
     if order.contains(&last) {
-        // No view is before the proposed one: none is known to be agreed on or accepted.
+        // No view is older than the proposed one, so none is agreed on or accepted.
         order = vec![0];
         successor = Some(Value::None);
     }

@@ -3,11 +3,9 @@
 use uav_relay::CRC_32C;
 use uav_relay::wire::frame::Header;
 
-/// Returns the header and body of a frame as bytes, without tag and CRC. `flags` is the top nibble of the second header
-/// word.
+/// Returns header and body of a frame, without tag and CRC. `flags` is the top nibble of the second header word.
 ///
-/// Node numbers are not checked. If a number has more than 12 bits, the excess bits overwrite other bits of the header,
-/// so that tests can build invalid frames.
+/// A node number of more than 12 bits overwrites other bits of the header, so that tests can build invalid frames.
 pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
     let first = 0x1000 | header.sender;
     let mut plain = first.to_le_bytes().to_vec();
@@ -18,29 +16,27 @@ pub fn before(header: Header, flags: u16, body: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Returns the frame `plain` with its CRC appended.
+/// Appends the CRC to the frame `plain`.
 pub fn sealed(mut plain: Vec<u8>) -> Vec<u8> {
     plain.extend(CRC_32C.checksum(&plain).to_le_bytes());
     plain
 }
 
-/// Returns a frame with its CRC, but without an authentication tag and COBS.
+/// Returns a frame with CRC, but without tag and COBS.
 pub fn unsigned(header: Header, body: &[u8]) -> Vec<u8> {
     sealed(before(header, 0, body))
 }
 
-/// Returns the frame `plain` as on the wire: encoded with COBS, followed by the delimiter. The COBS encoder is that of
-/// another crate.
+/// Returns the frame `plain` as on the wire: COBS (by another crate), and the delimiter.
 pub fn stuffed(plain: &[u8]) -> Vec<u8> {
     let mut out = cobs::encode_vec(plain);
     out.push(0);
     out
 }
 
-/// Decodes `stuffed`, a frame without its delimiter, according to the definition of COBS.
+/// Decodes `stuffed`, a frame without its delimiter, by the definition of COBS.
 ///
-/// Returns the decoded bytes, and true if the last COBS run is complete. This function exists because decoders of other
-/// crates return no bytes of a truncated frame, but tests need the bytes before the cut.
+/// Also returns true if the last COBS run is complete. Unlike other decoders it returns the bytes before a cut.
 pub fn unstuffed(stuffed: &[u8]) -> (Vec<u8>, bool) {
     let mut plain = Vec::with_capacity(stuffed.len());
     let (mut rest, mut whole) = (stuffed, true);

@@ -17,7 +17,7 @@ use crate::walk::walk;
 pub struct Frame<'f> {
     /// Length of the frame on the wire, bytes.
     pub len: usize,
-    /// Header of the frame; `None` unless version and CRC are right.
+    /// Header of the frame, if version and CRC are right.
     pub header: Option<Header>,
     /// Name of the frame's message, or `Handshake`; `None` if unknown.
     pub name: Option<&'f str>,
@@ -25,16 +25,16 @@ pub struct Frame<'f> {
     pub handshake: bool,
     /// Decoded fields of the body, up to the first field that cannot be decoded.
     pub fields: Fields<'f>,
-    /// Signed part of the frame (header and body), and its authentication tag. `None` for a frame without a tag.
+    /// Signed part of the frame (header and body), and its authentication tag, if it has one.
     pub tag: Option<(Vec<u8>, [u8; TAG])>,
     /// Reason why a receiver rejects the frame, if it does.
     pub refusal: Option<Refusal>,
 }
 
-/// Decodes a frame. `wire` has its bytes with the final delimiter, or only the first bytes of a longer frame.
+/// Decodes a frame. `wire` has its bytes with the delimiter, or only the first of them.
 ///
-/// `len` is the length of the whole frame on the wire. The crate's own decoder decides whether a receiver rejects the
-/// frame. The tables of `FORMAT.md` give the fields, and the reason of a rejection.
+/// `len` is the length of the whole frame on the wire. The crate's decoder decides if a receiver rejects the frame.
+/// The tables of `FORMAT.md` give the fields, and the reason.
 pub fn read<'f>(format: &'f Format, wire: &[u8], len: usize) -> Frame<'f> {
     let mut frame = Frame {
         len,

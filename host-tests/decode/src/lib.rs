@@ -1,6 +1,6 @@
-//! Decoder of uav-relay frames: each field by the tables of `FORMAT.md`, or the reason for rejection.
+//! Decoder of uav-relay frames by the tables of `FORMAT.md`: fields, or the reason of a rejection.
 //!
-//! `format`, `value`, `walk`, `write`, `range` and `draw` are the second codec: they share no code with the crate.
+//! `format`, `value`, `walk`, `write`, `range` and `draw` are a second codec. They share no code with the crate.
 //!
 //! | module | content |
 //! | --- | --- |

@@ -1,4 +1,4 @@
-//! Checks the values of a body against the ranges in the tables, and against the rules between fields.
+//! Checks of the values in a body: ranges in the tables, and rules between fields.
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -9,7 +9,7 @@
 use crate::format::{Field, Layout};
 use crate::value::{Fields, Value};
 
-/// Returns the name of the first field of a message that is out of range; `None` if all are in range.
+/// Returns the name of the first field that is out of range or breaks a rule; `None` if all are right.
 pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
     let alone = fields.0.iter();
     let mut alone = alone.filter(|(field, value)| !is_within(field, value));
@@ -17,10 +17,9 @@ pub fn outside<'f>(layout: &'f Layout, fields: &Fields<'f>) -> Option<&'f str> {
     wrong.or_else(|| check_rules(&layout.name, &Numbers(fields)))
 }
 
-/// Returns true if the value is within the field's range in `FORMAT.md`.
+/// Returns true if the value is in the field's range in `FORMAT.md`.
 ///
-/// The text of a range may also state, after a semicolon, a rule between several fields. Such rules are not checked
-/// here.
+/// Rules between fields, which may follow in the range after a semicolon, are not checked here.
 fn is_within(field: &Field, value: &Value<'_>) -> bool {
     let all = |values: &[Value<'_>]| values.iter().all(|value| is_within(field, value));
     match value {
@@ -34,7 +33,7 @@ fn is_within(field: &Field, value: &Value<'_>) -> bool {
         Value::Double(number) if !number.is_finite() => false,
         Value::View(view) => is_view(&field.range, *view),
         Value::Single(number) => {
-            // Bounds are the nearest f32; exactly 0 may be allowed in addition.
+            // The bounds are rounded to f32; 0 may be permitted besides.
             let (zero, least, most) = bounds(&field.range);
             let between = (least as f32..=most as f32).contains(number);
             between || zero && number.to_bits() == 0
@@ -52,8 +51,9 @@ fn is_between(range: &str, number: f64) -> bool {
     (least..=most).contains(&number) || zero && number == 0.0
 }
 
-/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`. Returns the two bounds, and before them
-/// true if 0 is permitted, too.
+/// Parses a range such as `0.1 to 1e5`, `1 or more`, `0 or 2 to 255` or `any`.
+///
+/// Returns true if 0 is permitted besides, and the two bounds.
 pub fn bounds(range: &str) -> (bool, f64, f64) {
     let first = range.split(';').next().unwrap_or_default();
     let (zero, rest) = ["`00000000` or ", "0 or "]
@@ -70,7 +70,7 @@ pub fn bounds(range: &str) -> (bool, f64, f64) {
             (zero, number(least), number(most))
         }
         None if rest == "any" => (zero, f64::MIN, f64::MAX),
-        // A range that cannot be read allows nothing, so that a test finds it.
+        // A range that cannot be parsed permits nothing, so that a test finds it.
         None => (false, f64::NAN, f64::NAN),
     }
 }
@@ -86,7 +86,7 @@ fn is_view(range: &str, view: u32) -> bool {
     }
 }
 
-/// Access to the numbers of a message body by field name; NaN for a name without a number.
+/// Access to the numbers of a body by field name; NaN if there is none.
 pub(crate) struct Numbers<'a, 'f>(pub(crate) &'a Fields<'f>);
 
 impl<'f> Numbers<'_, 'f> {
@@ -107,7 +107,7 @@ impl<'f> Numbers<'_, 'f> {
         number == 0.0 && number.is_sign_positive()
     }
 
-    /// Returns true if a lease renewal has no group `nodes`, or at least one node in this group is not 0.
+    /// Returns true if a lease renewal has no group `nodes`, or a node in it that is not 0.
     fn names_a_node(&self) -> bool {
         let mut names = ["leaver", "joiner", "spare"].into_iter();
         self.group("nodes")
@@ -129,7 +129,7 @@ impl<'f> Numbers<'_, 'f> {
     }
 }
 
-/// Checks the rules between the fields of a message. Returns the name of the first field that breaks a rule.
+/// Checks the rules between fields; returns the name of the first field that breaks one.
 fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str> {
     let get = |name| numbers.get(name);
     let zero = |name| numbers.is_zero(name);
@@ -233,7 +233,7 @@ fn check_rules(message: &str, numbers: &Numbers<'_, '_>) -> Option<&'static str>
     rules.find(|(_, holds)| !holds).map(|(name, _)| *name)
 }
 
-/// Returns true if the relays of an Offer, at their minimum separation, fit between Tx and Rx.
+/// Returns true if the relays of an Offer fit between Tx and Rx at their minimum separation.
 pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     let single = |number: f64| f64::from(number as f32);
     let distance = offer.get("distance_m");
@@ -241,10 +241,10 @@ pub(crate) fn has_room(offer: &Numbers<'_, '_>) -> bool {
     single((offer.get("relays") - 1.0) * step) <= distance
 }
 
-/// Returns the target SIRs (linear, ascending) that a sweep message lists in compact form.
+/// Returns the target SIRs (linear) that a sweep message lists in compact form, in ascending order.
 ///
-/// `anchor` is one of the targets. `gap` encodes the relative gap to the next target, 0 for a single target; `growth`
-/// encodes the factor from each gap to the next. Each f64 result is rounded to f32, as a relay's f32 operation does.
+/// `anchor` is one of them. `gap` encodes the relative gap to the next one, 0 for a single target. `growth` encodes
+/// the factor from each gap to the next. Results are rounded to f32, as in a relay.
 pub fn targets(anchor: f32, gap: u8, growth: u8) -> Vec<f32> {
     if gap == 0 {
         return vec![anchor];

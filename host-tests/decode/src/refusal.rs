@@ -2,24 +2,24 @@
 
 use std::fmt;
 
-/// Reason for rejecting a frame. If there are several reasons, it is the reason that a receiver finds first.
+/// Reason for rejecting a frame: the first one that a receiver finds.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Refusal {
     /// The stream ends before the frame's delimiter.
     Unended,
-    /// The frame exceeds the largest length. The number is its length on the wire, bytes.
+    /// The frame is too long: its length on the wire, bytes.
     Oversized(usize),
-    /// A delimiter came inside a COBS run: the frame was cut short.
+    /// A delimiter inside a COBS run: the frame was cut short.
     Truncated,
-    /// The frame is too short for header and CRC, or for the tag. The number is its length without COBS, bytes.
+    /// The frame is too short for header and CRC, or for the tag: its length without COBS, bytes.
     Short(usize),
-    /// The CRC is wrong. The fields are the received CRC and the computed CRC.
+    /// The CRC is wrong: the received and the computed CRC.
     Crc(u32, u32),
-    /// The version of the frame format is unknown, or the flags are. The fields are the version and the flags.
+    /// The version of the format or the flags are unknown: version and flags.
     Version(u8, u8),
-    /// The message tag (the byte that states the kind of message) is unknown.
+    /// The message tag (kind of message) is unknown.
     UnknownTag(u8),
-    /// The body is not the canonical encoding of any message. The text describes the fault.
+    /// The body is not the canonical encoding of a message; with the fault.
     Malformed(String),
     /// A number in the message is out of range.
     Range,

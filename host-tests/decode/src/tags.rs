@@ -1,4 +1,4 @@
-//! Verifies tags with the network key and the nonces of captured handshakes.
+//! Verifies authentication tags with the network key and the nonces of captured handshakes.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -10,13 +10,13 @@ use crate::value::Value;
 /// Result of verifying the authentication tag of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TagCheck {
-    /// The authentication tag of the frame is right.
+    /// The tag is right.
     Right,
-    /// The authentication tag of the frame is wrong.
+    /// The tag is wrong.
     Wrong,
-    /// The tag was not checked, because the network key is not known.
+    /// The tag was not checked, because the network key is unknown.
     NoKey,
-    /// The tag was not checked, because the handshake of the two nodes was not captured.
+    /// The tag was not checked, because no handshake of the two nodes was captured.
     NoHandshake,
 }
 
@@ -42,13 +42,12 @@ impl TagCheck {
     }
 }
 
-/// Number of nonces that the verifier stores for a node: the newest ones.
+/// Number of newest nonces stored for a node. A tag is right if it fits any of them.
 ///
-/// A tag is right if it fits any of them. A frame that was signed before a new handshake can arrive after it, so the
-/// last nonce alone is not enough.
+/// The last one is not enough: a frame signed before a new handshake can arrive after it.
 const TRIED: usize = 4;
 
-/// Key of the stored nonces: network number, sender and destination of the frames.
+/// Key of the stored nonces: network, sender and destination.
 type Pair = (u16, u16, u16);
 
 /// Verifier of authentication tags, with the nonces of all captured handshakes.
@@ -59,7 +58,7 @@ pub struct TagVerifier {
 }
 
 impl TagVerifier {
-    /// Creates a verifier without nonces, for a network with the key `key`; `None` if the key is unknown.
+    /// Creates a verifier without nonces. `key` is the network key, if known.
     pub fn new(key: Option<[u8; 32]>) -> Self {
         Self {
             key: key.map(Key::new),
@@ -72,7 +71,7 @@ impl TagVerifier {
         self.key.is_some()
     }
 
-    /// Verifies the authentication tag of `frame`; `None` if it has none. Stores the nonces of valid handshakes.
+    /// Verifies the tag of `frame`, if it has one. Stores the nonces of valid handshakes.
     pub fn check(&mut self, frame: &Frame<'_>) -> Option<TagCheck> {
         let (signed, tag) = frame.tag.as_ref()?;
         let Some(key) = &self.key else {

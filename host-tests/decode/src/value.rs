@@ -14,9 +14,9 @@ pub enum Value<'f> {
     Unsigned(u64),
     /// Signed integer.
     Signed(i64),
-    /// Digest of a mission, of a view, or of the line between the surveyed positions of Tx and Rx.
+    /// Digest of a mission, of a view, or of the line between the Tx and Rx positions.
     Digest(u16),
-    /// Name of a view (membership of the chain): its number and its proposer.
+    /// Name of a view (membership of the chain): number and proposer.
     View(u32),
     /// Floating-point number, f32.
     Single(f32),
@@ -24,9 +24,9 @@ pub enum Value<'f> {
     Double(f64),
     /// Boolean value.
     Bool(bool),
-    /// Flags: their bits in one byte, and the names of all flags.
+    /// Flags: one byte, and the names of its bits.
     Flags(u8, &'f [String]),
-    /// Enumeration: the value, and its name if it has one.
+    /// Enumeration: value, and its name, if any.
     Word(u8, Option<&'f str>),
     /// Absent optional value.
     None,
@@ -56,7 +56,7 @@ impl<'f> Fields<'f> {
     }
 }
 
-/// Conversion of a value to a Rust type by serde. The value is as on the wire: a digest or flags are a number.
+/// Conversion of a value to a Rust type by serde, as on the wire: digests and flags are numbers.
 impl<'de> Deserializer<'de> for &Value<'_> {
     type Error = de::value::Error;
 
@@ -112,7 +112,7 @@ impl<'a, 'de> IntoDeserializer<'de> for &'a Fields<'_> {
     }
 }
 
-/// Returns the names of the flags that are set in `bits`; `bit 7` stands for a flag without a name.
+/// Returns the names of the flags set in `bits`; `bit 7` for a flag without a name.
 pub(crate) fn set(bits: u8, names: &[String]) -> Vec<String> {
     let set = (0..8).filter(|bit| bits >> bit & 1 == 1);
     let name = |bit: usize| match names.get(bit) {

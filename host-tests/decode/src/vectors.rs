@@ -1,8 +1,10 @@
-//! Test vectors of the wire format, made by an independent Python program. Their file is
-//! `host-tests/tests/data/vectors.json`.
+//! Test vectors of the wire format, made by an independent Python program.
 //!
-//! It encodes bodies by the byte tables (tags 0 and 2 also by the postcard implementation pohlednice 0.2.1), CRC bit by bit,
-//! COBS by definition, and ladders with each step rounded. `FORMAT.md` describes the file.
+//! Their file is `host-tests/tests/data/vectors.json`.
+//!
+//! The program encodes bodies by the byte tables, and tags 0 and 2 also with the postcard implementation pohlednice
+//! 0.2.1. It computes CRCs bit by bit, COBS by definition, and lists of target SIRs step by step with rounding.
+//! `FORMAT.md` describes the file.
 
 use serde::{Deserialize, Deserializer, de::Error as _};
 
@@ -13,9 +15,9 @@ const FILE: &str = include_str!("../../tests/data/vectors.json");
 pub struct Vectors {
     /// Valid frames without a tag.
     pub frames: Vec<Frame>,
-    /// Handshakes and a message, with authentication tags, in the order in which they are sent.
+    /// Handshakes and a message, with tags, in the order of sending.
     pub signed: Vec<Signed>,
-    /// Lists of target SIRs, each with its compact form in a sweep message.
+    /// Lists of target SIRs, with their compact form in a sweep message.
     pub ladders: Vec<Ladder>,
     /// Byte streams that a receiver rejects, or whose message has no effect.
     pub rejected: Vec<Rejected>,
@@ -71,26 +73,25 @@ pub struct Signed {
     pub wire: Vec<u8>,
 }
 
-/// Test vector: the compact form of a sweep message's list of target SIRs, and the targets.
+/// Test vector: a list of target SIRs, and its compact form in a sweep message.
 #[derive(Deserialize, Debug)]
 pub struct Ladder {
-    /// Target SIR with index 7 of 0 to 15, or the only target: the bits of its f32, in hexadecimal. The targets below
-    /// and above are computed from it.
+    /// Target SIR with index 7 of 0 to 15, or the only one: the bits of its f32, hexadecimal.
     pub anchor: String,
-    /// Code of the relative gap between the anchor and the next target SIRs; 0 for a single target.
+    /// Code of the relative gap to the next targets; 0 for a single target.
     pub gap: u8,
-    /// Code of the factor by which each gap exceeds the adjacent gap that is nearer to the anchor.
+    /// Code of the factor from each gap to the next one, away from the anchor.
     pub growth: u8,
-    /// Target SIRs that the compact form stands for: the bits of each f32 in hexadecimal.
+    /// Target SIRs: the bits of each f32, hexadecimal.
     pub targets: Vec<String>,
 }
 
 /// Test vector: a byte stream that is rejected or has no effect.
 #[derive(Deserialize, Debug)]
 pub struct Rejected {
-    /// Reason why the stream is rejected or has no effect, in words.
+    /// Reason why the stream is rejected or has no effect.
     pub what: String,
-    /// Names of the receive counters that the stream increments at a relay.
+    /// Names of the receive counters that the stream increments.
     pub counted: Vec<String>,
     /// Bytes of the stream, with the delimiter.
     #[serde(deserialize_with = "hex")]
@@ -98,10 +99,10 @@ pub struct Rejected {
 }
 
 impl Vectors {
-    /// Reads the test vectors from their built-in file.
+    /// Reads the built-in test vectors.
     ///
     /// # Errors
-    /// The file does not have this format. A test checks that it has.
+    /// The file does not have this format; a test excludes this.
     pub fn load() -> Result<Self, serde_json::Error> {
         serde_json::from_str(FILE)
     }

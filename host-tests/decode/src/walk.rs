@@ -21,8 +21,7 @@ impl Rest<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    /// Reads a variable-length integer of the postcard format. Returns an error if the integer is not in its shortest
-    /// form.
+    /// Reads a varint of the postcard format. It is an error if it is not in its shortest form.
     fn varint(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
@@ -49,12 +48,12 @@ impl Rest<'_> {
     }
 }
 
-/// Decodes the body of a message, with the tables of `FORMAT.md` instead of the crate's code.
+/// Decodes the body of a message by the tables of `FORMAT.md`, without the crate's code.
 ///
-/// Returns the layout of the message and the values of its fields. The body begins with the message tag.
+/// Returns the layout of the message and its fields. The body begins with the message tag.
 ///
 /// # Errors
-/// The reason for which a receiver has to reject the body according to the tables.
+/// Reason why a receiver has to reject the body.
 pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Fields<'f>), Refusal> {
     let (&tag, body) = body
         .split_first()
@@ -68,8 +67,7 @@ pub fn message<'f>(format: &'f Format, body: &[u8]) -> Result<(&'f Layout, Field
     }
 }
 
-/// Decodes the message fields `fields` from `body`. Also returns an error text if bytes are missing or left over;
-/// otherwise `None`.
+/// Decodes the fields `fields` from `body`. Also returns an error if bytes are missing or left over.
 pub fn walk<'f>(fields: &'f [Field], body: &[u8]) -> (Fields<'f>, Option<String>) {
     let mut rest = Rest(body);
     let mut read = Fields::default();

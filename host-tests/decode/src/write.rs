@@ -1,12 +1,13 @@
-//! Encodes a body from the values of its fields, by the tables alone.
+//! Encodes a body from its field values, by the tables alone.
 
 use serde_json::Value as Json;
 
 use crate::format::{Field, Format, Kind};
 use crate::value::{Fields, Value};
 
-/// Encodes the body of the message `name`. `fields` has the values in the form that `cargo decode --json` prints;
-/// digests and flags are also accepted as numbers.
+/// Encodes the body of the message `name`. `fields` has the values as `cargo decode --json` prints them.
+///
+/// Digests and flags may also be numbers.
 ///
 /// # Errors
 /// Names the field whose value is missing or does not fit its type.
@@ -20,7 +21,7 @@ pub fn write(format: &Format, name: &str, fields: &Json) -> Result<Vec<u8>, Stri
     Ok(body)
 }
 
-/// Appends the bytes of all fields to `body`, whether their values are valid or not.
+/// Appends the bytes of all fields to `body`, valid or not.
 pub fn write_fields(fields: &Fields<'_>, body: &mut Vec<u8>) {
     for (field, value) in &fields.0 {
         one(&field.kind, value, body);
@@ -36,7 +37,7 @@ fn one(kind: &Kind, value: &Value<'_>, body: &mut Vec<u8>) {
         }
         (Kind::List(_, of) | Kind::Array(_, of), Value::List(values)) => {
             if matches!(kind, Kind::List(..)) {
-                // A count up to 127 is its own varint.
+                // A varint up to 127 is one byte.
                 body.push(u8::try_from(values.len()).unwrap_or(u8::MAX));
             }
             for value in values {
@@ -59,7 +60,7 @@ fn one(kind: &Kind, value: &Value<'_>, body: &mut Vec<u8>) {
         (_, Value::Bool(said)) => body.push((*said).into()),
         (_, Value::Flags(bits, _)) => body.push(*bits),
         (_, Value::Word(word, _)) => body.push(*word),
-        // Only an Option has no value, and only the two kinds above have several.
+        // Only an Option can be empty, and only the two kinds above have several values.
         (_, Value::None | Value::List(_)) => {}
     }
 }
@@ -82,7 +83,7 @@ fn read<'f>(fields: &'f [Field], values: &Json) -> Result<Fields<'f>, String> {
     }
 }
 
-/// Converts a JSON value to a field value of type `kind`; `None` if it does not fit.
+/// Converts a JSON value to a field value, if it fits the type `kind`.
 fn from_json<'f>(kind: &'f Kind, value: &Json) -> Option<Value<'f>> {
     let byte = || u8::try_from(value.as_u64()?).ok();
     Some(match kind {

@@ -1,4 +1,4 @@
-//! Chain of relays on a virtual clock, which needs only `uav-relay` with any set of features.
+//! Chain of relays on a virtual clock, for any set of features. It needs only `uav-relay`.
 #![cfg(not(target_os = "none"))]
 
 use std::collections::VecDeque;
@@ -46,7 +46,7 @@ pub fn paper(relays: u16) -> Mission {
 
 const FLIGHT: Duration = Duration::from_millis(2);
 
-/// Radio range on a shared channel. A frame reaches this number of relays in each direction of the chain.
+/// Radio range on a shared channel: number of relays in each direction that receive a frame.
 const RANGE: usize = 4;
 
 struct Arrival {
@@ -56,7 +56,7 @@ struct Arrival {
     bytes: Vec<u8>,
 }
 
-/// Simulated chain: the relays, the frames in transit between them, and the virtual time.
+/// Simulated chain: relays, frames in transit, and virtual time.
 #[derive(Debug)]
 pub struct Chain {
     relays: Vec<Relay>,
@@ -73,7 +73,7 @@ impl core::fmt::Debug for Arrival {
 }
 
 impl Chain {
-    /// Creates and starts the relays of `mission`, all with `settings`.
+    /// Creates and starts the relays of `mission`, all with the same `settings`.
     ///
     /// # Errors
     /// The error of the first relay that rejects the mission or the settings.
@@ -100,7 +100,7 @@ impl Chain {
         &self.relays
     }
 
-    /// Returns the relays as mutable. A test can then call the functions that a firmware calls.
+    /// Returns the relays, mutable, to call the functions that a firmware calls.
     pub fn relays_mut(&mut self) -> &mut [Relay] {
         &mut self.relays
     }
@@ -110,7 +110,7 @@ impl Chain {
         self.now
     }
 
-    /// Disconnects relay `index`, counted from 1: it neither sends nor receives any more.
+    /// Disconnects relay `index`, from 1: it sends and receives nothing more.
     pub fn silence(&mut self, index: usize) {
         if let Some(silent) = self.silent.get_mut(index.wrapping_sub(1)) {
             *silent = true;
@@ -184,9 +184,9 @@ impl Chain {
     }
 }
 
-/// Returns the indices, from 0, of the relays that receive a frame, each with its receiving port.
+/// Returns the index, from 0, and the port of each relay that receives a frame.
 ///
-/// Relay `index` (from 0) of `count` sends the frame on `port`.
+/// Relay `index` (from 0) of `count` sends it on `port`.
 fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     let next = |at: usize, port| (at < count).then_some((at, port));
     match port {
@@ -203,7 +203,7 @@ fn hearers(index: usize, port: Port, count: usize) -> Vec<(usize, Port)> {
     }
 }
 
-/// Returns default settings, except that all relays share one radio channel.
+/// Returns default settings with one radio channel for all relays.
 pub fn shared() -> Settings {
     Settings {
         wiring: Wiring::Shared,

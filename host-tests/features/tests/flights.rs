@@ -1,4 +1,4 @@
-//! Results common to all sets of features. Positions, bytes on the air, and the refusal of missing features.
+//! Tests of positions, sent bytes and missing features, the same for all sets of features.
 
 use uav_relay::SetupError;
 use uav_relay::mission::MissionError;
@@ -8,8 +8,8 @@ use uav_relay::{
 };
 use uav_relay_features::{Chain, paper, shared};
 
-// Results of the full set of features; `-- --nocapture` prints them, for an update after a change of the arithmetic or the wire
-// format.
+// Results of the full set of features. After a change of the arithmetic or the wire format, print them with `--
+// --nocapture`.
 /// Expected x of each relay in a chain of five, m, as the bits of an f32.
 const OF_FIVE: [u32; 5] = [
     0x439b_7618,
@@ -20,10 +20,9 @@ const OF_FIVE: [u32; 5] = [
 ];
 const OF_FOUR: [u32; 4] = [0x439f_cc32, 0x43b1_2a47, 0x43c2_1c40, 0x43d2_be13];
 
-/// Expected CRC-32C of all bytes that the relays send, when they are connected by wires.
+/// Expected CRC-32C of all sent bytes, with relays connected by wires.
 ///
-/// With the feature `departures` each lease renewal has one flag more: it states that all relays are in place. No other
-/// feature changes a byte.
+/// Only the feature `departures` changes a byte: each lease renewal has a flag that all relays are in place.
 const SAID_BY_WIRES: u32 = if cfg!(feature = "departures") {
     0x7b9b_6625
 } else {
@@ -55,8 +54,8 @@ fn bits(places: &[f32]) -> Vec<u32> {
 
 /// Returns the SIR of every hop, linear, in f64 by the paper's formulas.
 ///
-/// `places` are the relays' x, m. The excess loss is 0.1 dB with line of sight in the air, and 21 dB from the
-/// interferer to the receiver.
+/// `places` are the relays' x, m. Excess losses: 0.1 dB to and from drones, 21 dB from the interferer to the
+/// receiver.
 fn hops(places: &[f32]) -> Vec<f64> {
     let squared = |x: f64, y: f64, h: f64| x * x + y * y + h * h;
     let mut before = (0.0, 0.0, 1.0);

@@ -12,32 +12,34 @@ use super::input::Input;
 use super::setting;
 use super::watch::{Sent, Watched};
 
-/// Maximum number of fuzzed operations in one run, because each takes some milliseconds.
+/// Maximum number of fuzzed operations in one run; each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
 const MAX_RELAYS: u8 = 4;
 
-/// Maximum number of simulated frames in transit to one relay. A further frame displaces the oldest frame.
+/// Maximum number of frames in transit to one relay. A further frame displaces the oldest.
 const MAX_IN_TRANSIT: usize = 24;
 
-/// Maximum number of rounds in one operation. In a round each relay receives a frame.
+/// Maximum number of rounds in one operation. In a round each relay receives one frame.
 const MAX_ROUNDS: u8 = 128;
 
-/// Tolerance for the minimum separation of two relays, as a fraction of the distance from Tx to Rx. Positions are f32
-/// numbers, so rounding can bring two relays closer by this much.
+/// Tolerance for the separation of two relays, as a fraction of the distance from Tx to Rx.
+///
+/// Positions are rounded to f32, which can bring two relays closer by this much.
 const ROUNDING: f64 = 1.3e-7;
 
-/// Fuzz target. Reads `data` as a mission, settings of each relay, and operations on the frames between them.
+/// Fuzz target. Reads `data` as a mission, the relays' settings, and operations on the frames between relays.
 ///
 /// # Panics
-/// A relay breaks a rule that the module `watch` checks. Or two neighbours whose positions come from the same pass (a
-/// message along the chain and back) are too close. Or the chain does not agree after faults have ended.
+/// A relay breaks a rule that the module `watch` checks. Or two neighbours are too close, although their positions come
+/// from the same pass, a message along the chain and back. Or the chain does not agree after the faults have ended.
 pub fn chain(data: &[u8]) {
     _ = flown(data);
 }
 
-/// Runs the fuzz target [`chain()`] and returns its relays at the end. `None` if the mission or the settings are
-/// refused.
+/// Runs the fuzz target [`chain()`] and returns its relays at the end.
+///
+/// `None` if the mission or the settings are refused.
 ///
 /// # Panics
 /// Those of [`chain()`].
@@ -68,7 +70,7 @@ struct Chain {
     mission: Mission,
     members: Vec<Member>,
     now: Instant,
-    /// Random seed of the next relay that starts. It increases at every start.
+    /// Random seed of the next relay that starts. It rises at every start.
     seed: u32,
     version: u16,
 }
@@ -162,7 +164,7 @@ impl Chain {
         }
     }
 
-    /// Delays the oldest frame in transit to relay `at`. All other frames to this relay then arrive before it.
+    /// Delays the oldest frame to relay `at` until all others in transit to it have arrived.
     fn delay_frame(&mut self, at: usize) {
         if let Some(member) = self.members.get_mut(at)
             && let Some(first) = member.arriving.pop_front()
@@ -182,7 +184,7 @@ impl Chain {
         }
     }
 
-    /// Delivers the oldest frame to relay `at` in two pieces. `input` chooses whether the second piece is lost.
+    /// Delivers the oldest frame to relay `at` in two pieces. `input` chooses if the second one is lost.
     fn cut(&mut self, at: usize, input: &mut Input<'_>) {
         let (place, lost) = (usize::from(input.byte()), input.flag());
         if let Some(frame) = self.take(at) {
@@ -209,7 +211,7 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Advances the time to the earliest timeout of all relays.
+    /// Advances the time to the earliest timeout of any relay.
     fn wake(&mut self) {
         let next = self
             .members
@@ -220,8 +222,9 @@ impl Chain {
         self.settle_all();
     }
 
-    /// Delivers to each relay its oldest frame, without faults. If no frame is in transit, first advances the time to
-    /// the next timeout.
+    /// Delivers the oldest frame to each relay, without faults.
+    ///
+    /// Without a frame in transit the time is first advanced to the next timeout.
     fn round(&mut self) {
         if self.members.iter().all(|member| member.arriving.is_empty()) {
             self.wake();
@@ -236,14 +239,14 @@ impl Chain {
     }
 
     fn restart(&mut self) {
-        // Only the leader has a pass to restart.
+        // Only the leader restarts a pass.
         for member in &mut self.members {
             member.watched.restart(self.now);
         }
         self.settle_all();
     }
 
-    /// Restarts relay `at`. The frames in transit to it are still delivered later.
+    /// Restarts relay `at`. Frames in transit to it are still delivered.
     fn reboot(&mut self, at: usize) {
         let Some(settings) = self.members.get(at).map(|member| member.settings) else {
             return;
@@ -255,7 +258,8 @@ impl Chain {
         if let Some(member) = self.members.get_mut(at) {
             member.watched = watched;
         }
-        // If it leads, its pass numbers restart, perhaps at an old one; and view numbers restart if most relays have lost them.
+        // The leader's pass numbers start again, perhaps with an old number. View numbers start again if most relays
+        // have lost them.
         for member in &mut self.members {
             member.watched.forget_pass();
         }
@@ -294,7 +298,7 @@ impl Chain {
         }
     }
 
-    /// Puts the frames that relay `at` sends in transit. Checks the relay's view, and its distance from its neighbours.
+    /// Takes the frames that relay `at` sends, and checks the relay's view and separation.
     fn settle(&mut self, at: usize) {
         let now = self.now;
         let Some(member) = self.members.get_mut(at) else {
@@ -309,7 +313,7 @@ impl Chain {
         self.check_separation(at + 1);
     }
 
-    /// Puts a frame of relay `from` in transit to one neighbour or, on a shared channel, to all relays.
+    /// Puts a frame of relay `from` in transit: to one neighbour, or to all relays of a shared channel.
     fn send(&mut self, from: usize, frame: &Sent) {
         for (at, member) in self.members.iter_mut().enumerate() {
             let port = match frame.port {
@@ -326,10 +330,9 @@ impl Chain {
         }
     }
 
-    /// Checks the index of relay `at` in its view, and the number of relays in the view. A view is a membership of the
-    /// chain.
+    /// Checks relay `at` in its view (membership of the chain): its index, and the number of relays.
     ///
-    /// On either side of the relay, the view must not have more relays than the mission has there.
+    /// On neither side of the relay may the view have more relays than the mission.
     fn check_place(&self, at: usize) {
         if let Some(member) = self.members.get(at) {
             let relay = member.watched.relay();
@@ -343,8 +346,9 @@ impl Chain {
         }
     }
 
-    /// Checks the separation of relay `at` (from 0) from the previous relay. Does nothing unless both have their
-    /// positions from the same pass. A pass is a message along the chain and back.
+    /// Checks the separation of relay `at` (from 0) from the previous relay.
+    ///
+    /// Only if both positions come from the same pass, a message along the chain and back.
     fn check_separation(&self, at: usize) {
         let (Some(before), Some(after)) = (
             at.checked_sub(1)

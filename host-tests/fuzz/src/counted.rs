@@ -2,11 +2,10 @@
 
 use uav_relay::Stats;
 
-/// Returns the number of received frames with a valid CRC, as a sum of counters. Each such frame is in exactly one of
-/// the summed counters.
+/// Returns the number of received frames with a valid CRC. Each is in exactly one of the summed counters.
 ///
-/// `key` is true if the relay has a signing key. Such a relay rejects unsigned frames, and counts them in `unsigned`,
-/// which is added. A relay without a key accepts unsigned frames, and counts them with the accepted frames.
+/// `key` is true if the relay has a signing key. It then counts unsigned frames in `unsigned`; without a key they are
+/// accepted.
 pub const fn intact(stats: &Stats, key: bool) -> u32 {
     let unsigned = if key { stats.unsigned } else { 0 };
     stats.received
@@ -23,7 +22,7 @@ pub const fn intact(stats: &Stats, key: bool) -> u32 {
 
 /// Returns every counter of a relay with its name, in the order of [`Stats`].
 pub const fn named(stats: &Stats) -> [(&'static str, u32); 23] {
-    // Without a rest, so that the compiler asks for a new counter here.
+    // All fields are named, so that the compiler reports a new counter.
     let Stats {
         sent,
         repeats,

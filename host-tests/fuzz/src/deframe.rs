@@ -1,4 +1,4 @@
-//! Fuzz target: an arbitrary byte stream, in which frames must not depend on how it is split.
+//! Fuzz target: a byte stream has the same frames however it is split.
 
 use uav_relay::wire::deframe::{DeframeError, Deframer};
 use uav_relay::wire::frame::{MAX_DECODED, MAX_FRAME};
@@ -10,12 +10,11 @@ use super::setting;
 
 /// Fuzz target. Reads `data` as two lengths and a byte stream.
 ///
-/// A deframer receives the stream byte by byte, one relay receives it as a whole, and another relay in pieces of these
-/// lengths.
+/// A deframer receives the stream byte by byte. One relay receives it as a whole, another in pieces of these lengths.
 ///
 /// # Panics
 /// The deframer deviates from the definition of COBS, returns a frame that is too long, or returns more bytes than it
-/// has received. Or the two relays differ afterwards. (Each push stores at most one byte, so that its work is bounded.)
+/// has received. Or the two relays differ afterwards.
 pub fn deframe(data: &[u8]) {
     let mut input = Input::new(data);
     let lengths = input.word();
@@ -52,8 +51,9 @@ fn frames_by_definition(stream: &[u8]) {
     }
 }
 
-/// Checks that a relay handles a stream in one piece and in many pieces alike. The pieces have two alternating
-/// lengths, 1 to 256 bytes each.
+/// Checks that a relay handles a stream alike in one and in many pieces.
+///
+/// The pieces have two alternating lengths of 1 to 256 bytes.
 fn cut(stream: &[u8], lengths: u16) {
     let Some(mut whole) = relay() else { return };
     let mut pieces = whole.clone();

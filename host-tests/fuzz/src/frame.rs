@@ -1,4 +1,4 @@
-//! Fuzz target: arbitrary bytes with a valid CRC. A frame that can be decoded is encoded identically.
+//! Fuzz target: bytes with a valid CRC. A decoded frame is encoded identically.
 
 use std::sync::LazyLock;
 
@@ -21,14 +21,14 @@ use super::watch::NETWORK;
 
 const CHECK: usize = 4;
 
-/// Byte of fuzzer input for which `setting::of_chain` selects signed frames.
+/// Byte of input with which `setting::of_chain` chooses signed frames.
 const SIGNS: u8 = 8;
 
-/// Fuzz target. Reads `data` as the header and body of a frame, adds the CRC and COBS, and decodes it.
+/// Fuzz target. Reads `data` as header and body of a frame, adds CRC and COBS, and decodes it.
 ///
 /// # Panics
-/// The decoded frame differs from the original, a flipped bit is not detected, a message has two encodings, or the
-/// decoder accepts or rejects a body against the tables of `FORMAT.md`.
+/// The frame changes when it is decoded and encoded, a flipped bit is not detected, a message has two encodings, or
+/// the decoder contradicts the tables of `FORMAT.md`.
 pub fn frame(data: &[u8]) {
     let plain = sealed(data.to_vec());
     let wire = stuffed(&plain);
@@ -48,7 +48,7 @@ pub fn frame(data: &[u8]) {
         assert_eq!(len, 0, "nobody writes to 4095");
         return;
     }
-    // A frame loses its tag when it is encoded again.
+    // Encoding it again omits the tag.
     let mut bare = plain.clone();
     if frame::open(&bare).is_ok_and(|opened| opened.tag.is_some()) {
         bare.truncate(bare.len() - TAG - CHECK);
@@ -62,7 +62,7 @@ pub fn frame(data: &[u8]) {
     assert_eq!(written.iter().position(|&byte| byte == 0), Some(len - 1));
 }
 
-/// Checks that `frame::open` splits an intact frame into the parts that the format defines.
+/// Checks that `frame::open` returns the parts of an intact frame that the format defines.
 fn check_decoded(plain: &[u8]) {
     let opened = frame::open(plain);
     let (Some(checked), Some(&[_, first, _, second])) = (
@@ -93,8 +93,8 @@ fn check_decoded(plain: &[u8]) {
 
 /// Checks that a relay which requires authentication tags verifies them.
 ///
-/// The relay must accept a frame with this body, valid addresses and a valid tag, but only once. If a bit of the frame
-/// is flipped, the relay must reject the frame as forged.
+/// A frame with this body, valid addresses and a valid tag must be accepted, but only once. With a flipped bit it
+/// must be counted as forged.
 fn check_signed(plain: &[u8]) {
     let body = plain.get(HEADER..plain.len() - CHECK).unwrap_or_default();
     let Some(HandshakenPair {
@@ -132,12 +132,12 @@ fn check_signed(plain: &[u8]) {
         ..before
     };
     match Message::decode(body) {
-        // A Level is accepted only from the ground, a Claim only without a key.
+        // A Level is accepted only from the ground, and a Claim only without a key.
         Ok(Message::Level { .. } | Message::Claim(_)) => expected.misaddressed += 1,
         Ok(_) => expected.received += 1,
         Err(_) => expected.malformed += 1,
     }
-    // Effects of messages are checked by other targets.
+    // Other targets check the effects of messages.
     let after = Stats {
         mission: before.mission,
         view: before.view,
@@ -150,7 +150,7 @@ fn check_signed(plain: &[u8]) {
     assert_eq!(after, expected);
 }
 
-/// Relay 2 of 3, which requires authentication tags, and its upstream neighbour. Both have exchanged handshakes.
+/// Relay 2 of 3, which requires tags, and its upstream neighbour, after their handshakes.
 #[derive(Clone)]
 struct HandshakenPair {
     relay: Relay,
@@ -202,7 +202,7 @@ fn check_round_trip(plain: &[u8], wire: &[u8]) {
     }
 }
 
-/// Checks that the CRC detects a flipped bit in a frame. The bytes of the CRC determine which bit is flipped.
+/// Checks that the CRC detects a flipped bit. The CRC itself chooses the bit.
 fn check_flipped_bit(plain: &[u8]) {
     let mut plain = plain.to_vec();
     let bits = plain.len() * 8;
@@ -220,7 +220,7 @@ fn check_flipped_bit(plain: &[u8]) {
     assert_eq!(frame::decode(&plain), Err(refusal));
 }
 
-/// Checks that the decoder accepts exactly the message bodies that the tables of `FORMAT.md` permit.
+/// Checks that the decoder accepts exactly the bodies that `FORMAT.md` permits.
 fn check_body(body: &[u8]) {
     static FORMAT: LazyLock<Option<Format>> = LazyLock::new(|| Format::load().ok());
     let Some(format) = &*FORMAT else {

@@ -1,7 +1,7 @@
 //! Allocation counter of this thread, to show that the crate never allocates.
 //!
-//! It counts if [`Counting`] is the global allocator: in the fuzz targets of relays and in `tests/fuzz/main.rs`. Elsewhere [`without_allocation`]
-//! checks nothing.
+//! It counts only if [`Counting`] is the global allocator: in the fuzz targets of relays and in `tests/fuzz/main.rs`.
+//! Elsewhere [`without_allocation`] checks nothing.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -15,7 +15,7 @@ thread_local! {
 pub struct Counting;
 
 fn count() {
-    // A terminating thread has no counter any more, and needs none.
+    // An ending thread has no counter any more.
     _ = ASKED.try_with(|asked| asked.set(asked.get().wrapping_add(1)));
 }
 
@@ -53,7 +53,7 @@ pub fn allocations() -> u64 {
 /// Runs `work`, which must not allocate.
 ///
 /// # Panics
-/// If `work` allocates memory.
+/// `work` allocates memory.
 pub fn without_allocation<T>(work: impl FnOnce() -> T) -> T {
     let before = allocations();
     let done = work();

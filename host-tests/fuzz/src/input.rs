@@ -1,10 +1,10 @@
-//! Interpretation of a fuzzer's bytes as choices, numbers of a range and pieces of a stream.
+//! A fuzzer's bytes, read as choices, numbers in a range, and pieces of a stream.
 //!
 //! Reads past the end return zeros, so every byte string is an input, and a truncated one means nearly the same.
 
 use uav_relay_scenario::number::narrow;
 
-/// Fuzzer's bytes that have not been read yet.
+/// Unread bytes of the fuzzer.
 #[derive(Clone, Debug)]
 pub struct Input<'a> {
     rest: &'a [u8],
@@ -16,12 +16,12 @@ impl<'a> Input<'a> {
         Self { rest: bytes }
     }
 
-    /// Returns true if all bytes of the fuzz input have been read.
+    /// Returns true if all bytes have been read.
     pub const fn is_empty(&self) -> bool {
         self.rest.is_empty()
     }
 
-    /// Returns the bytes of the fuzz input that have not been read yet.
+    /// Returns the unread bytes.
     pub const fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -47,7 +47,7 @@ impl<'a> Input<'a> {
         u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])
     }
 
-    /// Reads a byte of the fuzz input; returns true if it is odd.
+    /// Reads a byte; returns true if it is odd.
     pub const fn flag(&mut self) -> bool {
         self.byte() % 2 == 1
     }
@@ -57,7 +57,7 @@ impl<'a> Input<'a> {
         self.byte() % count.max(1)
     }
 
-    /// Reads a byte as a length, and returns that many of the following bytes.
+    /// Reads a byte as a length, and then as many bytes.
     pub fn piece(&mut self) -> &'a [u8] {
         let len = usize::from(self.byte()).min(self.rest.len());
         let (piece, rest) = self.rest.split_at_checked(len).unwrap_or((self.rest, &[]));
@@ -65,7 +65,7 @@ impl<'a> Input<'a> {
         piece
     }
 
-    /// Reads any f32, NaN and the infinities included.
+    /// Reads any f32, including NaN and the infinities.
     pub const fn any_number(&mut self) -> f32 {
         f32::from_bits(self.long())
     }
@@ -83,7 +83,7 @@ impl<'a> Input<'a> {
         narrow(f64::from(low) * ratio.powf(part)).clamp(low, high)
     }
 
-    /// Reads an arbitrary f32 in one of sixteen cases, otherwise the result of `usual`.
+    /// Reads any f32 in one case of sixteen, otherwise calls `usual`.
     pub fn mostly(&mut self, usual: impl FnOnce(&mut Self) -> f32) -> f32 {
         if self.byte() % 16 == 15 {
             self.any_number()

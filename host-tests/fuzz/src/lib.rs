@@ -1,4 +1,4 @@
-//! Fuzz targets as plain functions, which a plain test also runs, on the corpora and on random bytes.
+//! Fuzz targets as plain functions. A plain test also runs them, on the corpora and on random bytes.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -15,7 +15,7 @@
 //! | [`input`] | numbers and choices from bytes |
 //! | [`heap`] | check that the crate never allocates |
 //!
-//! Every target accepts any bytes and panics if a promise is broken.
+//! Every target accepts any bytes, and panics if a rule is broken.
 
 pub mod chain;
 pub mod counted;
@@ -38,7 +38,7 @@ pub use mavlink::mavlink;
 pub use relay::relay;
 pub use scenario::scenario;
 
-/// Fuzz target: its name and its function. The name is also the name of its corpus, the collection of inputs.
+/// Fuzz target: name, also of its corpus (collection of inputs), and function.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// List of all fuzz targets.

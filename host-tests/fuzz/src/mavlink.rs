@@ -18,8 +18,9 @@ use wire::{Placed, stream};
 /// # Panics
 /// - The parser deviates from the definition of frames, misses an intact frame, or exceeds its bound on work.
 /// - The link sends numbers that are not finite, targets far from the line, or targets that its state does not permit.
-/// - The results of the link depend on how its bytes are split, or the link allocates memory or requests needless calls.
-/// - A link with a key accepts unsigned or repeated frames, rejects other frames, or does not sign its frames with increasing stamps.
+/// - The results of the link depend on how its bytes are split, or it allocates memory or requests needless calls.
+/// - A link with a key accepts unsigned or repeated frames, rejects other frames, or does not sign its frames with
+///   rising timestamps.
 pub fn mavlink(data: &[u8]) {
     let mut input = Input::new(data);
     match input.below(4) {
@@ -63,7 +64,7 @@ fn frames_by_definition(bytes: &[u8], placed: &[Placed]) {
         bytes.len()
     );
     for &Placed { at, .. } in placed {
-        // An inserted frame may lie in the payload of another valid frame; otherwise it must be found.
+        // An inserted frame must be found, unless it lies inside another valid frame.
         let is_in = |frame: &reference::Frame| (frame.at..frame.end).contains(&at);
         assert!(reference.frames.iter().any(is_in), "lost at {at}");
     }

@@ -1,7 +1,7 @@
-//! Neighbour with the network's key: it makes handshakes and signs arbitrary frames.
+//! Neighbour with the network's key. It makes handshakes and signs arbitrary frames.
 //!
-//! Written from the format, independently of the crate. A handshake contains the relay's nonce and its neighbour's if known, 8
-//! bytes each, little-endian, and whether it requests an answer.
+//! Written from the format, independently of the crate. A handshake has the sender's nonce, the receiver's nonce if
+//! known (8 bytes each, little-endian), and a flag that requests an answer.
 
 use blake2::Blake2sMac;
 use blake2::digest::consts::U8;
@@ -27,14 +27,14 @@ const HANDSHAKE_BODY: usize = 2 * NONCE + 1;
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Member {
     key: [u8; 32],
-    /// Nonce of the simulated neighbour. It increases at every start.
+    /// Nonce of the neighbour. It rises at every start.
     own: Vec<u8>,
     relay: Vec<u8>,
     counter: u32,
 }
 
 impl Member {
-    /// Creates a neighbour that has received `frame`, the tested relay's handshake. `None` if `frame` is no handshake.
+    /// Creates a neighbour from the tested relay's handshake `frame`; `None` if it is no handshake.
     pub fn from_handshake(frame: &[u8]) -> Option<Self> {
         let mut deframer = Deframer::new();
         let mut ended = None;
@@ -62,7 +62,7 @@ impl Member {
         }
     }
 
-    /// Returns this neighbour after a restart: with a larger nonce, and with the frame counter 0.
+    /// Returns this neighbour after a restart, with a larger nonce and the frame counter 0.
     pub fn restarted(&self) -> Self {
         Self {
             own: incremented(&self.own),
@@ -80,7 +80,7 @@ impl Member {
         other
     }
 
-    /// Returns this neighbour's next signed frame before COBS: header, body, tag and CRC.
+    /// Returns this neighbour's next signed frame before COBS.
     pub fn signed(&mut self, header: Header, body: &[u8]) -> Vec<u8> {
         let relay = self.relay.clone();
         self.frame(header, SIGNED, &relay, body)
@@ -103,8 +103,7 @@ impl Member {
         sealed(plain)
     }
 
-    /// Returns the authentication tag of a frame: keyed BLAKE2s over both nonces and the signed bytes. It is cut to
-    /// eight bytes.
+    /// Returns the tag of a frame: keyed BLAKE2s over both nonces and the signed bytes, cut to 8 bytes.
     fn tag(&self, to: &[u8], signed: &[u8]) -> [u8; 8] {
         let Ok(mut mac) = Blake2sMac::<U8>::new_from_slice(&self.key) else {
             unreachable!("a key of 32 bytes");
@@ -123,7 +122,7 @@ fn handshake_in(plain: &[u8]) -> Option<Vec<u8>> {
     handshake.then(|| body.to_vec())
 }
 
-/// Returns `number` plus one. `number` is a little-endian number of any length.
+/// Returns a little-endian number of any length, plus one.
 fn incremented(number: &[u8]) -> Vec<u8> {
     let mut carry = true;
     let up = number.iter().map(|&byte| {

@@ -1,6 +1,6 @@
-//! Valid frames with a body of every kind and fuzzed numbers: messages of a malicious neighbour.
+//! Valid frames with a body of every kind and fuzzed numbers, from a malicious neighbour.
 //!
-//! Bodies are written from the byte tables, independently of the crate, because they must include what the crate never writes.
+//! Bodies are written from the byte tables, independently of the crate, because the crate never writes some of them.
 
 mod hearing;
 mod offer;
@@ -13,10 +13,9 @@ use parts::Body;
 
 pub use parts::RelayState;
 
-/// Builds a message body. It is a message with fuzzed fields, of one of the kinds 0 to 22 except 20, or it consists of
-/// arbitrary bytes.
+/// Builds a message body of one of the kinds 0 to 22 except 20, or of arbitrary bytes.
 ///
-/// Some fields are drawn near the values in `state`, so that the tested relay often accepts the message.
+/// Some fields are drawn near `state`, so that the tested relay often accepts the message.
 pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
     let tag = match input.below(16) {
         15 => 15 + input.below(6),
@@ -52,7 +51,7 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
         19 => body.level(),
         _ => {
             body.bytes = body.input.piece().to_vec();
-            // The recorded inputs keep their meaning.
+            // So the recorded inputs have the same meaning as before.
             match *body.bytes {
                 [21] => body.pass_of_mission(),
                 [22] => body.report(),
@@ -65,8 +64,8 @@ pub fn body(input: &mut Input<'_>, state: &RelayState) -> Vec<u8> {
 
 /// Additional field of a sweep message: none, Upsilon = E[1 / interference], or the lateral position.
 ///
-/// The field is between the sender's power and the list of positions. The list has one position for each target SIR:
-/// the sender's farthest position at which the target is met.
+/// It follows the sender's power. After it comes, for each target SIR, the farthest position of the sender with that
+/// SIR.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Extra {
     Nothing,
@@ -80,7 +79,7 @@ impl Body<'_, '_> {
         let plain = self.input.flag();
         self.sir();
         if plain {
-            // The sign bit of the anchor marks the variant.
+            // The anchor's sign bit marks a variant of the message.
             if let Some(byte) = self.bytes.last_mut() {
                 *byte ^= 0x80;
             }
@@ -117,7 +116,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends profiles (altitude and power) of up to eight relays to the message. The relays' indices mostly ascend.
+    /// Appends profiles (altitude and power) of up to eight relays, mostly in ascending order.
     fn roster(&mut self) {
         self.pass();
         let mut index = u16::from(self.small(0, 3));
@@ -224,7 +223,7 @@ impl Body<'_, '_> {
         self.small(0, 15);
     }
 
-    /// Appends a sequence number and the digest of a mission. A Watch message begins with these two fields.
+    /// Appends a sequence number and a mission digest, the first fields of a Watch message.
     fn pass_of_mission(&mut self) {
         self.request_number();
         self.digest();

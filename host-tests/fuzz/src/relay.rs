@@ -15,13 +15,13 @@ use super::setting;
 use super::watch::Watched;
 use addresses::{far, from, port};
 
-/// Maximum number of fuzzed operations in one run. It limits the run's duration: each takes some milliseconds.
+/// Maximum number of fuzzed operations in one run; each takes some milliseconds.
 const MAX_OPERATIONS: usize = 256;
 
-/// Maximum number of relays in the fuzzed mission. One mission in sixteen has 1000 relays instead.
+/// Maximum number of relays in a mission, except that one mission in sixteen has 1000.
 const MAX_RELAYS: u8 = 5;
 
-/// Maximum number of timeouts that one operation handles.
+/// Maximum number of timeouts handled by one operation.
 const MAX_WAKES: u8 = 64;
 
 /// Fuzz target. Reads `data` as a mission, a relay's settings, and operations on this relay.
@@ -32,8 +32,9 @@ pub fn relay(data: &[u8]) {
     _ = flown(data);
 }
 
-/// Runs the fuzz target [`relay()`] and returns the relay at the end. `None` if the mission or the settings are
-/// refused.
+/// Runs the fuzz target [`relay()`] and returns the relay at the end.
+///
+/// `None` if the mission or the settings are refused.
 ///
 /// # Panics
 /// Those of [`relay()`].
@@ -57,18 +58,19 @@ struct Bench {
     mission: Mission,
     wiring: Wiring,
     now: Instant,
-    /// Simulated neighbours upstream and downstream. `None` if the relay does not require authentication tags, or if
-    /// the fuzzer does not know the relay's nonce.
+    /// Simulated neighbours upstream and downstream.
+    ///
+    /// `None` if the relay does not require tags, or if the neighbour does not know the relay's nonce.
     members: [Option<Member>; 2],
 }
 
-/// Bytes of a frame for the relay, and the counter in which the relay must count this frame.
+/// Frame for the relay, and the counter in which the relay must count it.
 struct TestFrame {
     wire: Vec<u8>,
     counter: ExpectedCounter,
 }
 
-/// Statistics counter in which the tested relay must count a received frame.
+/// Counter in which the tested relay must count a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum ExpectedCounter {
     Counted,
@@ -105,13 +107,12 @@ impl Bench {
         })
     }
 
-    /// Exchanges handshakes between the relay and its neighbours, if it requires authentication tags. Without this
-    /// requirement there is no handshake.
+    /// Exchanges handshakes between the relay and its neighbours, if the relay requires tags.
     fn exchange_handshakes(&mut self) {
         let (sent, _) = self.watched.settle(self.now);
         for side in [0, 1] {
             let there = [self.index > 1, self.index < self.mission.relays()];
-            // Handshakes come first, upstream before downstream.
+            // The relay sends its handshakes first, upstream before downstream.
             let place = usize::from(side == 1 && there == [true; 2]);
             let heard = sent.get(place).filter(|_| there.get(side) == Some(&true));
             let member = heard.and_then(|frame| Member::from_handshake(&frame.bytes));
@@ -120,8 +121,9 @@ impl Bench {
         }
     }
 
-    /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake. `None` if this
-    /// neighbour is a relay. Tx or Rx sends its handshake first, because the relay only answers their handshakes.
+    /// Returns Tx or Rx as the neighbour at `side` (0 upstream, 1 downstream), after a handshake.
+    ///
+    /// `None` if this neighbour is a relay. The relay only answers handshakes of Tx and Rx, so these begin.
     fn ground(&mut self, side: usize) -> Option<Member> {
         let (header, port) = from(self.index, side, self.wiring);
         let signs = self.watched.settings().auth.is_some();
@@ -134,14 +136,13 @@ impl Bench {
         let heard = sent
             .last()
             .and_then(|frame| Member::from_handshake(&frame.bytes));
-        // The handshake above was that of an earlier start.
+        // The handshake sent above counts as one of an earlier start.
         heard.map(|member| member.restarted())
     }
 
-    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream).
+    /// Makes `member` the neighbour at `side` (0 upstream, 1 downstream), and delivers its handshake.
     ///
-    /// The neighbour's handshake is delivered to the relay. If `member` is `None`, this side has no neighbour from now
-    /// on.
+    /// With `None` this side has no neighbour any more.
     fn introduce(&mut self, side: usize, member: Option<Member>) {
         let Some(place) = self.members.get_mut(side) else {
             return;
@@ -167,7 +168,7 @@ impl Bench {
         match input.below(16) {
             0 => self.advance_time(Duration::from_micros(u64::from(input.word()))),
             1 => self.advance_time(Duration::from_millis(u64::from(input.word()))),
-            // Time should not run backward. If it does, the only consequence may be delays.
+            // Time should not run backward. If it does, it may only cause delays.
             2 => {
                 let back = u64::from(input.word());
                 self.now = Instant::from_micros(self.now.as_micros().saturating_sub(back));
@@ -184,8 +185,10 @@ impl Bench {
         }
     }
 
-    /// Delivers arbitrary bytes to the relay. If they contain a valid handshake, the relay changes its nonces. The
-    /// simulated neighbours are then removed, because they do not know the new nonces.
+    /// Delivers arbitrary bytes to the relay.
+    ///
+    /// If they contain a valid handshake, the relay's nonces change, and the simulated neighbours, which do not know
+    /// them, are removed.
     fn noise(&mut self, port: Port, bytes: &[u8]) {
         let before = self.watched.relay().stats().handshakes;
         self.watched.bytes(self.now, port, bytes);
@@ -198,7 +201,7 @@ impl Bench {
         self.now = self.now + span;
     }
 
-    /// Advances the time to the relay's next timeout and handles it, `times` times.
+    /// Advances the time to the relay's next timeout, and handles it, `times` times.
     fn wake(&mut self, times: u8) {
         for _ in 0..times {
             let Some(next) = self.watched.relay().poll_timeout() else {
@@ -234,8 +237,7 @@ impl Bench {
         self.watched.sample(self.now, sample, count);
     }
 
-    /// Reports a present or past position of the drone to the relay. In some draws it reports instead that lost
-    /// neighbours have landed.
+    /// Reports a present or past position of the drone, or sometimes that lost neighbours have landed.
     fn position(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         if how >= 0xF0 {
@@ -253,17 +255,17 @@ impl Bench {
         self.watched.position(self.now, at, place);
     }
 
-    /// Delivers a message with a valid CRC to the relay.
+    /// Delivers a message with a valid CRC. Header and port are mostly those of a neighbour.
     ///
-    /// Header and port are mostly those of a neighbour. In some draws one of them has another value.
+    /// Sometimes one of them has another value.
     fn message(&mut self, input: &mut Input<'_>) {
         let how = input.byte();
         let side = usize::from(how % 2);
         let (mut header, mut port) = from(self.index, side, self.wiring);
         match how / 2 % 32 {
-            // On a shared channel this node may become a neighbour.
+            // This node may become a neighbour on a shared channel.
             23..27 => header.sender = far(self.index, side, how / 64 + 1),
-            // The version is in the top bits of the same word.
+            // The top bits of this word are the version.
             27 => header.sender |= 0x2000,
             28 => header.network ^= 1,
             29 => header.destination = u16::from(input.byte()),
@@ -286,7 +288,7 @@ impl Bench {
         if (header, port) != from(self.index, side, self.wiring) {
             counter = ExpectedCounter::Counted;
         }
-        // The delimiter ends an incomplete frame.
+        // This delimiter ends an incomplete frame.
         self.watched.bytes(self.now, port, &[0]);
         let heard = (port == Port::Shared) == (self.wiring == Wiring::Shared);
         self.deliver(port, &wire, heard.then_some(counter));
@@ -317,8 +319,9 @@ impl Bench {
         self.watched.relay().upload().map_or(loaded, Upload::id)
     }
 
-    /// Delivers a frame to the relay, and checks that the relay counts the frame as `counter` says. `counter` is
-    /// `None` at a port that is not connected.
+    /// Delivers a frame, and checks that the relay counts it as `counter` says.
+    ///
+    /// `counter` is `None` at a port that is not connected.
     fn deliver(&mut self, port: Port, wire: &[u8], counter: Option<ExpectedCounter>) {
         let before = self.watched.relay().clone();
         self.watched.bytes(self.now, port, wire);
@@ -343,8 +346,9 @@ impl Bench {
         assert_eq!(before.poll_timeout(), after.poll_timeout());
     }
 
-    /// Builds a frame with this body. The frame is signed if the relay requires authentication tags. In some draws the
-    /// frame is forged: altered, unsigned, or signed with a wrong key or nonce.
+    /// Builds a frame with this body, signed if the relay requires tags.
+    ///
+    /// Sometimes it is altered, unsigned, or signed with a wrong key or nonce.
     fn test_frame(
         &mut self,
         side: usize,
@@ -371,7 +375,7 @@ impl Bench {
                 member.with_other_key().signed(header, body),
                 ExpectedCounter::Forged,
             ),
-            // Restarted, but without a new handshake.
+            // After a restart, but without a new handshake.
             13 => (
                 member.restarted().signed(header, body),
                 ExpectedCounter::Forged,
@@ -394,15 +398,16 @@ impl Bench {
     }
 }
 
-/// Returns the number of received frames that the relay has accepted or rejected, by its counters. `key` is true if the
-/// relay has a signing key.
+/// Returns the number of accepted and rejected frames, by the relay's counters.
+///
+/// `key` is true if the relay has a signing key.
 fn frames(stats: &Stats, key: bool) -> u64 {
     let broken = [stats.oversized, stats.truncated, stats.crc];
     let broken: u64 = broken.into_iter().map(u64::from).sum();
     broken + u64::from(intact(stats, key))
 }
 
-/// Returns the counters of frames that authentication rejects: unsigned, forged, replayed.
+/// Returns the counters of frames without a valid tag: unsigned, forged, replayed.
 const fn refusals(stats: &Stats) -> [u32; 3] {
     [stats.unsigned, stats.forged, stats.replayed]
 }

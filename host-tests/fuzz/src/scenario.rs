@@ -1,4 +1,4 @@
-//! Fuzz target for scenario files. Any text gives a scenario within its ranges or a one-line error, and then a mission or an error.
+//! Fuzz target for scenario files: any text gives a scenario in its ranges, or a one-line error.
 
 use uav_relay::Mission;
 
@@ -10,8 +10,7 @@ const RELAYS: [u16; 4] = [1, 3, 8, 1000];
 /// Fuzz target. Reads `data` as the text of a scenario file; ignores it if it is not UTF-8.
 ///
 /// # Panics
-/// An error text has more than one line, a number is out of its field's range, or a mission has a number that is not
-/// finite.
+/// An error text has several lines, a number is out of range, or a mission has a number that is not finite.
 pub fn scenario(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {
         return;
@@ -95,7 +94,7 @@ fn look_at_field(field: &Field) {
     }
 }
 
-/// Checks that the numbers of a mission from a scenario file are finite.
+/// Checks that all numbers of a mission are finite.
 fn look_at_mission(mission: &Mission) {
     let config = mission.config();
     let numbers = [

@@ -1,4 +1,4 @@
-//! Missions and settings of relays from a fuzzer's bytes, within the accepted ranges, limits included.
+//! Missions and settings of relays from a fuzzer's bytes, in the accepted ranges including limits.
 
 use uav_relay::GuardConfig;
 use uav_relay::channel::AirGround;
@@ -10,18 +10,18 @@ use uav_relay::{Auth, Key};
 
 use super::input::Input;
 
-/// Interference along Tx-Rx in some fuzzed missions: equally strong everywhere.
+/// Interference along x in some missions: the same everywhere.
 ///
-/// This field and the following fields are constants, because a `Field` borrows its points until the program ends.
+/// A `Field` borrows its points until the program ends, so these are constants.
 const EVEN: Field = Field::new(&[at(0.0, 1e8)]);
-/// Interference along Tx-Rx in some fuzzed missions: slightly uneven.
+/// Interference along x in some missions: slightly uneven.
 const UNEVEN: Field = Field::new(&[at(0.0, 4.2e5), at(600.0, 3.75e5), at(1000.0, 4.4e5)]);
-/// Interference along Tx-Rx in some fuzzed missions: changes by a factor of 10 000 within 10 m.
+/// Interference along x in some missions: changes by a factor of 10 000 within 10 m.
 const STEEP: Field = Field::new(&[at(100.0, 1e7), at(300.0, 1e10), at(310.0, 1e6)]);
-/// Interference along Tx-Rx in some fuzzed missions: weakest permitted at Tx, strongest at 1 km.
+/// Interference along x in some missions: weakest permitted at Tx, strongest at 1 km.
 const WILD: Field = Field::new(&[at(0.0, 1e32), at(1000.0, 1e-9)]);
 
-/// Interferer in the fuzzed missions in which relays may leave the line Tx-Rx sideways.
+/// Interferer in the missions with a lateral range.
 const BESIDE: Interference = Interference::Source(Interferer {
     power_w: 80.0,
     x_m: 500.0,
@@ -35,11 +35,10 @@ const fn at(x_m: f32, upsilon_per_w: f32) -> FieldPoint {
     FieldPoint { x_m, upsilon_per_w }
 }
 
-/// Creates a mission of 1 to `most` relays from the fuzzer's input bytes. Returns `None` if the mission's parameters
-/// are rejected, for example if its relays do not fit between Tx and Rx.
+/// Creates a mission of 1 to `most` relays; `None` if its parameters are rejected.
 ///
-/// Half of the missions are the paper's scenario with one change. Few input bytes define them, so the rest of the
-/// input reaches many states of the chain. The other half takes every parameter at random from its whole range.
+/// Half of the missions are the paper's scenario with one change. They take few bytes of input, so the rest reaches
+/// many states of the chain. The other half takes every parameter from its whole range.
 pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     let drawn = input.byte();
     let (kind, variant) = (drawn % 14, drawn / 14 % 8);
@@ -49,7 +48,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
         _ => tame(kind, relays)?,
     };
     let config = match (variant, config.interference) {
-        // Interferer unknown to the relays.
+        // The relays do not know the interferer.
         (6, Interference::Source(_)) => MissionConfig {
             interference: Interference::Unknown,
             ..config
@@ -63,8 +62,7 @@ pub fn mission(input: &mut Input<'_>, most: u8) -> Option<Mission> {
     Mission::try_new(config).ok()
 }
 
-/// Returns the paper's scenario with `relays` relays and one change, which `kind` selects. `None` if `kind` selects no
-/// change.
+/// Returns the paper's scenario with the change `kind`; `None` if there is no such change.
 fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
     let paper = MissionConfig {
         relays,
@@ -114,7 +112,7 @@ fn tame(kind: u8, relays: u16) -> Option<MissionConfig> {
             interference: Interference::Field(STEEP),
             ..paper
         },
-        // A range of altitudes, and lateral positions on both sides.
+        // A range of altitudes, and a lateral range on both sides.
         _ => MissionConfig {
             band: Band {
                 least_m: 20.0,
@@ -176,7 +174,7 @@ fn wild(input: &mut Input<'_>, kind: u8, relays: u16) -> Option<MissionConfig> {
     })
 }
 
-/// Reads a position, mostly between Tx and Rx, at any altitude, and mostly in the lateral range.
+/// Reads a position at any altitude, mostly between Tx and Rx and in the lateral range.
 pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, config.distance_m)),
@@ -185,7 +183,7 @@ pub fn place(input: &mut Input<'_>, config: &MissionConfig) -> Placement {
     }
 }
 
-/// Reads a lateral position, m, inside or outside of the lateral range; 0 if there is no lateral range.
+/// Reads a lateral position, m, in the lateral range or outside; 0 without a range.
 pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     if lateral.is_single() {
         0.0
@@ -194,7 +192,7 @@ pub fn aside(input: &mut Input<'_>, lateral: Band) -> f32 {
     }
 }
 
-/// Reads an interferer: its x is between Tx and Rx, at Rx, or outside; its y is 0 or beside the line.
+/// Reads an interferer with x between Tx and Rx, at Rx or outside, and y of 0 or other.
 ///
 /// `distance_m` is the distance from Tx to Rx, m.
 fn interferer(input: &mut Input<'_>, distance_m: f32) -> Interferer {
@@ -226,8 +224,7 @@ fn channel(input: &mut Input<'_>) -> Option<Channel> {
     Channel::from_db(carrier_hz, los.into(), nlos.into(), air_ground).ok()
 }
 
-/// Reads the settings of one relay of `mission`. `chain` has the settings that are the same for all relays of the
-/// chain.
+/// Reads the settings of one relay of `mission`. `chain` has those of the whole chain.
 pub fn settings(input: &mut Input<'_>, mission: &Mission, chain: Settings) -> Settings {
     let own = input.byte();
     let profile = (own % 4 == 1).then(|| Profile {

@@ -1,4 +1,4 @@
-//! Watched relay. After every input its output is collected as by a firmware, and the guarantees of its documentation are checked.
+//! Relay under test. After every input its output is collected, and the documented guarantees are checked.
 
 mod frames;
 mod number;
@@ -19,16 +19,16 @@ pub use frames::NETWORK;
 
 /// Maximum number of frames that a relay may have to send at once.
 ///
-/// The sum has a term for each group of messages of the file FORMAT.md, in this order: message of a pass and busy notice; view decision;
-/// lease renewal and its answer; eight messages for each side; claim to a node number and its answer; a handshake for each of eight nodes.
+/// The terms are, in the order of FORMAT.md: message of a pass and busy notice; view decision; lease renewal and its
+/// answer; eight messages for each side; claim to a node number and its answer; handshakes for eight nodes.
 const MOST_FRAMES: usize = 2 + 1 + 2 + 2 * (1 + 4 + 1 + 2) + 2 + 8;
 
 const MOST_EVENTS: usize = 14;
 
-/// Length on the wire, bytes, of the shortest frame whose CRC is computed: header, no body, CRC.
+/// Length of the shortest frame whose CRC is computed, bytes on the wire: header, no body, CRC.
 const LEAST_CHECKED: usize = 16;
 
-/// Length on the wire, bytes, of the shortest frame with a message. The message is a Busy.
+/// Length of the shortest frame with a message, a Busy, bytes on the wire.
 const LEAST_MESSAGE: usize = 19;
 
 /// Frame sent by a relay.
@@ -40,7 +40,7 @@ pub struct Sent {
     pub bytes: Vec<u8>,
 }
 
-/// Relay under test, with its state when the rules were last checked.
+/// Relay under test, and its state at the last check.
 #[derive(Clone, Debug)]
 pub struct Watched {
     relay: Relay,
@@ -53,22 +53,22 @@ pub struct Watched {
     view: ViewId,
     agreed: Option<Placement>,
     setpoint: Option<Placement>,
-    /// Surveyed positions of Tx and Rx in the mission that the relay uses now; `None` if it has none.
+    /// Tx and Rx positions in the mission in use, if it has any.
     sites: Option<Sites>,
-    /// Distance from Tx to Rx, m, in the mission that was loaded into the relay before flight.
+    /// Distance from Tx to Rx in the mission loaded before flight, m.
     loaded_m: f32,
     frames: Frames,
-    /// Number of bytes received at each port since the last frame delimiter.
+    /// Number of bytes received at each port since the last delimiter.
     begun: [usize; 3],
-    /// Pass that has given the relay its position: view and number. A pass is a message along the chain and back.
+    /// View and number of the pass that has given the relay its position; `None` if unknown.
     ///
-    /// `None` if unknown.
+    /// A pass is a message along the chain and back.
     held: Option<(ViewId, u16)>,
     flown: MissionConfig,
 }
 
 impl Watched {
-    /// Creates the relay `index` of `mission`, started at `now`, and watches it. `None` if a setting is refused.
+    /// Creates the relay `index` of `mission`, started at `now`; `None` if a setting is refused.
     pub fn new(
         mission: Mission,
         index: u16,
@@ -115,28 +115,28 @@ impl Watched {
         self.frames.number
     }
 
-    /// Returns the session number in the relay's last message of its collision guard (a fence), 0 for none.
+    /// Returns the session number in the relay's last fence (collision-guard message), 0 for none.
     pub const fn association(&self) -> u16 {
         self.frames.association
     }
 
-    /// Returns the number in the relay's last hello, 0 for none. The offer of a mission has to repeat this number.
+    /// Returns the number in the relay's last hello, 0 for none. A mission offer must repeat it.
     pub const fn offer_number(&self) -> u16 {
         self.frames.asked
     }
 
-    /// Returns view and number of the pass that has given the relay its agreed position. A pass is a message along the
-    /// chain and back.
+    /// Returns view and number of the pass that gave the agreed position.
     ///
-    /// `None` if the pass is not known. The pass of a relay with a collision guard is never known.
+    /// A pass is a message along the chain and back.
+    ///
+    /// `None` if unknown, as always for a relay with a collision guard.
     pub const fn held(&self) -> Option<(ViewId, u16)> {
         self.held
     }
 
-    /// Forgets which pass (message along the chain and back) has given the relay its position.
+    /// Forgets which pass has given the relay its position. Called when a relay restarts.
     ///
-    /// Called when a relay restarts. A restarted leader numbers its passes anew, so two different passes may have the
-    /// same number.
+    /// A restarted leader numbers its passes anew, so two passes may have the same number.
     pub const fn forget_pass(&mut self) {
         self.held = None;
     }
@@ -144,8 +144,7 @@ impl Watched {
     /// Delivers bytes to the relay at `port`.
     ///
     /// # Panics
-    /// The relay exceeds its bounds on work: one CRC for every 16 received bytes, and one decoded message for every 19
-    /// received bytes.
+    /// The relay exceeds its bounds on work: one CRC per 16 received bytes, one decoded message per 19.
     pub fn bytes(&mut self, now: Instant, port: Port, bytes: &[u8]) {
         let before = *self.relay.stats();
         heap::without_allocation(|| self.relay.handle_bytes(now, port, bytes));
@@ -179,23 +178,23 @@ impl Watched {
         heap::without_allocation(|| self.relay.handle_position(now, place, at));
     }
 
-    /// Reports to the relay that the lost relays at `side` have landed.
+    /// Reports that the lost relays at `side` have landed.
     pub fn forget(&mut self, now: Instant, side: Side) {
         heap::without_allocation(|| self.relay.clear_lost(now, side));
     }
 
-    /// Uploads a mission to the relay. The relay can refuse it.
+    /// Uploads a mission to the relay, which may refuse it.
     pub fn upload(&mut self, now: Instant, upload: &Upload) {
-        // An older mission, or one for a relay without a key, is refused.
+        // An older mission is refused, and any mission by a relay without a key.
         _ = heap::without_allocation(|| self.relay.handle_upload(now, upload));
     }
 
-    /// Makes the relay start a new agreement, if it leads the chain.
+    /// Starts a new agreement, if the relay leads the chain.
     pub fn restart(&mut self, now: Instant) {
         heap::without_allocation(|| self.relay.restart(now));
     }
 
-    /// Handles the relay's timeouts, returns its frames and events, and checks the rules that it must keep.
+    /// Handles the relay's timeouts, returns its frames and events, and checks its rules.
     ///
     /// # Panics
     /// The relay breaks a rule.
@@ -236,9 +235,10 @@ impl Watched {
         (sent, events)
     }
 
-    /// Checks the relay's view (membership of the chain): views increase, and each is reported and counted.
+    /// Checks the relay's view (membership of the chain).
     ///
-    /// The relay must have an index in its view, and the neighbours must be before and after it.
+    /// Views rise; each is reported and counted. The relay's index must be in it, and the neighbours before and
+    /// after.
     fn look_at_view(&mut self, events: &[Event]) {
         let (relay, node) = (&self.relay, self.node);
         let (view, left) = (relay.view(), relay.mission().relays());
@@ -268,13 +268,14 @@ impl Watched {
 
     /// Checks the relay's setpoint, and that each of its changes is reported.
     ///
-    /// Without a collision guard the setpoint must be the agreed position. With a guard it must be inside the geofence,
-    /// or no farther outside than before.
+    /// Without a collision guard it must be the agreed position. With one it must be in the geofence, or no farther
+    /// outside than before.
     fn look_at_setpoint(&mut self, events: &[Event]) {
         let setpoint = self.relay.setpoint();
         let told = events.contains(&Event::SetpointChanged);
         assert!(told || setpoint == self.setpoint, "moved in silence");
-        // A passive relay has no setpoint; nor has one whose line has changed, before the next agreement.
+        // Without a setpoint are a passive relay, and a relay whose Tx and Rx positions have changed since the last
+        // agreement.
         let moved = self.sites != self.relay.sites();
         let silent = self.relay.is_passive() || moved;
         let before = self.setpoint;
@@ -286,11 +287,11 @@ impl Watched {
         };
         if let Some(GuardConfig { mut geofence, .. }) = self.settings.guard {
             if self.relay.sites().is_some() {
-                // The geofence extends with the distance of the receiver.
+                // A more distant receiver extends the geofence.
                 let longer_m = self.relay.mission().config().distance_m - self.loaded_m;
                 geofence.most_x_m += longer_m;
             }
-            // A first setpoint may be anywhere; from outside the geofence it must not move farther out.
+            // The first setpoint may be anywhere. From outside the geofence it must not move farther out.
             let before = before.unwrap_or(place);
             for (is, was, least, most) in [
                 (place.x_m, before.x_m, geofence.least_x_m, geofence.most_x_m),
@@ -314,7 +315,7 @@ impl Watched {
 
     /// Checks the relay's agreed position.
     ///
-    /// It must be between Tx and Rx, in the permitted lateral range, and at an altitude permitted to this relay.
+    /// It must be between Tx and Rx, in the lateral range, and at an altitude permitted for this relay.
     fn look_at_agreed(&mut self, events: &[Event]) {
         let agreed = self.relay.agreed_place();
         if self.settings.guard.is_none() && events.contains(&Event::SetpointChanged) {
@@ -326,7 +327,7 @@ impl Watched {
             "taken away"
         );
         self.agreed = self.agreed.filter(|_| !moved);
-        // A position of the previous mission is held until the next agreement, and may be the newest one when the mission
+        // A position of the previous mission is valid until the next agreement; it may still arrive when the mission
         // changes.
         let flown = core::mem::replace(&mut self.flown, *self.relay.mission().config());
         let Some(place) = agreed.filter(|_| agreed != self.agreed) else {

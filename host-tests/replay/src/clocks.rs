@@ -1,10 +1,14 @@
 //! Merges the frames of several files by their clocks.
 //!
-//! The clock of the first file is the reference. A frame that occurs in two files connects their clocks: it was sent in one and received
-//! in the other, or received in both. A received frame is later than the sent one by its delay. In each `WINDOW` the largest
-//! lower bound of the offset, from frames in one direction, and the smallest upper bound, from frames in the other, are closest to the
-//! offset; in their mean the shortest delays of both directions cancel. Between windows the offset is interpolated, which follows
-//! the drift. A step of a clock ends an interpolation. Steps of the first file's clock are left out.
+//! The clock of the first file is the reference. A frame that occurs in two files connects their clocks. It was sent
+//! in one and received in the other, or received in both.
+//!
+//! A received frame is later than the sent one by its delay. So frames in one direction give lower bounds of the
+//! clock offset, and frames in the other direction upper bounds. In each `WINDOW` the mean of the closest two bounds
+//! is taken, in which the shortest delays of both directions cancel.
+//!
+//! Between windows the offset is interpolated, which follows the drift. A step of a clock ends an interpolation.
+//! Steps of the first file's clock are left out.
 
 use std::collections::HashMap;
 
@@ -12,31 +16,33 @@ use uav_relay_capture::Direction;
 
 use crate::recording::{Frame, Recording, retain};
 
-/// Length of the time windows, s. For each window one clock offset is computed. Clocks drift by at most 100 ppm, which
-/// is 2 ms in a window.
+/// Length of a time window with one clock offset, s. Clocks drift by at most 100 ppm: 2 ms in a window.
 const WINDOW: f64 = 20.0;
 
-/// Minimum change of the clock offset between two common frames that counts as a step of a clock, s. A time that goes
-/// back by more than this also counts.
+/// Minimum step of a clock, s.
+///
+/// It is a change of the offset between two common frames, or a time that goes back.
 const STEP: f64 = 2.0;
 
-/// Maximum time, s, between two capture files of one flight, if they have no common frame. The time between two
-/// consecutive frames of a file has the same limit.
+/// Maximum time between two capture files of one flight without a common frame, s.
+///
+/// Two consecutive frames of a file have the same limit.
 const APART: f64 = 3_600.0;
 
-/// Offset of a file's clock from the clock of the first file, and the number of frames behind it.
+/// Offset of a file's clock from the first file's clock.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Alignment {
     /// Name of the capture file.
     pub name: String,
-    /// Number of frames that this file has in common with the other files; `None` for the first file.
+    /// Number of frames in common with the other files; `None` for the first file.
     pub common: Option<usize>,
-    /// Smallest and largest offset that is added to the times of the file, s.
+    /// Smallest and largest offset added to the times of the file, s.
     pub offset_s: [f64; 2],
 }
 
-/// Part of a file, from the frame `from` on, without a step of the file's clock. `offsets` are pairs: a time of that
-/// clock, and the clock's offset at this time, s.
+/// Part of a file without a step of its clock, from the frame `from` on.
+///
+/// `offsets` has pairs of a time of that clock and its offset, s.
 struct Segment {
     from: usize,
     offsets: Vec<(f64, f64)>,
@@ -54,8 +60,11 @@ impl Segment {
     }
 }
 
-/// Bounds of the clock offset in one time window, s. They come from frames that were sent in one file and received in
-/// the other. `equal` are the offsets by all other frames.
+/// Bounds of the clock offset in a time window, s.
+///
+/// They come from frames sent in one file and received in the other.
+///
+/// `equal` has the offsets by all other frames.
 #[derive(Default)]
 struct Window {
     times: Vec<f64>,
@@ -91,8 +100,7 @@ impl Window {
     }
 }
 
-/// Returns the index of each frame that occurs exactly once in a file. The key is the bytes of the frame. `None` for a
-/// frame that occurs more often.
+/// Returns the index of each frame, by its bytes; `None` if it occurs several times in the file.
 fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     let mut known = HashMap::new();
     for (index, frame) in frames.iter().enumerate() {
@@ -102,8 +110,9 @@ fn once(frames: &[Frame]) -> HashMap<&[u8], Option<usize>> {
     known
 }
 
-/// Frames of the aligned files: the bytes, the time by the reference clock, and the direction. If a frame was sent in
-/// one file and received in another, the sent frame counts.
+/// Frames of the aligned files by their bytes: time of the reference clock, and direction.
+///
+/// Of a frame that was sent and received the sent one counts.
 type Aligned = HashMap<Vec<u8>, (f64, Direction)>;
 
 fn add(aligned: &mut Aligned, frames: &[Frame]) {
@@ -119,18 +128,18 @@ fn add(aligned: &mut Aligned, frames: &[Frame]) {
 /// Frames of all files, merged by time.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// Frames in the order of time, by the clock of the first file. A frame of several files occurs once.
+    /// Frames in order of time. A frame of several files occurs once.
     pub frames: Vec<Frame>,
-    /// Relation of each file's clock to the clock of the first file, in the order of the files.
+    /// Relation of each file's clock to that of the first file.
     pub files: Vec<Alignment>,
-    /// Warnings about the captured files, one line each.
+    /// Warnings about the capture files, one line each.
     pub warnings: Vec<String>,
 }
 
 /// Merges the frames of all files.
 ///
 /// # Errors
-/// One line that names a file which belongs to another chain or another flight.
+/// One line with a file that belongs to another chain or flight.
 pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     let mut warnings = Vec::new();
     if let Some(first) = files.first() {
@@ -160,7 +169,7 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     let mut span = [f64::INFINITY, f64::NEG_INFINITY];
     while alignments.contains(&None) {
         let waiting = alignments.iter().enumerate().filter(|(_, it)| it.is_none());
-        // The first file, then always the file with most frames in common with those that are aligned.
+        // After the first file always the one with the most frames in common with the aligned files.
         let counted = waiting.map(|(index, _)| {
             let frames = files.get(index).map_or(&[][..], |it| &it.frames);
             let own = once(frames);
@@ -191,10 +200,10 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     }
     let mut frames: Vec<Frame> = files.into_iter().flat_map(|file| file.frames).collect();
     frames.sort_by(|one, other| one.at.total_cmp(&other.at));
-    // A frame that was captured by several nodes, or replayed by an attacker, counts once.
+    // A frame that several nodes captured, or that an attacker replayed, counts once.
     let mut known = std::collections::HashSet::new();
     retain(&mut frames, "", |it| known.insert(it.wire.clone()));
-    // Another clock may step after its last common frame.
+    // A clock may still step after its last common frame.
     if let Some(steps) = without_steps(&mut frames) {
         warnings.push(format!("the time of the flight jumps {steps}: corrected"));
     }
@@ -205,10 +214,9 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
     })
 }
 
-/// Removes steps of a file's clock, which go more than [`STEP`] backward or [`APART`] forward. The times before a step
-/// are shifted to the clock after the last step.
+/// Removes steps of a file's clock: more than [`STEP`] backward or [`APART`] forward.
 ///
-/// Returns a description of the steps; `None` if there is no step.
+/// Times before a step are shifted to the clock after the last step. Returns a description of the steps, if any.
 fn without_steps(frames: &mut [Frame]) -> Option<String> {
     let times: Vec<f64> = frames.iter().map(|frame| frame.at).collect();
     let pairs = times.iter().zip(times.iter().skip(1));
@@ -258,8 +266,9 @@ fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
     }
 }
 
-/// Checks that a file without common frames is of the same flight, by its own clock. `span` are the first and the last
-/// time of the other files, s.
+/// Checks by its clock that a file without common frames is of the same flight.
+///
+/// `span` has the first and the last time of the other files, s.
 fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     let times = file.frames.iter().map(|frame| frame.at);
     let [first, last] = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| {
@@ -276,8 +285,9 @@ fn own_clock(file: &Recording, span: [f64; 2]) -> Result<(), String> {
     ))
 }
 
-/// Returns the index of the frame with the largest change of time from the previous frame. Only the frames after `from`
-/// and up to `to` count.
+/// Returns the index of the frame with the largest change of time from the previous frame.
+///
+/// Only frames after `from` and up to `to` count.
 fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
     let change = |index: &usize| {
         let [one, other] =
@@ -289,7 +299,7 @@ fn step_between(frames: &[Frame], from: usize, to: usize) -> usize {
         .unwrap_or(to)
 }
 
-/// Converts the frame times of a file to the reference clock. Returns the relation of the two clocks.
+/// Converts the times of a file to the reference clock. Returns the relation of the clocks.
 fn align(file: &mut Recording, aligned: &Aligned, common: Option<usize>) -> Alignment {
     let own = once(&file.frames);
     let mut windows: Vec<(usize, Vec<Window>)> = Vec::new();

@@ -1,4 +1,4 @@
-//! Flight from merged frames: snapshots as on the screen, log, and the figures of the report.
+//! Flight computed from merged frames: snapshots of the screen, log, and figures of the report.
 
 use std::collections::BTreeMap;
 
@@ -13,44 +13,43 @@ use uav_relay_screen::{Alarm, LogLine, Snapshot, clean};
 
 use crate::recording::Frame;
 
-/// Time between two computed snapshots of a flight, s. It is the same for long flights, because alarms are raised after
-/// a few seconds.
+/// Time between two computed snapshots, s. Alarms are raised after a few seconds, so it is fixed.
 const PERIOD: f64 = 0.5;
 
-/// Maximum number of stored snapshots, not counting the last snapshot. Of a long flight only every k-th snapshot is
-/// stored.
+/// Maximum number of stored snapshots, without the last. Of a long flight every k-th one is stored.
 const MOST: f64 = 7_200.0;
 
-/// Maximum time between two reported positions of a relay, s, for an interpolation between them.
+/// Maximum time between two reported positions of a relay for an interpolation, s.
 const GAP: f64 = 5.0;
 
-/// Mission that the chain loaded before flight, as the scenario describes it.
+/// Mission that the chain loaded before flight, from the scenario.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// Mission loaded before flight, with all parameters.
     pub mission: Mission,
-    /// Altitudes and powers of the relays that differ from the others, each with the relay's number.
+    /// Profiles (altitude and power) of single relays, with the relay's number.
     pub profiles: Vec<(u16, Profile)>,
-    /// Line on earth from Tx to Rx, if the scenario has such a line.
+    /// Line on earth from Tx to Rx, if the scenario has one.
     pub axis: Option<Axis>,
 }
 
-/// Period in which a relay did not report.
+/// Period in which a relay sent no report.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Loss {
-    /// Number of the silent relay; 0 if all relays were silent at once.
+    /// Number of the silent relay; 0 if all were silent.
     pub relay: u16,
     /// Time of the last report before the silence, s.
     pub from: f64,
     /// Time of the first report after the silence, s; `None` if there is no later report.
     pub until: Option<f64>,
-    /// True if another relay has reported the relay as lost.
+    /// True if another relay has reported it as lost.
     pub is_reported: bool,
 }
 
 impl Loss {
-    /// Returns true if the relay was silent only because all relays were silent. `all` is the silence of all relays.
-    /// The relay's own silence may begin up to 5 s earlier, and may end up to 5 s later.
+    /// Returns true if this silence is a part of `all`, a silence of all relays.
+    ///
+    /// It may begin up to 5 s earlier and end up to 5 s later.
     fn is_part_of(&self, all: &Self) -> bool {
         let margin = seconds(Instant::ZERO + SILENT_AFTER);
         let ends = all
@@ -63,24 +62,24 @@ impl Loss {
 /// Closest approach of two relays in the air.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Nearest {
-    /// Smallest distance of the two relays in the flight, m.
+    /// Smallest distance in the flight, m.
     pub distance_m: f64,
-    /// Numbers of the two relays that came closest.
+    /// Numbers of these two relays.
     pub relays: [u16; 2],
-    /// Time of the closest approach of two relays, s.
+    /// Time of the closest approach, s.
     pub time_s: f64,
 }
 
-/// Recorded flight. Times are in s since its first frame.
+/// Recorded flight. All other times are in s since its first frame.
 #[derive(Debug, Default)]
 pub struct Flight {
     /// Time of the flight's first frame, s since 1970-01-01.
     pub begin: f64,
     /// Duration of the flight, s.
     pub duration: f64,
-    /// Time between two stored snapshots, s. The last snapshot is at the end of the flight.
+    /// Time between two stored snapshots, s. The last snapshot is the end of the flight.
     pub period: f64,
-    /// Stored snapshots as JSON, each as its difference from the previous snapshot.
+    /// Stored snapshots as JSON, each one as its changes.
     pub steps: Vec<Value>,
     /// Last snapshot of the flight.
     pub last: Snapshot,
@@ -90,17 +89,18 @@ pub struct Flight {
     pub alarms: Vec<Alarm>,
     /// Number of relays in the recorded flight.
     pub relays: u16,
-    /// Time of the first agreement of all relays, s, and two shares of the time since then. In the first share all
-    /// relays had agreed positions; in the second share at least as many relays as the last agreed view has.
+    /// Time of the first agreement, s, and two fractions of the time since then.
+    ///
+    /// The first one is with agreed positions of all relays. The second one is with those of all members of the last
+    /// view.
     pub available: Option<(f64, [f64; 2])>,
-    /// Lowest SIR of any hop, dB, for each stored snapshot. It covers the time since the previous stored snapshot.
-    /// `None` if no SIR is known.
+    /// Lowest SIR of any hop since the previous stored snapshot, dB; `None` if unknown.
     pub worst_db: Vec<Option<f64>>,
-    /// Periods in which relays did not report.
+    /// Periods in which relays sent no reports.
     pub losses: Vec<Loss>,
-    /// Agreed views (memberships of the chain): time, number of the view, and number of its relays.
+    /// Agreed views (memberships of the chain): time, number, and number of relays.
     pub views: Vec<(f64, u32, u16)>,
-    /// Closest approach of two relays in the air. `None` if two relays were never in the air at the same time.
+    /// Closest approach of two relays in the air, if two were in the air at once.
     pub nearest: Option<Nearest>,
 }
 
@@ -110,8 +110,7 @@ pub fn largest(frames: &[Frame]) -> u16 {
     entries.map(|(entry, ..)| entry.relay()).max().unwrap_or(0)
 }
 
-/// Returns the entries of a report message, each with its details, if any. An entry is the state of one relay. Empty
-/// for other messages.
+/// Returns the entries (states of relays) of a report message; the first has the detail, if any.
 fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
     let report = match &frame.message {
         Some(Message::Report(report)) => Some(report),
@@ -125,7 +124,7 @@ fn entries(frame: &Frame) -> impl Iterator<Item = (Entry, Option<Detail>)> {
 }
 
 impl Flight {
-    /// Computes the flight of `relays` relays from frames that are sorted by time.
+    /// Computes the flight of `relays` relays from frames in order of time.
     pub fn new(frames: &[Frame], relays: u16, loaded: Option<&Loaded>) -> Self {
         let begin = frames.first().map_or(0.0, |frame| frame.at);
         let duration = frames.last().map_or(0.0, |frame| frame.at - begin);
@@ -176,7 +175,7 @@ impl Flight {
         (step as f64 * self.period).min(self.duration)
     }
 
-    /// Records the agreed views, and the missions that a ground station uploads, from all frames.
+    /// Records the agreed views and the uploaded missions.
     fn follow_frames(&mut self, frames: &[Frame]) {
         let mut offered = Vec::new();
         for frame in frames {
@@ -216,8 +215,7 @@ impl Flight {
     }
 }
 
-/// Returns the states of all relays, sorted by time. The time of a state is the frame's time minus the age in the
-/// entry.
+/// Returns the states of all relays in order of time: the frame's time minus the entry's age.
 fn reports(frames: &[Frame], begin: f64, relays: u16) -> Vec<Report> {
     let mut all: Vec<_> = frames
         .iter()
@@ -247,28 +245,29 @@ fn instant(at: f64) -> Instant {
     Instant::from_micros((at * 1e6).round() as u64)
 }
 
-/// State of the replay's computation between two snapshots of the flight.
+/// State of the recorder, which follows the flight from one snapshot to the next.
 struct Recorder<'a> {
     reports: &'a [Report],
     loaded: Option<&'a Loaded>,
     view: StationView,
     uploads: BTreeMap<u16, Upload>,
-    /// End of the chain (Tx or Rx) at which the ground station is. It is the station that has sent the last Watch, a
-    /// request for reports.
+    /// End of the chain with the ground station that sent the last Watch (request for reports).
     end: Side,
-    /// Number of reports, and number of frames, that have been processed.
+    /// Number of processed reports, and of processed frames.
     used: [usize; 2],
     received: u32,
     newest: BTreeMap<u16, Report>,
     tracks: BTreeMap<u16, Vec<(f64, Placement)>>,
-    /// Lowest SIR since the last stored snapshot, dB; `None` if no hop's SIR is known.
+    /// Lowest SIR since the last stored snapshot, dB; `None` if unknown.
     worst_db: Option<f64>,
-    /// Periods without a report that have not ended yet, by relay number.
+    /// Present silences, by relay number.
     open: BTreeMap<u16, Loss>,
-    /// Last time at which no relay was reporting.
+    /// Last time at which no relay reported.
     silent_at: Instant,
-    /// Time of the first agreement, s, and three numbers of snapshots since then. They count all snapshots, the
-    /// snapshots in which all relays had agreed, and the snapshots in which all members of the view had agreed.
+    /// Time of the first agreement, s, and numbers of snapshots since then.
+    ///
+    /// All snapshots; those with agreed positions of all relays; those with agreed positions of all members of the
+    /// view.
     agreed: Option<(f64, u32, [u32; 2])>,
 }
 
@@ -299,8 +298,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Returns the snapshot at `now`, and updates `flight`, for example its lowest SIR. `frames` are all frames up to
-    /// `now`.
+    /// Returns the snapshot at `now` and updates `flight`. `frames` are all frames up to `now`.
     fn advance(&mut self, flight: &mut Flight, now: f64, frames: &[Frame]) -> Snapshot {
         for frame in frames.get(self.used[1]..).unwrap_or_default() {
             self.act(flight, now, frame);
@@ -353,7 +351,7 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Repeats the acts of the operator that a frame's comment names, and logs them.
+    /// Repeats and logs the acts of the operator that a frame's comment names.
     fn act(&mut self, flight: &mut Flight, now: f64, frame: &Frame) {
         let acts = frame.comment.split("; ");
         for act in acts.filter_map(|it| it.strip_prefix("operator: ")) {
@@ -362,7 +360,7 @@ impl<'a> Recorder<'a> {
                 ["clear-lost", relay, ..] => relay.parse().ok(),
                 _ => None,
             };
-            // The relay may not be lost in the captures of all nodes.
+            // The captures may not show that the relay was lost.
             if cleared.is_none_or(|relay| self.view.clear(instant(now), relay, []).is_err()) {
                 flight.log.push(LogLine {
                     time_s: frame.at - flight.begin,
@@ -404,8 +402,9 @@ impl<'a> Recorder<'a> {
         snapshot
     }
 
-    /// Updates the chain's availability and the periods without reports. Both follow from `snapshot`, the state at
-    /// `now`. The availability is the fraction of time in which all relays have agreed positions.
+    /// Updates the chain's availability and the silences by `snapshot`, the state at `now`.
+    ///
+    /// The availability is the fraction of time with agreed positions.
     fn losses(&mut self, flight: &mut Flight, now: f64, snapshot: &Snapshot) {
         let is_fresh = |report: &Report| instant(now).since(report.at) < SILENT_AFTER;
         let reporting: Vec<&Report> = self.newest.values().filter(|it| is_fresh(it)).collect();
@@ -457,8 +456,9 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Updates the closest approach from the distances between all relays at a time. If `only` is given, only the
-    /// distances of this relay are computed.
+    /// Updates the closest approach by the distances between all relays.
+    ///
+    /// With `only` just the distances of this relay are computed.
     fn nearest(&self, flight: &mut Flight, time_s: f64, only: Option<u16>) {
         let places = self.tracks.iter();
         let places: Vec<(u16, Placement)> = places
@@ -491,7 +491,7 @@ impl<'a> Recorder<'a> {
 
     fn finish(self, flight: &mut Flight) {
         flight.losses.extend(self.open.into_values());
-        // At an outage of all relays some of them are silent first, and some report later again.
+        // When all relays fall silent, some are silent earlier, and some report again later.
         let outages = flight.losses.iter().filter(|it| it.relay == 0);
         let outages: Vec<Loss> = outages.cloned().collect();
         flight
@@ -506,8 +506,9 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// Removes the part about the station's received frames from the text of an alarm. A replay does not know which frames
-/// the station received.
+/// Removes the part about received frames from an alarm.
+///
+/// A replay does not know what the station received.
 fn replayed(text: String) -> String {
     match text.split_once("nothing received from the chain") {
         Some(("", rest)) => {
@@ -519,8 +520,9 @@ fn replayed(text: String) -> String {
     }
 }
 
-/// Returns the position of a relay at `now`, interpolated between two reported positions. `None` if the times of these
-/// two differ by more than [`GAP`].
+/// Returns the position of a relay at `now`, interpolated between two reports.
+///
+/// `None` if they are more than [`GAP`] apart.
 fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     let after = track.partition_point(|(at, _)| *at < now);
     let (t0, one) = track.get(after.checked_sub(1)?)?;
@@ -535,8 +537,9 @@ fn between(track: &[(f64, Placement)], now: f64) -> Option<Placement> {
     })
 }
 
-/// Returns a snapshot as JSON with rounded numbers. The age of a relay's report is replaced by its time, `at_s`,
-/// because the age differs in every snapshot.
+/// Returns a snapshot as JSON with rounded numbers.
+///
+/// The age of a report differs in every snapshot, so it is replaced by the report's time `at_s`.
 fn compact(snapshot: &Snapshot, now: f64) -> Value {
     let mut value = serde_json::to_value(snapshot).unwrap_or_default();
     if let Some(all) = value.as_object_mut() {
@@ -555,7 +558,7 @@ fn compact(snapshot: &Snapshot, now: f64) -> Value {
     value
 }
 
-/// Rounds all numbers in a JSON value to two decimals, except powers and degrees, which need more.
+/// Rounds all numbers in a JSON value to two decimals, except powers and degrees.
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
@@ -571,10 +574,9 @@ fn round(value: &mut Value) {
     }
 }
 
-/// Returns the changes from `old` to `new`, in the form that the page applies; `None` for no change.
+/// Returns the changes from `old` to `new` for the page; `None` without changes.
 ///
-/// For an object or an array the result is an object with the changed values, by key or index. Its key `#` is the new
-/// length of an array.
+/// For an object or array it has the changed values by key or index. The key `#` is an array's new length.
 fn difference(old: &Value, new: &Value) -> Option<Value> {
     let mut changes = serde_json::Map::new();
     match (old, new) {

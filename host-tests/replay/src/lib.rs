@@ -1,4 +1,4 @@
-//! Replay of a recorded flight: one page with the screen of the flight, a time bar, and a report.
+//! Replay of a recorded flight: one page with the screen, a time bar, and a report.
 //!
 //! | module | content |
 //! | --- | --- |
@@ -24,12 +24,12 @@ use recording::Recording;
 /// Relative tolerance of the SIR in missions, as in the Linux programs and the simulator.
 const TOLERANCE: f64 = 1e-4;
 
-/// Replay of a flight: its page, and lines that describe it.
+/// Replay of a flight: its page, and warnings.
 #[derive(Debug)]
 pub struct Replay {
-    /// Computed flight that the page shows.
+    /// Flight on the page.
     pub flight: Flight,
-    /// Page of the replay as HTML.
+    /// Page as HTML.
     pub html: String,
     /// Warnings about the input files, one line each.
     pub warnings: Vec<String>,
@@ -37,8 +37,8 @@ pub struct Replay {
 
 /// Reads the captures `files` of one flight, and creates its page. The first file has the reference clock.
 ///
-/// If `scenario` is `None`, the mission is that of the default scenario, provided that the relays report its digest.
-/// Otherwise the mission is unknown.
+/// Without `scenario` the default scenario is used, if the relays report the digest of its mission. Otherwise the
+/// mission is unknown.
 ///
 /// # Errors
 /// One line that names the file and the fault.
@@ -90,8 +90,9 @@ pub fn replay(files: &[PathBuf], scenario: Option<&Path>) -> Result<Replay, Stri
     })
 }
 
-/// Returns the mission of a scenario whose digest is `digest`, with equal or fitted slots. `None` if neither has this
-/// digest. If `digest` is `None`, the slots are equal.
+/// Returns the scenario's mission with the digest `digest`, with equal or fitted slots, if it matches.
+///
+/// Without `digest` the slots are equal.
 fn loaded(scenario: &Scenario, relays: u16, digest: Option<u16>) -> Result<Option<Loaded>, String> {
     let (plain, profiles) =
         mission(scenario, relays, TOLERANCE).map_err(|error| error.to_string())?;

@@ -8,8 +8,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use uav_relay_command::{Failure, ended, print, print_line, usage};
 
-/// Writes a page that shows a recorded flight as the screen showed it, with a time bar and a report. It needs no server. The captures
-/// of companions and ground stations are merged by the frames that occur in two of them
+/// Writes a page that shows a recorded flight as the screen showed it, with a time bar and a report. It needs no
+/// server. The captures of companions and ground stations are merged by the frames that occur in two of them
 #[derive(Parser, Debug)]
 #[command(
     name = "replay",
@@ -17,7 +17,8 @@ use uav_relay_command::{Failure, ended, print, print_line, usage};
     disable_version_flag = true
 )]
 struct Options {
-    /// Captures (pcapng) of one flight, by --capture of linux_ground, linux_companion or cargo chain. The clock of the first one counts
+    /// Captures (pcapng) of one flight, by --capture of linux_ground, linux_companion or cargo chain. The clock of
+    /// the first file is the reference
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// TOML file with the mission loaded before flight, for Rx, SIRs, interferer and geofence
@@ -37,7 +38,7 @@ fn main() -> ExitCode {
 
 /// Checks that the page replaces neither an input file nor another capture.
 fn check_out(options: &Options) -> Result<(), String> {
-    // A file that does not exist has no such path.
+    // A missing file has no such path.
     let Ok(path) = options.out.canonicalize() else {
         return Ok(());
     };

@@ -14,7 +14,7 @@ const SCRIPT: &str = include_str!("../web/replay.js");
 const STYLE: &str = include_str!("../web/replay.css");
 const BAR: &str = include_str!("../web/bar.html");
 
-/// Width and height of the chart, and its margins at the left and the bottom, px.
+/// Width and height of the chart, its left and its bottom margin, px.
 const CHART: [f64; 4] = [1000.0, 180.0, 44.0, 22.0];
 
 /// Returns the page of a flight as a single HTML document that loads no other files.
@@ -26,7 +26,7 @@ pub fn page(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String
     };
     let (mut head, mut scripts, mut hashes) = (String::new(), String::new(), String::new());
     let (mut index, mut style) = (String::new(), String::new());
-    // The page of the screen refers to its files one in a line.
+    // The screen's page names each of its files on a line of its own.
     for line in file(Some("/")).1.lines() {
         let (media, content) = file(line.split('"').find(|part| part.starts_with('/')));
         match media.split(';').next() {
@@ -56,7 +56,7 @@ pub fn page(flight: &Flight, files: &[Alignment], warnings: &[String]) -> String
         "log": flight.log,
         "alarms": flight.alarms,
     });
-    // No text of the data can end the element.
+    // No text in the data can end the script element.
     let data = data.to_string().replace('<', "\\u003c");
     let data = format!("<script type=\"application/json\" id=\"flight\">{data}</script>\n");
     index
@@ -83,7 +83,7 @@ fn escaped(text: &str) -> String {
     text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Formats a time of the flight as a button. A click on the button shows the flight at this time.
+/// Formats a time of the flight as a button that shows the flight at this time.
 fn time(at: f64) -> String {
     format!(
         "<button type=\"button\" class=\"time\" data-time=\"{at:.1}\">{}</button>",

@@ -14,19 +14,17 @@ use uav_relay_decode::source::{Item, Packet, SourceError, read};
 /// Intact frame of a capture.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Time of the frame, s since 1970. Before a merge the clock is that of the frame's own file; after a merge it is
-    /// the clock of the first file.
+    /// Time of the frame, s since 1970: by its own file's clock, after a merge by the first file's clock.
     pub at: f64,
-    /// Direction of the frame, relative to the node that wrote the file.
+    /// Direction of the frame, seen from the node that wrote the file.
     pub direction: Direction,
     /// Bytes of the frame on the wire.
     pub wire: Vec<u8>,
     /// Network, sender, destination and counter of the frame.
     pub header: Header,
-    /// Message of the frame; `None` for a handshake, and for a message that no relay accepts.
+    /// Message of the frame; `None` for a handshake, and if no relay accepts it.
     pub message: Option<Message>,
-    /// Comment on the frame, and on packets left out before it: acts of the operator at the station. Empty without a
-    /// comment.
+    /// Comment on the frame and on omitted packets before it: acts of the operator. Empty for none.
     pub comment: String,
 }
 
@@ -38,8 +36,10 @@ fn join(comment: &mut String, more: &str) {
     comment.push_str(more);
 }
 
-/// Leaves frames out of `frames`. The comment on such a frame goes to the next one that is kept; at the end, with
-/// `last`, a comment on what follows, to the last one.
+/// Removes the frames that `is_kept` rejects. Their comments go to the next kept frame, or at the end to the last
+/// one.
+///
+/// `last` is a comment on packets after the last frame.
 pub(crate) fn retain(frames: &mut Vec<Frame>, last: &str, mut is_kept: impl FnMut(&Frame) -> bool) {
     let mut acts = String::new();
     frames.retain_mut(|frame| {
@@ -63,11 +63,11 @@ pub struct Recording {
     pub name: String,
     /// Intact frames of the file's network.
     pub frames: Vec<Frame>,
-    /// Number of the network that most frames of the file belong to.
+    /// Network number of most frames.
     pub network: u16,
-    /// Digest of the mission that the chain loaded before flight; `None` if no frame of the file states it.
+    /// Digest of the mission loaded before flight, if a frame has it.
     pub mission: Option<u16>,
-    /// Fault in the file after its last readable frame; `None` if it is intact.
+    /// Fault after the last readable frame, if any.
     pub fault: Option<String>,
 }
 
@@ -86,13 +86,13 @@ impl Recording {
             if let Item::Packet(packet) = item {
                 all += 1;
                 is_stream |= packet.at.is_none();
-                // A packet without an intact frame may have an act of the operator, too.
+                // A packet without an intact frame may also have an act of the operator.
                 join(&mut acts, packet.comment);
                 if let Some(frame) = frame(&packet) {
                     let comment = std::mem::take(&mut acts);
                     frames.push(Frame { comment, ..frame });
                 }
-                // A long file without times is not read to its end.
+                // Without times a long file is not read to its end.
                 return if is_stream { Err(()) } else { Ok(()) };
             }
             Ok(())
@@ -152,8 +152,7 @@ fn frame(packet: &Packet<'_>) -> Option<Frame> {
     })
 }
 
-/// Returns the digest of the mission that the sender of a message loaded before flight. `None` if the message does not
-/// state it.
+/// Returns the digest of the mission that the sender loaded before flight, if the message has it.
 fn loaded(message: &Message) -> Option<u16> {
     match message {
         Message::Heartbeat { mission, .. }
@@ -165,7 +164,7 @@ fn loaded(message: &Message) -> Option<u16> {
     }
 }
 
-/// Returns the most frequent of the numbers; `None` without numbers.
+/// Returns the most frequent of the numbers, if any.
 fn most(numbers: impl Iterator<Item = u16>) -> Option<u16> {
     let mut counts = BTreeMap::<u16, usize>::new();
     for number in numbers {

@@ -1,4 +1,4 @@
-//! Captures of a simulated flight, one of each node, with clocks of their own: merged, shown, refused.
+//! Tests with captures of a simulated flight, one for each node, whose clocks differ.
 
 #![cfg(not(target_os = "none"))]
 #![allow(
@@ -24,17 +24,18 @@ use uav_relay_sim::simulator::medium::Access;
 use uav_relay_sim::simulator::outcome::{Link, OnAir};
 use uav_relay_sim::simulator::setup::Setup;
 
-/// Time that a frame takes from its sender to its receiver, after its last byte.
+/// Delay of a frame from its last byte to its arrival, ms.
 const LATENCY_MS: u64 = 2;
 
-/// A simulated flight: all frames, and the relays' positions at the end.
+/// Simulated flight: all frames, and the relays' final positions.
 struct Flown {
     frames: Vec<OnAir>,
     places: BTreeMap<u16, [f64; 2]>,
 }
 
-/// Simulates a chain over wires or, if `is_shared` is true, on a shared channel. The ground station at Tx requests
-/// reports. Relay 2 is switched off at `kill_s`.
+/// Simulates a chain over wires, or on a shared channel; relay 2 is switched off at `kill_s`.
+///
+/// The ground station at Tx requests reports.
 fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown {
     let (mission, _) = mission(&Scenario::default(), relays, 1e-4).unwrap();
     let mut setup = if is_shared {
@@ -79,8 +80,9 @@ fn fly(relays: u16, is_shared: bool, seconds: u64, kill_s: Option<u64>) -> Flown
     }
 }
 
-/// Clock of a simulated node with three errors: an offset, s, a relative drift, and a step. `step` has the time of the
-/// step, s, and its size, s; `None` for no step.
+/// Clock of a simulated node with an offset, s, a relative drift, and a step.
+///
+/// `step` has the step's time and size, s.
 #[derive(Clone, Copy, Default)]
 struct Clock {
     offset: f64,
@@ -98,9 +100,10 @@ impl Clock {
     }
 }
 
-/// Writes the frames that `node` has sent and received to a capture, with the times of `clock`. The node is switched
-/// off at `end_s`. From second 70 to 71.5 it has received nothing, so that no frame connects the clocks just after a
-/// step.
+/// Writes the frames that `node` has sent and received to a capture, with the times of `clock`.
+///
+/// The node is switched off at `end_s`. From second 70 to 71.5 it receives nothing, so that no frame connects the
+/// clocks just after a step.
 fn capture(flown: &Flown, folder: &Path, node: u16, clock: Clock, end_s: f64) -> PathBuf {
     let path = folder.join(format!("node{node}.pcapng"));
     let mut capture = Capture::new(std::fs::File::create(&path).unwrap(), "a test", "").unwrap();
@@ -150,7 +153,7 @@ fn sender(wire: &[u8]) -> u16 {
 
 const EPOCH: f64 = 1.8e9;
 
-/// Checks that an act on a damaged packet is at the next frame, and one after all frames at the last.
+/// Checks that an act on a damaged packet goes to the next frame, or at the end to the last one.
 #[test]
 fn an_act_on_a_damaged_packet_is_kept() {
     let flown = fly(2, false, 10, None);
@@ -252,11 +255,13 @@ fn frames_of_clocks_that_differ_drift_and_step_are_in_their_order() {
         );
     }
     assert!(shown.available.unwrap().1[0] > 0.9, "{:?}", shown.available);
-    // The mission of the default scenario is known by its digest.
+    // The relays report the digest of the default scenario's mission.
     assert!(shown.worst_db.last().unwrap().is_some());
 }
 
-/// Writes the captures of all nodes with the same clock, and returns their paths. Relay 2 is switched off at `kill_s`.
+/// Writes the captures of all nodes with the same clock; returns their paths.
+///
+/// Relay 2 is switched off at `kill_s`.
 fn captures(flown: &Flown, folder: &Path, relays: u16, kill_s: f64) -> Vec<PathBuf> {
     let clock = Clock {
         offset: EPOCH,
@@ -280,7 +285,7 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
         std::fs::write(&path, bytes).unwrap();
         path
     };
-    // Another link type in the description of the interface.
+    // The interface has another link type.
     let mut ethernet = whole.clone();
     let at = ethernet
         .windows(4)
@@ -354,7 +359,7 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
         error.contains("other.toml: its mission of 3 relays is not the one"),
         "{error}"
     );
-    // A companion that lost its power: its frames until then are used.
+    // A companion that lost its power: the frames until then are used.
     let cut = write("lost_power.pcapng", &whole[..whole.len() / 2]);
     let shown = replay(&[files[0].clone(), cut, files[2].clone()], None).unwrap();
     assert!(
@@ -390,7 +395,7 @@ fn ten_minutes_of_eight_relays_are_a_small_page_with_a_report() {
         "{:?}",
         flight.available
     );
-    // Relay 2 is lost for good, and the others close up.
+    // Relay 2 is lost for good, and the others move to their new positions.
     let [loss] = flight.losses.as_slice() else {
         panic!("{:?}", flight.losses)
     };
@@ -422,7 +427,7 @@ fn ten_minutes_of_eight_relays_are_a_small_page_with_a_report() {
             "{shown:?}, but {x} {y}"
         );
     }
-    // Nothing is loaded from elsewhere, and no text of a file becomes a part of the page.
+    // The page loads nothing, and no text of a file becomes a part of it.
     assert!(
         !html.contains("src=\"")
             && !html.contains("href=\"/")

@@ -1,7 +1,7 @@
 //! Emulated drone: a QEMU process that ends with its owner, and a socket for each of its serial ports.
 //!
-//! The machine `netduinoplus2` is an STM32F405. It lacks a clock tree (`SysTick` counts at 168 MHz, so a firmware that assumes 16
-//! MHz runs 10.5 times as fast) and baud rates (bytes arrive as fast as they are read).
+//! The machine `netduinoplus2` is an STM32F405. It has no clock tree: `SysTick` counts at 168 MHz, so a firmware that
+//! assumes 16 MHz runs 10.5 times as fast. It has no baud rates: bytes arrive as fast as they are read.
 
 use std::io;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -15,23 +15,23 @@ use super::{MISSING, QEMU};
 
 /// Speed of an emulated drone's clock relative to the wall clock, with [`Life::Fast`].
 ///
-/// QEMU's `SysTick` counts at 168 MHz, and the firmware assumes 16 MHz.
+/// `SysTick` in QEMU counts at 168 MHz; the firmware assumes 16 MHz.
 pub const SPEED: f64 = 168.0 / 16.0;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Choice of the speed of an emulated drone's clock.
+/// Speed of an emulated drone's clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Life {
-    /// The drone's clock runs [`SPEED`] times as fast as the wall clock.
+    /// [`SPEED`] times as fast as the wall clock.
     #[default]
     Fast,
-    /// The drone's clock runs in real time.
+    /// Real time.
     Real,
 }
 
 impl Life {
-    /// Returns the speed of the drone's clock relative to the wall clock.
+    /// Returns the speed relative to the wall clock.
     pub const fn speed(self) -> f64 {
         match self {
             Self::Fast => SPEED,
@@ -40,25 +40,25 @@ impl Life {
     }
 }
 
-/// Serial port of the drone's microcontroller, in the order in which QEMU lists its ports.
+/// Serial port of the drone's microcontroller, in QEMU's order.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Uart {
-    /// USART1, which leads to the autopilot.
+    /// USART1: autopilot.
     Usart1,
-    /// USART2, which leads to the upstream neighbour, or to the radio.
+    /// USART2: upstream neighbour, or radio.
     Usart2,
-    /// USART3, which leads to the downstream neighbour.
+    /// USART3: downstream neighbour.
     Usart3,
-    /// UART4, which carries the log.
+    /// UART4: log.
     Uart4,
 }
 
 const UARTS: [Uart; 4] = [Uart::Usart1, Uart::Usart2, Uart::Usart3, Uart::Uart4];
 
-/// Part of the initial flash content of an emulated drone: an address, and the bytes at this address.
+/// Initial content of a part of the flash: address and bytes.
 pub type Kept = (u32, Vec<u8>);
 
-/// Running emulated drone: a QEMU process, and the folder with its files.
+/// Running emulated drone: QEMU process, and folder with its files.
 #[derive(Debug)]
 pub struct Emulator {
     process: Child,
@@ -71,10 +71,10 @@ pub type Sockets = [UnixStream; 4];
 impl Emulator {
     /// Starts a drone with the firmware `image`, its configuration `block`, and flash contents `kept`.
     ///
-    /// `life` selects the speed of the drone's clock. The files of the drone are in the new folder `name` in `folder`.
+    /// `life` is the speed of its clock. Its files are in the new folder `name` in `folder`.
     ///
     /// # Errors
-    /// [`MISSING`] if QEMU is not installed; otherwise the fault, with QEMU's own messages.
+    /// [`MISSING`] if QEMU is not installed; otherwise the fault, with QEMU's messages.
     pub fn start(
         image: &Path,
         block: &[u8],
@@ -156,7 +156,7 @@ impl Emulator {
         }
     }
 
-    /// Returns the text that QEMU has written to its error output.
+    /// Returns QEMU's error output.
     pub fn complaint(&self) -> String {
         std::fs::read_to_string(self.folder.join("qemu.txt")).unwrap_or_default()
     }
@@ -168,7 +168,7 @@ impl Emulator {
 
     /// Kills the drone's QEMU process at once.
     pub fn kill(&mut self) {
-        // A process that has already ended is no error.
+        // If the process has already ended, that is no error.
         _ = self.process.kill();
         _ = self.process.wait();
     }

@@ -1,4 +1,4 @@
-//! Firmware image, built by cargo into a folder of its own. A waiting outer cargo does not hold the lock of that folder.
+//! Firmware image, built by cargo into a folder of its own, which an outer cargo does not lock.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,12 +6,12 @@ use std::process::Command;
 /// Target triple of the firmware: Arm Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Cargo profile with which the firmware images are built.
+/// Cargo profile of the firmware images.
 pub const PROFILE: &str = "firmware";
 
 /// Builds the firmware `examples` and returns the folder of their images, valid until the next build.
 ///
-/// If `smallest` is true, the images are built with the log as the only feature, otherwise with all features.
+/// With `smallest` the log is the only feature, otherwise all features are built.
 ///
 /// # Errors
 /// The output of cargo, if it fails.
@@ -38,7 +38,7 @@ pub fn build(examples: &[&str], smallest: bool) -> Result<PathBuf, String> {
     for example in examples {
         command.args(["--example", example]);
     }
-    // The host compiler's flags do not apply to the target, and the tests read the log at the level of `.cargo/config.toml`.
+    // The host compiler's flags are not for the target. The tests read the log at the level of `.cargo/config.toml`.
     for variable in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "DEFMT_LOG"] {
         command.env_remove(variable);
     }

@@ -1,4 +1,4 @@
-//! Transmission between drones: faults and latency of frames. It has no clock of its own.
+//! Links between drones, with faults and latency of frames. They have no clock of their own.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,7 +11,7 @@ use uav_relay::MAX_FRAME;
 use super::emulator::SPEED;
 use uav_relay_sim::simulator::faults::{Faults, Injected, LinkSpec};
 
-/// Maximum number of bytes that a link collects while it waits for a frame delimiter.
+/// Maximum number of bytes collected while a link waits for a delimiter.
 const LONGEST: usize = 2 * MAX_FRAME;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -43,14 +43,14 @@ pub struct Medium {
     injected: Injected,
     flying: BinaryHeap<Reverse<Flying>>,
     order: u64,
-    /// State of each sender: bytes since its last frame delimiter, and the time when its link becomes idle.
+    /// State of each sender: bytes since its last delimiter, and time when its link becomes idle.
     lines: Vec<(Vec<u8>, Instant)>,
 }
 
 impl Medium {
-    /// Creates links for `senders` sending ports, one port of a drone each. No bytes are in transit at `now`.
+    /// Creates the links of `senders` sending ports. No bytes are in transit at `now`.
     ///
-    /// The times in `link` are on the drones' own clocks. `seed` determines the random `faults`.
+    /// Times in `link` are on the drones' clocks. `seed` is for the random `faults`.
     pub fn new(senders: usize, link: LinkSpec, faults: Faults, seed: u64, now: Instant) -> Self {
         Self {
             link,
@@ -63,7 +63,7 @@ impl Medium {
         }
     }
 
-    /// Accepts bytes from `sender`. Each complete frame goes to all `receivers`, with faults drawn for each receiver.
+    /// Accepts bytes from `sender`. Each complete frame goes to all `receivers`, with separate faults.
     pub fn send(&mut self, now: Instant, sender: usize, bytes: &[u8], receivers: &[usize]) {
         for &byte in bytes {
             let Some((frame, _)) = self.lines.get_mut(sender) else {
@@ -98,8 +98,7 @@ impl Medium {
         }
     }
 
-    /// Returns the receiver's index and the next bytes that have arrived there by `now`. `None` if no bytes have
-    /// arrived.
+    /// Returns the index of a receiver, and bytes that have arrived there by `now`, if any.
     pub fn receive(&mut self, now: Instant) -> Option<(usize, Vec<u8>)> {
         if self.next()? > now {
             return None;
@@ -108,12 +107,12 @@ impl Medium {
         Some((flying.receiver, flying.bytes))
     }
 
-    /// Returns the time of the next arrival; `None` if no bytes are in transit.
+    /// Returns the time of the next arrival, if any bytes are in transit.
     pub fn next(&self) -> Option<Instant> {
         self.flying.peek().map(|Reverse(flying)| flying.at)
     }
 
-    /// Returns the numbers of frames lost, corrupted, duplicated and reordered so far.
+    /// Returns how many frames were lost, corrupted, duplicated and reordered so far.
     pub const fn injected(&self) -> Injected {
         self.injected
     }

@@ -1,4 +1,4 @@
-//! Firmware on the ground: its configuration, its image, and drones emulated by QEMU.
+//! Firmware tests on a PC: configuration, image, and drones emulated by QEMU.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -26,9 +26,9 @@ pub mod uploads;
 
 pub use uav_relay_kept::{epoch, journal, views};
 
-/// Program name of the emulator that runs the firmware.
+/// Program name of the emulator.
 pub const QEMU: &str = "qemu-system-arm";
 
-/// Error message if the emulator is not installed, with the command that installs it.
+/// Error message for a missing emulator, with the command that installs it.
 pub const MISSING: &str =
     "qemu-system-arm is missing; type: sudo apt-get install --yes qemu-system-arm";

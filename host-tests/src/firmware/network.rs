@@ -1,6 +1,6 @@
-//! Network of emulated drones. A thread for each receiving serial port, and one that carries bytes through the medium.
+//! Network of emulated drones: a thread reads each port, and one more carries bytes through the links.
 //!
-//! Bytes not read in time are lost: a drone that falls behind receives less, instead of later and later.
+//! Bytes not read in time are lost, so a drone that falls behind receives less, and not later and later.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -15,13 +15,13 @@ use rustix::net::sockopt::set_socket_send_buffer_size;
 use super::medium::Medium;
 use uav_relay_sim::simulator::faults::Injected;
 
-/// Timeout of a write to a drone's socket that has accepted only the first bytes of a frame.
+/// Timeout of a write to a drone that has accepted only a part of a frame.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Size of the kernel's send buffer of a drone's port, bytes. It holds about four frames.
+/// Kernel's send buffer of a drone's port, bytes: about four frames.
 const WAITING: usize = 16_384;
 
-/// Running network of emulated drones. It ends on drop, or when the drones' sockets are closed.
+/// Running network of emulated drones. It ends on drop, or when the drones close their sockets.
 #[derive(Debug)]
 pub struct Network {
     carrier: Option<JoinHandle<()>>,
@@ -29,17 +29,17 @@ pub struct Network {
     injected: Arc<Mutex<Injected>>,
 }
 
-/// Bytes sent by the port with index `sender`. An empty `bytes` ends the network.
+/// Bytes sent by the port `sender`. Without bytes it ends the network.
 #[derive(Debug)]
 struct PortBytes {
     sender: usize,
     bytes: Vec<u8>,
 }
 
-/// Topology of a network. Entry n of the list has the indices of the ports that receive the bytes of port n.
+/// Topology of a network: entry n has the indices of the ports that receive the bytes of port n.
 pub type Hearers = Vec<Vec<usize>>;
 
-/// Returns the topology of a chain of `drones` with wires: each port leads to one neighbour.
+/// Returns the topology of a chain of `drones` with wires to the neighbours.
 ///
 /// Each drone has two ports, the upstream port first.
 pub fn chain(drones: usize) -> Hearers {
@@ -51,7 +51,7 @@ pub fn chain(drones: usize) -> Hearers {
         .collect()
 }
 
-/// Returns the topology of a radio channel: each drone reaches all others within `range` drones.
+/// Returns the topology of a radio channel that reaches all drones within `range` drones.
 ///
 /// Each drone has one port.
 pub fn radio(drones: usize, range: usize) -> Hearers {
@@ -65,7 +65,7 @@ pub fn radio(drones: usize, range: usize) -> Hearers {
 }
 
 impl Network {
-    /// Connects the drones' `ports` through `medium`. Frames that arrived completely before this call are discarded.
+    /// Connects the drones' `ports` through `medium`. Complete frames that are already there are discarded.
     ///
     /// # Errors
     /// A socket cannot be read, configured, or shared between two threads.
@@ -92,7 +92,7 @@ impl Network {
         })
     }
 
-    /// Returns the numbers of frames lost, corrupted, duplicated and reordered so far.
+    /// Returns how many frames were lost, corrupted, duplicated and reordered so far.
     pub fn injected(&self) -> Injected {
         *self.injected.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -110,7 +110,7 @@ impl Drop for Network {
     }
 }
 
-/// Reads the bytes that have arrived at a port, and returns the bytes of the last, incomplete frame.
+/// Reads the bytes that have arrived at a port, and returns those of the last, incomplete frame.
 fn begun(mut port: &UnixStream) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     port.set_nonblocking(true)?;
@@ -152,7 +152,7 @@ fn carry(
         let now = Instant::now();
         while let Some((receiver, bytes)) = medium.receive(now) {
             if let Some(port) = ports.get_mut(receiver).filter(|port| has_room(port)) {
-                // A write to a drone that is switched off fails and is ignored.
+                // A write to a drone that is switched off fails; this is ignored.
                 _ = port.write_all(&bytes);
             }
         }
@@ -213,7 +213,7 @@ mod tests {
         }
         let medium = Medium::new(3, LinkSpec::default(), Faults::default(), 1, Instant::now());
         let _network = Network::connect(ports, radio(3, 2), medium).unwrap();
-        // More bytes than a socket holds, while the third port is not read.
+        // More bytes than a socket holds. The third port is not read.
         let frame = [[1; 60].as_slice(), &[0]].concat();
         for sent in 0..2_000 {
             drones[0].write_all(&frame).unwrap();

@@ -1,29 +1,29 @@
-//! Mock of two flash sectors in RAM. Writes only clear bits, places may be worn, and power may fail during any operation.
+//! Mock of two flash sectors in RAM. Writes only clear bits; words may be worn, and power may fail at any time.
 
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 use super::journal::{BLANK, Flash};
 
-/// Mock of two flash sectors in RAM, with wear, loss of power, and a record of the erases.
+/// Mock of two flash sectors in RAM, with wear and loss of power.
 #[derive(Debug)]
 pub struct Ram {
-    /// Content of each flash sector, in words of 32 bits.
+    /// Content of each sector, words of 32 bits.
     pub sectors: [Vec<u32>; 2],
-    /// Number of word writes and erases after which power fails, in the middle of the last write or erase.
+    /// Number of word writes and erases until power fails, in the middle of the last of them.
     ///
-    /// 0 while the power is off; `None` if power does not fail.
+    /// 0 while the power is off; `None` if it does not fail.
     pub power: Option<usize>,
-    /// Number of writes that fail from now on, because the flash is worn.
+    /// Number of next writes that fail because of wear.
     pub worn: usize,
-    /// Numbers of the sectors that were erased, in order.
+    /// Indices of the erased sectors, in order.
     pub erased: Vec<usize>,
     rng: ChaCha8Rng,
 }
 
 enum Power {
     On,
-    /// Power fails in the middle of the operation, so that only a random part of the bits changes.
+    /// Power fails in this operation, so only some of the bits change.
     Fails,
     Off,
 }
@@ -40,7 +40,7 @@ impl Ram {
         }
     }
 
-    /// Creates a copy of the flash sectors and their faults, with random numbers from a new `seed`.
+    /// Creates a copy of the sectors and their faults, with random numbers from a new `seed`.
     pub fn copy(&self, seed: u64) -> Self {
         Self {
             sectors: self.sectors.clone(),
@@ -51,12 +51,12 @@ impl Ram {
         }
     }
 
-    /// Switches the power on and cancels a planned failure. Returns true if the power had failed.
+    /// Switches the power on, and cancels a planned failure. Returns true if the power had failed.
     pub fn switch_on(&mut self) -> bool {
         self.power.take() == Some(0)
     }
 
-    /// Returns the content of both flash sectors, one after the other, as little-endian bytes.
+    /// Returns the content of both sectors, one after the other, as little-endian bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let words = self.sectors.iter().flatten();
         words.flat_map(|word| word.to_le_bytes()).collect()

@@ -1,10 +1,10 @@
-//! Clock for QEMU that makes emulated drones run in real time, for peers that can not run faster.
+//! Clock for QEMU that makes emulated drones run in real time, for peers that are not faster.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Returns the path of the library that QEMU must preload, so that a drone runs in real time.
+/// Returns the path of the library that QEMU preloads to run a drone in real time.
 ///
 /// The first call builds it with the C compiler.
 ///
@@ -18,7 +18,7 @@ pub fn library() -> Result<PathBuf, String> {
 fn build() -> Result<PathBuf, String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/emulated");
     std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
-    // Another process may be building it, too.
+    // Another process may build it at the same time.
     let own = folder.join(format!("slow{}.so", std::process::id()));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/firmware/slow.c");
     let mut compiler = Command::new("cc");

@@ -1,33 +1,34 @@
-//! Upper bound on an image's stack, from its machine code.
+//! Upper bound of an image's stack, from its machine code.
 //!
-//! Parses the disassembly of `llvm-objdump`: stack use and calls of each function. A call through a pointer may reach any
-//! function whose address is in the image's constants; the one with the largest stack is assumed. An interrupt may occur at the
-//! deepest point; handlers of one priority do not nest. Recursion has no bound and is an error.
+//! It parses stack use and calls of each function in the disassembly by `llvm-objdump`. A call through a pointer may
+//! reach any function whose address is in the image's constants; the one with the largest stack is assumed. An
+//! interrupt may occur at the deepest point; handlers of one priority do not nest. Recursion has no bound and is an
+//! error.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Stack use of one function of an image, and the functions that it calls.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Function {
-    /// Name of the function as the linker has it, mangled.
+    /// Mangled name of the function.
     pub name: String,
-    /// Size of the function's own stack frame, bytes.
+    /// Size of its own stack frame, bytes.
     pub frame: u64,
-    /// Addresses of the functions that this function calls or jumps to.
+    /// Addresses of the functions that it calls or jumps to.
     pub calls: BTreeSet<u64>,
-    /// True if this function calls another function through a pointer.
+    /// True if it calls a function through a pointer.
     pub indirect: bool,
 }
 
-/// Reason why the stack of a function has no bound. Each variant has the function's name.
+/// Reason why the stack has no bound. Each variant has the function's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StackError {
-    /// Error: the function with this name can call itself, directly or not.
+    /// The function can call itself, directly or not.
     Recursion(String),
-    /// Error: the stack frame of the function with this name has no constant size.
+    /// The function's stack frame has no constant size.
     Dynamic(String),
-    /// Error: no function of the image has this name.
+    /// The image has no such function.
     Unknown(String),
 }
 
@@ -43,7 +44,7 @@ impl std::fmt::Display for StackError {
 
 impl std::error::Error for StackError {}
 
-/// Call graph of an image: functions by address, and functions that can be called by pointer.
+/// Call graph of an image: functions by address, and functions that may be called by pointer.
 #[derive(Clone, Debug, Default)]
 pub struct Calls {
     functions: BTreeMap<u64, Function>,
@@ -53,8 +54,8 @@ pub struct Calls {
 impl Calls {
     /// Parses a `disassembly` by `llvm-objdump -d --no-show-raw-insn` into a call graph.
     ///
-    /// `constants` are the words of the read-only data. An odd word that equals a function's address plus 1 is a pointer to that Thumb
-    /// function.
+    /// `constants` are the words of the read-only data. A word equal to a function's address plus 1 is a pointer to
+    /// that Thumb function.
     ///
     /// # Errors
     /// [`StackError::Dynamic`] for a function that moves the stack pointer by a register.
@@ -80,7 +81,7 @@ impl Calls {
         }
         let starts: BTreeSet<u64> = functions.keys().copied().collect();
         for (own, function) in &mut functions {
-            // Ignores jumps inside a function.
+            // Jumps inside a function are not calls.
             function.calls.retain(|to| to != own && starts.contains(to));
         }
         let pointed_at = constants
@@ -104,7 +105,7 @@ impl Calls {
             .ok_or_else(|| StackError::Unknown(name.to_owned()))
     }
 
-    /// Returns the largest stack of the function `name` with all its callees, bytes, and the call path.
+    /// Returns the largest stack of the function `name` with its callees, bytes, and the path of calls.
     ///
     /// # Errors
     /// [`StackError`] if the function does not exist or its stack has no bound.
@@ -200,9 +201,7 @@ fn instruction(line: &str, function: &mut Function) -> Result<(), StackError> {
     Ok(())
 }
 
-/// Returns the number of registers in a list such as `{r4, r5, lr}`.
-///
-/// objdump does not abbreviate ranges in such a list.
+/// Returns the number of registers in a list such as `{r4, r5, lr}`, which has no ranges.
 fn registers(operands: &str) -> u64 {
     let list = operands.split_once('{').map_or("", |(_, list)| list);
     list.split(',').count() as u64

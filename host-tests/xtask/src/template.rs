@@ -3,16 +3,16 @@
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-/// Name of the folder with the files that all firmware templates share.
+/// Folder with the files that all templates share.
 const COMMON: &str = "common";
 
-/// Dependency of each firmware template on this crate. The path is replaced when a template is written.
+/// Dependency of each template on this crate. Its path is replaced.
 const CRATE: &str = "path = \"../uav-relay\"";
 
-/// Names of the firmware templates, one for each kind of main loop, and of their folders.
+/// Names of the templates and their folders, one for each kind of main loop.
 pub const TEMPLATES: [&str; 3] = ["blocking", "rtic", "embassy"];
 
-/// Returns the root folder of this project's checkout.
+/// Returns the root of this checkout.
 pub fn checkout() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));
     own.ancestors().nth(2).unwrap_or(own).to_owned()

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// Returns the path of the program `name` of rustup's component llvm-tools; `None` if not installed.
+/// Returns the path of the program `name` in rustup's llvm-tools, if installed.
 pub fn llvm_tool(name: &str) -> Option<PathBuf> {
     let output = Command::new("rustc")
         .args(["--print", "target-libdir"])
@@ -13,7 +13,7 @@ pub fn llvm_tool(name: &str) -> Option<PathBuf> {
     Some(lib.parent()?.join("bin").join(name)).filter(|path| path.exists())
 }
 
-/// Runs a command without showing its output, and returns true if it succeeds.
+/// Runs a command without its output; returns true if it succeeds.
 pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     let status = Command::new(program)
         .args(arguments)
@@ -23,7 +23,7 @@ pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     status.is_ok_and(|status| status.success())
 }
 
-/// Formats a whole number in groups of three digits, with spaces between them.
+/// Formats a whole number in groups of three digits.
 pub fn spaced(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();

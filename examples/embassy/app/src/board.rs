@@ -15,29 +15,33 @@ pub struct Board<F> {
     pub seed: u32,
     /// Cause of the last reset of the board.
     pub reset: Reset,
-    /// Flash for state that survives a reboot; `None` if the board has no such flash. With `None` a block with a
-    /// signing key is refused, and the relay's votes are lost at a reboot.
+    /// Flash for state that survives a reboot; `None` if the board has none.
+    ///
+    /// Without it a block with a signing key is refused, and the relay's votes are lost at a reboot.
     pub storage: Option<Storage<F>>,
 }
 
-/// Flash of a board, and the offsets of its storage areas. Each area consists of whole erase units outside of the
-/// firmware image.
+/// Flash of a board, and the offsets of its storage areas.
+///
+/// Each area consists of whole erase units outside of the firmware image.
 #[derive(Debug)]
 pub struct Storage<F> {
     /// Driver of the flash memory.
     pub flash: F,
-    /// Offset of the configuration block in the flash memory, bytes.
+    /// Offset of the configuration block, bytes.
     pub block: u32,
-    /// Offsets of two flash sectors, which store the epoch, a number that rises at every start.
+    /// Offsets of the two sectors for the epoch, a number that rises at every start.
     pub epochs: [Range<u32>; 2],
-    /// Offsets of two flash sectors, which store the relay's votes on the chain's membership. When both are full, one
-    /// of them is erased in flight. Small sectors are better, because their erasure takes less time.
+    /// Offsets of the two sectors for the relay's votes on the chain's membership.
+    ///
+    /// When both are full, one is erased in flight. Small sectors take less time.
     pub views: [Range<u32>; 2],
 }
 
 impl<F: NorFlash> Board<F> {
-    /// Creates the description of a board, and reads the configuration block from its flash. After a read error the
-    /// block is blank.
+    /// Creates the description of a board, and reads the configuration block from its flash.
+    ///
+    /// The block is blank after a read error.
     pub fn new(seed: u32, mut storage: Storage<F>) -> Self {
         let mut block = [0xFF; LEN];
         if storage.flash.read(storage.block, &mut block).is_err() {

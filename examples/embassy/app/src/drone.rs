@@ -1,4 +1,4 @@
-//! Drone as defined by its configuration block, for either wiring.
+//! Drone as defined by its configuration block, with wires or a radio.
 
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::GuardConfig;
@@ -22,8 +22,8 @@ use crate::votes::Votes;
 /// Maximum position error of a hovering drone, m.
 const POSITION_ERROR_M: f32 = 1.5;
 
-/// Storage for the relay and for the interference points of its mission. It is a `static`, because both would take too
-/// much stack.
+/// Storage for the relay and the interference points of its mission. It is a `static`, because the stack is too
+/// small.
 #[derive(Debug)]
 pub struct DroneStorage {
     field: config::FieldStorage,
@@ -51,16 +51,17 @@ impl Default for DroneStorage {
 pub enum Refused {
     /// The configuration block is invalid.
     Block(ConfigError),
-    /// The configuration block has a signing key, but the board has no flash that stores the epoch.
+    /// The configuration block has a signing key, but the board has no flash to store the epoch.
     NoFlash,
-    /// Signing is impossible, because the last possible epoch (start counter) has been used.
+    /// The last epoch has been used, so signing is impossible.
     NoEpoch,
-    /// The configuration block has the positions of Tx and Rx, but there is no port to an autopilot.
+    /// The configuration block has Tx and Rx positions, but the board has no port to an autopilot.
     NoAutopilot,
-    /// The positions of Tx and Rx form no valid line, or their distance differs from the mission's.
+    /// The Tx and Rx positions form no valid line, or their distance differs from the mission's.
     Course(CourseError),
-    /// The relay rejects the settings. They need a feature that this build lacks, or the joint method for more than
-    /// 100 relays.
+    /// The relay rejects the settings.
+    ///
+    /// This build lacks a feature, or the joint method has more than 100 relays.
     Setup(SetupError),
 }
 
@@ -72,8 +73,9 @@ pub(crate) struct Drone<F> {
     pub(crate) autopilot: Option<AsyncAutopilot>,
 }
 
-/// Starts the drone of `board`, and stores its relay in `storage`. `flies` is true if the board has a port to an
-/// autopilot.
+/// Starts the drone of `board`, and stores its relay in `storage`.
+///
+/// `flies` is true if the board has a port to an autopilot.
 pub(crate) fn begin<F: NorFlash>(
     storage: &'static mut DroneStorage,
     mut board: Board<F>,
@@ -94,12 +96,12 @@ pub(crate) fn begin<F: NorFlash>(
             let mut link = Autopilot::new(axis, pace, now);
             link.set_seed(board.seed);
             if let Some(key) = config::autopilot_key(&board.block) {
-                // Without a clock the link takes the time from received stamps.
+                // Without a clock, the link takes the time from received timestamps.
                 link.sign(Signing::new(key, 0, Stamp::UNKNOWN, now));
                 log::signs_to_autopilot();
             }
             if board.reset == Reset::Watchdog {
-                // The empty queue has room for the line.
+                // The queue is still empty, so it has room for this text.
                 let _ = link.send_text("relay: restarted by its watchdog");
             }
             Some(AsyncAutopilot::new(link))

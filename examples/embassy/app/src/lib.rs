@@ -1,5 +1,6 @@
-//! Application of every board here. Reads the configuration block, creates the relay, runs its ports, and logs events and
-//! setpoints.
+//! Application of every board here: creates the relay from the configuration block, and runs its ports.
+//!
+//! It also logs events and setpoints.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -9,9 +10,9 @@
 //! | `log` | log lines |
 //! | `lib.rs` | application for wires and for a radio |
 //!
-//! With a key in the block the relay signs, with an epoch in the board's flash that increases at every start. With sites in the
-//! block it flies an autopilot, a PX4 or ArduCopter on a port of its own, and the guard keeps drones apart. Votes survive a
-//! reboot in flight. Uploads do not; `examples/stm32f405` has that.
+//! With a key in the block the relay signs; the epoch in the board's flash rises at every start. With Tx and Rx
+//! positions it flies an autopilot, PX4 or ArduCopter, on a port of its own, and the guard keeps drones apart. Votes
+//! survive a reboot in flight. Uploads do not; `examples/stm32f405` has that.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -39,8 +40,8 @@ use drone::{Drone, DroneStorage, Refused};
 /// Bit rate of every port, bit/s, 8N1.
 pub use uav_relay_block::BAUD;
 
-/// Size of a UART driver's buffers, bytes. A buffer holds 22 ms of traffic, and a call of the relay's functions takes
-/// at most 3 ms, so no byte is lost during a call.
+/// Size of a UART driver's buffers, bytes: 22 ms of traffic. A call of the relay takes at most 3 ms, so no byte is
+/// lost.
 pub const BUFFER: usize = 256;
 
 /// Clock of the relay, based on Embassy's time driver.
@@ -57,8 +58,7 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Size of the receive buffer of an autopilot's UART, bytes. It is larger than [`BUFFER`], because an autopilot sends
-/// bursts.
+/// Size of the receive buffer of the autopilot's UART, bytes. An autopilot sends bursts.
 pub const BURST: usize = 512;
 
 /// Static buffers of a UART driver: [`BUFFER`] bytes to send, `IN` bytes to receive.
@@ -86,7 +86,7 @@ impl<const IN: usize> Buffers<IN> {
 /// Interval at which the watchdog is fed, unless the relay's timers are late.
 pub const TURN: Duration = Duration::from_millis(watchdog::TURN_MS);
 
-/// Feeds the watchdog every [`TURN`] by calling `feed`, forever. Used for a drone that does not join the chain.
+/// Feeds the watchdog every [`TURN`], forever. For a drone that does not join the chain.
 pub async fn rest(mut feed: impl FnMut()) -> Infallible {
     loop {
         feed();
@@ -96,8 +96,7 @@ pub async fn rest(mut feed: impl FnMut()) -> Infallible {
 
 /// Feeds the watchdog every [`TURN`], forever, unless the relay's timers are late. See [`watchdog::may_feed`].
 ///
-/// It runs in the same task as the ports and timers. If that task hangs, panics or faults, the watchdog is not fed
-/// any more.
+/// It runs in the task of the ports and timers. If that task hangs, panics or faults, the feeding stops.
 async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
     loop {
         let now = EmbassyClock.now().as_micros();
@@ -114,11 +113,10 @@ async fn watch(relay: &AsyncRelay<'_>, feed: &mut dyn FnMut()) -> Infallible {
 
 /// Runs the relay of `board` on a UART to each neighbour, and on a UART to the autopilot, if any.
 ///
-/// If the drone joins the chain, the function never completes. It calls the watchdog's `feed` every [`TURN`] while the
-/// relay makes progress.
+/// If the drone joins the chain, this never completes. It calls `feed` every [`TURN`] while the relay makes progress.
 ///
 /// # Errors
-/// The reason why the drone does not join the chain, which is logged, too.
+/// The reason why the drone does not join the chain. It is also logged.
 pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read, AW: Write>(
     store: &'static mut DroneStorage,
     board: Board<F>,
@@ -142,7 +140,7 @@ pub async fn fly<F: NorFlash, UR: Read, UW: Write, DR: Read, DW: Write, AR: Read
     .await
 }
 
-/// Runs the relay of `board` on one UART to a radio that all relays share. `pin` is high while this relay sends.
+/// Runs the relay of `board` on one radio that all relays share. `pin` is high while this relay sends.
 ///
 /// # Errors
 /// Those of [`fly`].
@@ -166,8 +164,7 @@ pub async fn fly_shared<F: NorFlash, R: Read, W: Write, D: OutputPin, AR: Read, 
     .await
 }
 
-/// Runs the relay of `board` on the ports that `run` serves. Changed votes on the chain's membership are stored
-/// before the relay sends.
+/// Runs the relay of `board` on the ports that `run` serves. Changed votes are stored before the relay sends.
 async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     store: &'static mut DroneStorage,
     board: Board<F>,
@@ -200,7 +197,7 @@ async fn fly_over<F: NorFlash, AR: Read, AW: Write>(
     Ok(join3(runs, beside, watch(&relay, feed)).await.0)
 }
 
-/// Runs the log of events and the autopilot's port, if any, forever. They are the tasks beside the relay's ports.
+/// Logs events, and serves the autopilot's port, if any, forever.
 async fn beside<R: Read, W: Write>(
     relay: &AsyncRelay<'_>,
     link: Option<&AsyncAutopilot>,

@@ -35,7 +35,7 @@ pub(crate) fn unsigned() {
     warn!("no key: frames are not signed, so anybody in range can forge them");
 }
 
-/// Logs the signing epoch, a number that rises at every start. `is_stored` is true if the flash has stored it.
+/// Logs the signing epoch of this start, and whether it was stored.
 pub(crate) fn signs(epoch: u32, is_stored: bool) {
     if is_stored {
         info!(
@@ -70,7 +70,7 @@ pub(crate) fn signs_to_autopilot() {
     );
 }
 
-/// Logs that votes on the chain's membership were found after a reboot. `accepted` is true if the relay accepts them.
+/// Logs that votes were found after a reboot, and whether the relay accepts them.
 pub(crate) fn votes_restored(accepted: bool) {
     if accepted {
         info!("votes on the chain's members from before this start were read from flash");
@@ -81,7 +81,7 @@ pub(crate) fn votes_restored(accepted: bool) {
     }
 }
 
-/// Logs that storing the relay's votes works again (`is_stored` is true) or fails (false).
+/// Logs that storing the relay's votes works again (true) or fails (false).
 pub(crate) fn votes(is_stored: bool) {
     if is_stored {
         info!("votes on the chain's members can be stored in flash again");
@@ -123,7 +123,7 @@ pub(crate) fn refused(why: Refused) {
     }
 }
 
-/// Logs the relay's events and setpoints. An autopilot, if any, also shows the events to its operator.
+/// Logs the relay's events and setpoints, and shows the events to the autopilot's operator.
 pub(crate) async fn events(
     relay: &AsyncRelay<'_>,
     autopilot: Option<&AsyncAutopilot>,

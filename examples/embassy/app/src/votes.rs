@@ -1,4 +1,4 @@
-//! Votes of the relay on views, persisted across a reboot in flight.
+//! Votes of the relay on the chain's membership, persisted across a reboot in flight.
 
 use embedded_storage::nor_flash::NorFlash;
 use uav_relay::{Instant, Relay, ViewRecord};
@@ -9,7 +9,6 @@ use uav_relay_kept::views::{Views, log as journal};
 use crate::board::Storage;
 use crate::log;
 
-/// Flash storage of the relay's votes on the chain's membership.
 #[derive(Debug)]
 pub(crate) struct Votes<F> {
     flash: Nor<F>,
@@ -33,7 +32,7 @@ impl<F: NorFlash> Votes<F> {
         Self { flash, block, view }
     }
 
-    /// Stores the relay's changed votes, `record`. If the write fails, the relay flies on.
+    /// Stores the relay's votes. If the write fails, the relay flies on.
     pub(crate) fn store(&mut self, record: &ViewRecord) {
         let Self { flash, block, view } = self;
         if let Some(stored) = view.store(record, journal(flash, *block)) {

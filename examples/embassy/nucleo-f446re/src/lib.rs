@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | USART1: TX PA9 (D8, CN10 pin 21), RX PA10 (D2, CN10 pin 33) |
 //! | neighbour toward the receiver | USART3: TX PC10 (CN7 pin 1), RX PC11 (CN7 pin 2) |
-//! | autopilot, for a drone with sites | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
+//! | autopilot, if the block has Tx and Rx positions | USART6: TX PC6 (CN10 pin 4), RX PC7 (D9, CN10 pin 19) |
 //! | driver enable of the radio | PA8 (D7, CN10 pin 23): high while this relay sends |
 //! | log | the ST-LINK on the board (RTT) |
 //! | clock | PLL, 180 MHz, from the 8 MHz of the ST-LINK or from the HSI |
@@ -13,8 +13,8 @@
 //! | image | sector 0, the vectors alone; sectors 5 and 6 |
 //! | configuration block | sector 7 |
 //!
-//! USART2 on PA2 and PA3 is not used: solder bridges SB13 and SB14 connect both pins to the ST-LINK's virtual serial port, and
-//! not to D0 and D1.
+//! USART2 on PA2 and PA3 is not used. The solder bridges SB13 and SB14 connect these pins to the ST-LINK's virtual
+//! serial port, and not to D0 and D1.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -35,8 +35,9 @@ bind_interrupts!(
     }
 );
 
-/// Creates the description of the board. An erase of a flash sector stops the CPU for 0.25 s (16 KiB) or 0.55 s (64
-/// KiB); these are typical times, and the longest are twice as long.
+/// Creates the description of the board.
+///
+/// An erase of a flash sector stops the CPU for 0.25 s (16 KiB) or 0.55 s (64 KiB), at most for twice as long.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     Board::new(
         seed(),

@@ -3,7 +3,7 @@
 //! | function | resource |
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | UART0: TX GP0, RX GP1 |
-//! | neighbour toward the receiver; with a radio the autopilot, for a drone with sites | UART1: TX GP4, RX GP5 |
+//! | neighbour toward the receiver, or with a radio the autopilot | UART1: TX GP4, RX GP5 |
 //! | driver enable of the radio | GP2: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | configuration block | the last 4 KiB of the flash |
@@ -43,7 +43,7 @@ const FLASH_SIZE: usize = 4 * 1024 * 1024;
 /// Flash driver of the board.
 pub type BoardFlash = Flash<'static, FLASH, Blocking, FLASH_SIZE>;
 
-/// Running watchdog of the board, with a timeout of 6 s. It pauses while a debugger halts the core.
+/// Running watchdog of the board, with a timeout of 6 s. A debugger that halts the core pauses it.
 pub struct Guard(Watchdog);
 
 impl Guard {
@@ -89,7 +89,7 @@ fn seed(trng: Peri<'_, TRNG>) -> u32 {
 /// Receiving and sending half of a UART.
 pub type Port = (BufferedUartRx, BufferedUartTx);
 
-/// Absent autopilot port, for an image whose two UARTs both lead to neighbours.
+/// Absent autopilot port, for an image whose two UARTs lead to neighbours.
 pub const NO_AUTOPILOT: Option<Port> = None;
 
 /// Opens a UART at the firmware's bit rate, with `buffers` that no other UART uses.

@@ -20,8 +20,8 @@ use uav_relay_chip::watchdog;
 
 /// Starts the watchdog and the clocks of `hardware`. Returns the peripherals and the cause of the last reset.
 ///
-/// Embassy waits for its clocks without a limit, so we first probe the clock tree with bounded waits; if a clock stops in
-/// between, the watchdog restarts the chip.
+/// Embassy waits for its clocks without a limit, so we first probe them with bounded waits. If a clock then stops,
+/// the watchdog restarts the chip.
 pub fn init(hardware: &ClockHardware) -> (Peripherals, Reset) {
     let reset = Reset::take(&mut Chip);
     watchdog::start(&mut Chip);
@@ -39,7 +39,7 @@ pub fn feed() {
     watchdog::feed(&mut Chip);
 }
 
-/// Returns Embassy's description of the chip's clocks, which already run at the frequencies `clocks`.
+/// Returns Embassy's description of the clocks, which already run at `clocks`.
 fn tree(hardware: &ClockHardware, clocks: Clocks) -> rcc::Config {
     let mut config = rcc::Config::new();
     let (Some(source), Some(crystal)) = (clocks.pll, hardware.crystal) else {
@@ -99,8 +99,9 @@ pub fn port<T: Instance, const IN: usize>(
     Ok((rx, tx))
 }
 
-/// Returns a seed computed from the chip's unique number. The STM32F446 has no random number generator, and the
-/// random number generator of the STM32F405 has no clock, because PLLQ is not set up.
+/// Returns a seed computed from the chip's unique number.
+///
+/// The STM32F446 has no random number generator. That of the STM32F405 has no clock, because PLLQ is not set up.
 pub fn seed() -> u32 {
     let words = embassy_stm32::uid::uid().map(u32::from);
     let step = |hash: u32, byte: u32| (hash ^ byte).wrapping_mul(0x0100_0193);

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | neighbour toward the transmitter, or radio | USART2: TX PA2, RX PA3 |
 //! | neighbour toward the receiver | USART3: TX PB10, RX PB11 |
-//! | autopilot, for a drone with sites | USART1: TX PA9, RX PA10 |
+//! | autopilot, if the block has Tx and Rx positions | USART1: TX PA9, RX PA10 |
 //! | driver enable of the radio | PA1: high while this relay sends |
 //! | log | the debug probe (RTT) |
 //! | clock | PLL, 168 MHz, from a crystal of 8 MHz or from the HSI |
@@ -37,8 +37,7 @@ const FLASH_START: u32 = 0x0800_0000;
 
 const KIB: u32 = 1024;
 
-/// Creates the description of the board. An erase of a flash sector that stores epochs stops the CPU, typically for 1 s
-/// and at most for 2 s.
+/// Creates the description of the board. An erase of an epoch sector stops the CPU for 1 s, at most 2 s.
 pub fn board(flash: Peri<'static, FLASH>) -> Board<Flash<'static, Blocking>> {
     let sector = |address: u32, bytes: u32| -> Range<u32> {
         let start = address - FLASH_START;

@@ -29,7 +29,7 @@ use uav_relay::{Duration, Event, Instant, Relay, Settings};
 /// Queues of a UART: 10 ms of received bytes, and 256 bytes to send, more than the longest frame.
 type Queues = ByteQueues<{ queue_depth(BAUD, Duration::from_millis(10)) }, 256>;
 
-/// UART that its interrupt serves, and the interrupt handler's side of the UART's queues.
+/// UART and its queues, as the interrupt handler uses them.
 struct Served<U: Instance> {
     uart: Serial<U>,
     end: InterruptEnd<'static>,
@@ -38,7 +38,7 @@ struct Served<U: Instance> {
 static UPSTREAM: Mutex<RefCell<Option<Served<USART2>>>> = Mutex::new(RefCell::new(None));
 static DOWNSTREAM: Mutex<RefCell<Option<Served<USART3>>>> = Mutex::new(RefCell::new(None));
 
-/// Milliseconds since the start. The counter overflows after 49 days.
+/// Milliseconds since the start. They overflow after 49 days.
 static MILLIS: AtomicU32 = AtomicU32::new(0);
 
 #[entry]
@@ -79,7 +79,7 @@ fn main() -> ! {
             end: down_end,
         }));
     });
-    // SAFETY: both drivers are in place, and no critical section relies on masking one interrupt.
+    // SAFETY: both drivers are in place, and no critical section relies on one masked interrupt.
     unsafe {
         NVIC::unmask(Interrupt::USART2);
         NVIC::unmask(Interrupt::USART3);
@@ -93,7 +93,7 @@ fn main() -> ! {
     let seed = u32::from(id.x()) << 16 ^ u32::from(id.y()) ^ u32::from(id.waf_num()) << 8;
     let mut relay = Relay::new(MISSION, IDENTITY, Settings::wires(BAUD), seed, now()).unwrap();
     loop {
-        // This board stores no view record: leave it off after a reboot in flight.
+        // This board stores no votes: after a reboot in flight leave the relay off.
         ports.poll(now(), &mut relay, |_| true);
         while let Some(event) = relay.poll_event() {
             if event == Event::SetpointChanged {
@@ -125,7 +125,7 @@ fn USART3() {
     serve(&DOWNSTREAM);
 }
 
-/// Moves received bytes to the receive queue and queued bytes to the UART. Called by the UART's interrupt.
+/// Moves bytes from the UART to the receive queue, and from the send queue to the UART.
 fn serve<U: Instance>(slot: &Mutex<RefCell<Option<Served<U>>>>) {
     critical_section::with(|cs| {
         let mut slot = slot.borrow_ref_mut(cs);

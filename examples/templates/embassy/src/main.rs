@@ -1,4 +1,4 @@
-//! A relay on an STM32F405 with Embassy. One link receives by interrupts, the other one by DMA; either way does for both.
+//! Relay on an STM32F405 with Embassy. One port receives by interrupts, the other by DMA.
 //!
 //! | pins | connected to |
 //! | --- | --- |
@@ -45,7 +45,7 @@ impl Clock for EmbassyClock {
     }
 }
 
-/// Static storage of the relay, some 10 KB, to keep it off the stack of `main`.
+/// Static storage of the relay, about 10 KB, which would be too large for the stack.
 static RELAY: StaticCell<Option<Relay>> = StaticCell::new();
 static SENT: StaticCell<[u8; 256]> = StaticCell::new();
 static RECEIVED: StaticCell<[u8; 256]> = StaticCell::new();
@@ -71,7 +71,8 @@ async fn main(_spawner: Spawner) {
     );
     let (up_tx, up_rx) = upstream.unwrap().split();
 
-    // DMA writes received bytes into a ring buffer, and `read` returns when the line becomes idle or half of the buffer is full.
+    // DMA writes received bytes into a ring buffer. `read` returns when no more bytes arrive or half of the buffer is
+    // full.
     let downstream = Uart::new(
         chip.USART3,
         chip.PB11,
@@ -102,11 +103,11 @@ async fn main(_spawner: Spawner) {
             }
         }
     };
-    // This board stores no view record: leave it off after a reboot in flight.
+    // This board stores no votes: after a reboot in flight leave the relay off.
     join(ports.run(&relay, &EmbassyClock, |_| true), firmware).await;
 }
 
-/// Returns a seed: a hash (FNV-1a) of the chip's unique number.
+/// Returns a seed: an FNV-1a hash of the chip's unique number.
 fn seed(id: [u8; 12]) -> u32 {
     id.into_iter().fold(0x811C_9DC5, |hash, byte| {
         (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)

@@ -33,13 +33,13 @@ mod app {
     /// Queues of a UART: 10 ms of received bytes, and 256 bytes to send, more than the longest frame.
     type Queues = ByteQueues<{ queue_depth(BAUD, Duration::from_millis(10)) }, 256>;
 
-    /// UART that its interrupt serves, and the interrupt handler's side of the UART's queues.
+    /// UART and its queues, as the interrupt handler uses them.
     pub struct Served<U: Instance> {
         uart: Serial<U>,
         end: InterruptEnd<'static>,
     }
 
-    /// Starter of the interrupt that serves a UART: it sets this interrupt pending.
+    /// Interrupt of a UART, to be set pending so that it sends.
     pub struct Request(Interrupt);
 
     impl Pend for Request {
@@ -110,7 +110,7 @@ mod app {
             ports, relay, led, ..
         } = cx.local;
         loop {
-            // This board stores no view record: leave it off after a reboot in flight.
+            // This board stores no votes: after a reboot in flight leave the relay off.
             ports.poll(now(), relay, |_| true);
             while let Some(event) = relay.poll_event() {
                 if event == Event::SetpointChanged {
@@ -118,7 +118,7 @@ mod app {
                     led.set_state(relay.setpoint().is_none().into());
                 }
             }
-            // Returns at the next byte, or at the next tick of the monotonic, which comes every millisecond.
+            // Returns at the next byte, or after at most a millisecond.
             rtic::export::wfi();
         }
     }
@@ -134,7 +134,7 @@ mod app {
     }
 
     impl<U: Instance> Served<U> {
-        /// Moves received bytes to the receive queue and queued bytes to the UART. Called by the UART's interrupt.
+        /// Moves bytes from the UART to the receive queue, and from the send queue to the UART.
         fn serve(&mut self) {
             let Self { uart, end } = self;
             loop {

@@ -1,4 +1,4 @@
-//! The stored run, and error messages for missing programs.
+//! Tests of the stored run, and of error messages for missing programs.
 
 use super::*;
 
@@ -32,11 +32,11 @@ fn results_contain_the_stored_run() {
     );
 }
 
-/// Checks in the recorded run that SLSQP takes at least 20 times as long as this crate.
+/// Checks in the stored run that SLSQP takes at least 20 times as long as this crate.
 ///
-/// SLSQP runs from a single start. This start is the equally spaced chain from which SLSQP reaches this crate's SIR
-/// soonest. The problems have eight and fifty relays with free altitudes. Problems with lateral offsets are not
-/// checked, because this crate itself takes more time there: it tries more than twice as many starts.
+/// SLSQP has a single start: of the equally spaced chains the one that reaches this crate's SIR soonest. The problems
+/// have eight and fifty relays with free altitudes. Lateral offsets are not checked: there this crate tries more than
+/// twice as many starts.
 #[test]
 fn slsqp_from_one_start_takes_20_times_our_time() {
     let kept = include_str!("../../rivals/measured.json");
@@ -75,8 +75,9 @@ fn json_round_trip_is_the_identity() {
     );
 }
 
-/// Runs `compare` with `folder` as its whole PATH, so that it finds no other programs. The virtual environment for
-/// Python is the subfolder `venv`.
+/// Runs `compare` with `folder` as its whole PATH, so that it finds no other programs.
+///
+/// The virtual environment is the subfolder `venv`.
 fn with_path(folder: &Path) -> Output {
     let venv = folder.join("venv");
     Command::new(env!("CARGO_BIN_EXE_compare"))
@@ -115,7 +116,7 @@ fn missing_venv_pip_or_packages_are_reported() {
         "{line}"
     );
 
-    // A complete environment whose Python does not answer.
+    // Complete environment with a Python that does not answer.
     std::fs::remove_file(bin.join("python")).unwrap();
     symlink("/bin/true", bin.join("python")).unwrap();
     let line = refusal(&with_path(folder.path()), 1);

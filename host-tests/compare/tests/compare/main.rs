@@ -1,4 +1,4 @@
-//! `cargo compare` without Python: scores, tables, and errors if Python is missing.
+//! Tests of `cargo compare` without Python: scores, tables, and errors.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -26,7 +26,7 @@ fn compare(arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Checks that a run failed with this exit status, and returns its only line on standard error.
+/// Checks that a run failed with this exit status; returns its only line on standard error.
 fn refusal(output: &Output, status: i32) -> String {
     let text = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!(text.lines().count(), 1, "{text}");
@@ -58,10 +58,9 @@ fn table(results: &Value) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Returns SIR (linear) and positions [x, y, altitude], m, of the best chain of eight relays.
+/// Returns SIR (linear) and positions [x, y, altitude], m, of the best chain of eight relays at 20 m.
 ///
-/// The altitude is 20 m. An independent program has computed the chain. The tests use it as the chain of a correct
-/// solver.
+/// An independent program has computed it. The tests use it as the result of a correct solver.
 fn best_of_eight() -> (f64, Vec<[f64; 3]>) {
     let cases = cases::of("gamma_star").unwrap();
     let found = cases.iter().find(|case| {
@@ -79,7 +78,7 @@ fn run(solver: &str, time_s: f64, sir: f64, chain: &[[f64; 3]]) -> Value {
     json!({ "solver": solver, "answer": { "found": found } })
 }
 
-/// Returns the table cells of the solver "rival", if it has the result `rival` for eight relays.
+/// Returns the table cells of a solver "rival" with the result `rival` for eight relays.
 fn line_of_rival(rival: Value) -> String {
     let (sir, chain) = best_of_eight();
     let own = run("own", 1e-5, sir, &chain);
@@ -165,7 +164,7 @@ fn the_reported_sir_is_that_of_the_positions() {
     assert!(
         line_of_rival(run("rival", 1.0, sir, &chain)).starts_with("2.465536 | less than 1e-8 |")
     );
-    // All hops of the best chain are equal: one relay moved by a metre makes one hop worse.
+    // All hops of the best chain have the same SIR, so a relay moved by 1 m makes one hop worse.
     let mut moved = chain.clone();
     moved[3][0] -= 1.0;
     let x: Vec<f64> = moved.iter().map(|[x, ..]| *x).collect();
@@ -176,7 +175,7 @@ fn the_reported_sir_is_that_of_the_positions() {
         line.starts_with(&format!("{worse:.6} | {short:.1e} |")),
         "{line}"
     );
-    // A solver's reported SIR is not trusted.
+    // The reported SIR is checked.
     let line = line_of_rival(run("rival", 1.0, sir, &moved));
     assert!(
         line.starts_with("does not count: it reports SIR 2.465536, and has 2.3"),
@@ -253,7 +252,7 @@ fn an_invalid_chain_does_not_count() {
     ] {
         assert_eq!(line, format!("does not count: {reason} | | | | | | |"));
     }
-    // Rounding to f32 is tolerated.
+    // Rounding to f32 is permitted.
     let line = broken(&|chain| chain[4][0] = chain[5][0] - 3.9995);
     assert!(!line.contains("m from the one before it"), "{line}");
 }
@@ -268,7 +267,7 @@ fn the_good_enough_limit_is_applied() {
     assert!(line_of_rival(rival.clone()).contains("| 500 ms (50 000) |"));
     rival["answer"]["found"]["good"]["chain"] = json!(moved);
     assert!(line_of_rival(rival.clone()).contains("| never |"));
-    // A chain is on a level with the first line if it has its SIR.
+    // A chain with the SIR of this crate's chain counts as equal.
     rival["answer"]["found"]["level"] = json!({ "after_s": 0.25, "chain": chain });
     assert!(line_of_rival(rival.clone()).contains("| 250 ms (25 000) |"));
     rival["answer"]["found"]["level"]["chain"] = json!(moved);

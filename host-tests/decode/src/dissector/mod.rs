@@ -1,4 +1,4 @@
-//! Generates the Wireshark dissector in Lua: the tables as data, and an engine that reads them.
+//! Wireshark dissector in Lua: the tables as data, and an engine that reads them.
 
 use std::fmt::Write as _;
 

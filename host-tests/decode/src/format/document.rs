@@ -1,4 +1,4 @@
-//! Parses the document into the fields of every message.
+//! Parser of the document `FORMAT.md`: fields of every message.
 
 use super::rows::{Row, Table, last_number, rows, tables};
 use super::{Field, Format, Kind, Layout};
@@ -55,9 +55,9 @@ pub(super) fn read(document: &str) -> Result<Format, String> {
     })
 }
 
-/// Replaces each row such as `as bytes 1 to 18 of a Sweep` by the rows of that message's table.
+/// Replaces each row such as `as bytes 1 to 18 of a Sweep` with the rows of that message's table.
 ///
-/// `known` has the names and table rows of the messages before this one.
+/// `known` has the tables of the earlier messages.
 fn expanded(rows: Vec<Row>, known: &[(String, Vec<Row>)]) -> Result<Vec<Row>, String> {
     let mut all = Vec::new();
     for row in rows {
@@ -156,7 +156,7 @@ fn kind(row: &Row, tables: &[Table<'_>]) -> Result<Kind, String> {
     plain(&row.kind)
 }
 
-/// Returns the names of a field's values, as in `turn: 0 look, 1 stop, 2 move`. `None` if it has no names.
+/// Returns the names of a field's values, such as `turn: 0 look, 1 stop, 2 move`, if any.
 fn words(field: &str) -> Option<Vec<String>> {
     let (_, list) = field.split_once(": ")?;
     let between = if list.contains("; ") { "; " } else { ", " };

@@ -1,4 +1,4 @@
-//! Tables of `FORMAT.md`: the messages and their fields.
+//! Messages and their fields, from the tables of `FORMAT.md`.
 
 mod document;
 mod rows;
@@ -24,28 +24,28 @@ pub enum Kind {
     F32,
     /// Floating-point number of eight bytes, IEEE 754 binary64.
     F64,
-    /// Boolean in one byte, 00 or 01.
+    /// Boolean in one byte: 00 or 01.
     Bool,
-    /// Digest (u16) of a mission, of a view, or of the line between the surveyed positions of Tx and Rx.
+    /// Digest (u16) of a mission, of a view, or of the line between the Tx and Rx positions.
     Digest,
-    /// Name of a view (membership of the chain), a u32: its number and its proposer.
+    /// Name of a view (membership of the chain), u32: number and proposer.
     View,
-    /// Flags in one byte, with the names of its bits, lowest first.
+    /// Flags in one byte, with their names, lowest bit first.
     Flags(Vec<String>),
-    /// Enumeration in one byte, with the words for its values, from 0 on.
+    /// Enumeration in one byte, with names for its values from 0 on.
     Words(Vec<String>),
     /// Fixed number of items of one type.
     Array(usize, Box<Kind>),
     /// Optional item: byte 00 for none, or byte 01 and the item.
     Option(Box<Kind>),
-    /// List of items of one type: their count, a varint up to the given number, and the items.
+    /// List of items of one type: a varint count, at most the given number, and the items.
     List(u64, Box<Kind>),
     /// Group of consecutive fields.
     Group(Vec<Field>),
 }
 
 impl Kind {
-    /// Returns the number of bytes of this type; 0 for a type of variable size.
+    /// Returns the size of this type, bytes; 0 if it varies.
     pub const fn size(&self) -> usize {
         match self {
             Self::U8 | Self::Bool | Self::Flags(_) | Self::Words(_) => 1,
@@ -58,7 +58,7 @@ impl Kind {
     }
 }
 
-/// Field of a message: a row of a table in `FORMAT.md`.
+/// Field of a message: one row of a table in `FORMAT.md`.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Field {
     /// Name of the message field.
@@ -73,7 +73,7 @@ pub struct Field {
     pub range: String,
 }
 
-/// Layout of a message's body, after the first byte, which states the kind of message.
+/// Layout of a message's body after its first byte, the tag.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Layout {
     /// Name of the message.
@@ -85,7 +85,7 @@ pub struct Layout {
 /// Layouts of all messages and of the handshake.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Format {
-    /// Layouts of the messages; the index is the message's tag.
+    /// Layouts of the messages, by message tag.
     pub messages: Vec<Layout>,
     /// Layout of the authentication handshake's body.
     pub handshake: Layout,
@@ -95,7 +95,7 @@ impl Format {
     /// Reads the layouts from the tables of `FORMAT.md`.
     ///
     /// # Errors
-    /// Names the row that cannot be parsed; a test ensures that there is none.
+    /// Names the row that cannot be parsed; tests exclude this.
     pub fn load() -> Result<Self, String> {
         document::read(DOCUMENT)
     }
@@ -107,8 +107,7 @@ impl Format {
 }
 
 impl Field {
-    /// Returns the number of units in a base unit, and the base unit: (10, "s") for a unit of 0.1 s. `None` if the unit
-    /// has no factor.
+    /// Returns factor and base unit: (10, "s") for a unit of 0.1 s. `None` for a unit without a factor.
     pub fn scale(&self) -> Option<(f64, &str)> {
         let (number, base) = self.unit.split_once(' ')?;
         let multiple: f64 = number.parse().ok()?;

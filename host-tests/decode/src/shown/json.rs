@@ -55,7 +55,7 @@ struct Tag {
 /// Returns the frame as a line of JSON.
 ///
 /// # Errors
-/// A number that JSON cannot represent.
+/// A number cannot be represented in JSON.
 pub fn json(shown: &Shown<'_>) -> Result<String, serde_json::Error> {
     let Shown {
         number,

@@ -12,16 +12,16 @@ use crate::tags::TagCheck;
 pub use json::json;
 pub use text::text;
 
-/// Decoded frame with its context, to be printed.
+/// Decoded frame with its context, for output.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
     /// Number of the frame in its source, from 1.
     pub number: u64,
-    /// Frame as captured, with time and interface.
+    /// Frame as captured, with its time and interface.
     pub packet: &'a Packet<'a>,
     /// Decoded frame that is shown.
     pub frame: &'a Frame<'a>,
-    /// Result of verifying the frame's authentication tag, if it has one.
+    /// Result of the tag's verification, if the frame has a tag.
     pub tag: Option<TagCheck>,
 }
 

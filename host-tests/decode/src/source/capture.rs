@@ -17,8 +17,7 @@ use super::{Item, Packet, SourceError};
 struct Interface {
     name: String,
     is_ours: bool,
-    /// Time resolution of the interface as the capture file states it. The value n stands for 10^-n s, the value 128 +
-    /// n for 2^-n s.
+    /// Time resolution of the interface in the file: n means 10^-n s, 128 + n means 2^-n s.
     resolution: u8,
 }
 
@@ -87,7 +86,7 @@ fn interface(block: &InterfaceDescriptionBlock<'_>) -> Interface {
     interface
 }
 
-/// Passes the frames in a captured packet to `take`. This project's captures have exactly one frame in each packet.
+/// Passes the frames in a packet to `take`. Captures of this project have one frame per packet.
 fn pieces<E>(
     packet: &EnhancedPacketBlock<'_>,
     interface: &Interface,
@@ -108,7 +107,7 @@ fn pieces<E>(
             _ => {}
         }
     }
-    // Bytes that the packet lacks are counted for its last piece.
+    // Bytes that were not captured count for the last piece.
     let missing = usize::try_from(packet.original_len)
         .unwrap_or(usize::MAX)
         .saturating_sub(packet.data.len());
@@ -132,11 +131,9 @@ fn pieces<E>(
     }
 }
 
-/// Converts the time stamp of a captured packet to the time since 1970. `resolution` is the time resolution of its
-/// interface.
+/// Converts a packet's timestamp to the time since 1970. `resolution` is that of its interface.
 ///
-/// `read` is the time stamp as the capture library returns it. The library ignores the resolution and takes every unit
-/// for a nanosecond.
+/// The capture library, which returns `read`, ignores the resolution: it takes every unit for a nanosecond.
 fn time(read: Duration, resolution: u8) -> Duration {
     let units = read.as_nanos();
     let exponent = u32::from(resolution & 0x7F);

@@ -1,4 +1,4 @@
-//! Reads frames from a capture or a byte stream, each as soon as it is complete.
+//! Reads frames from a capture or a byte stream, each one as soon as it is complete.
 
 mod capture;
 
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use uav_relay_capture::{Direction, FrameSplitter, Piece};
 
-/// First bytes of every pcapng capture. They distinguish a capture from a stream of frames.
+/// First bytes of every pcapng capture.
 ///
 /// No frame begins with them, because the second byte of a frame's header is 10 to 1f (hexadecimal), not 0d.
 const CAPTURE: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
@@ -28,9 +28,9 @@ pub struct Packet<'a> {
     pub at: Option<Duration>,
     /// Name of the interface in the capture; empty if unknown.
     pub interface: &'a str,
-    /// Direction of the frame, relative to the node that wrote the capture.
+    /// Direction of the frame, seen from the node that wrote the capture.
     pub direction: Direction,
-    /// Comment of the captured packet; empty if the packet has no comment.
+    /// Comment on the packet; empty for none.
     pub comment: &'a str,
     /// Bytes of the frame on the wire, possibly truncated.
     pub wire: &'a [u8],
@@ -41,11 +41,11 @@ pub struct Packet<'a> {
 /// Error while reading a capture or byte stream.
 #[derive(Debug)]
 pub enum SourceError<E> {
-    /// Read error of the capture or byte stream.
+    /// Read error.
     Read(io::Error),
     /// Malformed capture, with the fault.
     Capture(String),
-    /// Error that the caller's function `take` has returned. It ended the reading.
+    /// Error of the caller's function `take`; it ended the reading.
     Taken(E),
 }
 
@@ -57,7 +57,7 @@ pub fn read<E>(
     mut input: impl Read,
     mut take: impl FnMut(Item<'_>) -> Result<(), E>,
 ) -> Result<(), SourceError<E>> {
-    // Reads no more bytes than needed, because a single frame on a line may be all that comes.
+    // Reads no more bytes than needed, because no more than one frame may come.
     let mut begin = Vec::new();
     while begin.len() < CAPTURE.len() && CAPTURE.starts_with(&begin) {
         let mut byte = [0];

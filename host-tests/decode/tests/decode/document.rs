@@ -1,4 +1,4 @@
-//! Test vectors of the wire format, and its frames with tags.
+//! Tests with the vectors of the wire format, and with signed frames.
 
 use uav_relay_decode::vectors::Vectors;
 
@@ -36,7 +36,7 @@ fn the_reason_of_every_rejected_stream_is_shown() {
     let (mut stream, mut counted) = (Vec::new(), Vec::new());
     for vector in Vectors::load().unwrap().rejected {
         stream.extend(vector.wire);
-        // Counters for frames that are intact but not accepted.
+        // Counters of frames that are intact but not accepted.
         let on_top = [
             "mission",
             "view",
@@ -58,10 +58,10 @@ fn the_reason_of_every_rejected_stream_is_shown() {
             "oversized" => why == "oversized",
             "truncated" => why == "truncated" || why == "short",
             "crc" => why == "crc",
-            // The decoder accepts tags in every network.
+            // The decoder accepts signed frames in every network.
             "version" => why == "version" || line["tag"].is_object(),
             "malformed" => ["malformed", "range", "unknown_tag"].contains(&why),
-            // Only the receiver can detect the others.
+            // Only a receiver detects the other reasons.
             _ => why == "none",
         };
         assert!(fits, "{counted}: {line}");

@@ -1,4 +1,4 @@
-//! Captures and other files, complete and damaged.
+//! Tests with captures and other files, complete and damaged.
 
 use std::time::Duration;
 

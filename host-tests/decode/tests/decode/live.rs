@@ -1,12 +1,11 @@
-//! Live input: each frame is printed at once, with noise in between, into a pipe that closes.
+//! Tests of live input: each frame is printed at once, also between noise and into a pipe that closes.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::Stdio;
 
 use super::{HEARTBEAT, decode, lines};
 
-/// Checks that each frame is printed at once. If the program buffered a frame, this test would block until it times
-/// out.
+/// Checks that each frame is printed at once. With a buffer the test would time out.
 #[test]
 fn each_frame_is_printed_at_once() {
     let mut child = decode().arg("--json").spawn().unwrap();
@@ -73,7 +72,7 @@ fn a_closed_standard_output_ends_it_without_an_error() {
         let mut child = decode().args(arguments).spawn().unwrap();
         drop(child.stdout.take());
         let mut input = child.stdin.take().unwrap();
-        // The reader may be gone before all of it is written.
+        // The reader may close before everything is written.
         let frames = HEARTBEAT.repeat(10_000);
         _ = input.write_all(&frames);
         drop(input);

@@ -1,4 +1,4 @@
-//! `cargo decode`, run as a program: live input, noise, keys, and a pipe that closes.
+//! Tests of the program `cargo decode`: live input, noise, keys, and a pipe that closes.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -14,7 +14,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// Bytes of a heartbeat from relay 1 to relay 2, the first example of FORMAT.md.
+/// Heartbeat from relay 1 to relay 2, the first example of FORMAT.md.
 pub(crate) const HEARTBEAT: [u8; 23] = [
     0x04, 0x01, 0x10, 0x02, 0x02, 0x07, 0x01, 0x01, 0x01, 0x01, 0x05, 0x03, 0x3C, 0x5A, 0x05, 0x01,
     0x01, 0x05, 0x4C, 0x3C, 0x53, 0x4A, 0x00,
@@ -46,7 +46,7 @@ fn lines(arguments: &[&str], input: &[u8]) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Runs the program, checks that it exits with status 2, and returns its line on standard error.
+/// Runs the program; checks exit status 2; returns its line on standard error.
 fn refusal(arguments: &[&str], input: &[u8]) -> String {
     let output = piped(arguments, input);
     let text = String::from_utf8(output.stderr).unwrap();

@@ -1,4 +1,4 @@
-//! Random frames: well-formed with arbitrary numbers, and damaged ones.
+//! Random frames: well-formed with arbitrary numbers, or damaged.
 
 use chacha20::ChaCha8Rng;
 use rand::RngExt;
@@ -8,8 +8,7 @@ use uav_relay_decode::envelope::{before, sealed, stuffed};
 use uav_relay_decode::format::Format;
 use uav_relay_decode::write::write_fields;
 
-/// Returns a random frame with the message whose tag is `kind`. If `kind` is the last tag plus one, the frame is a
-/// handshake.
+/// Returns a random frame with the message tag `kind`; a handshake if `kind` is the number of tags.
 pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let (layout, flags, mut body) = match format.messages.get(kind) {
         Some(message) => (
@@ -25,9 +24,9 @@ pub(crate) fn frame(format: &Format, kind: usize, rng: &mut ChaCha8Rng) -> Vec<u
     around(&body, flags, rng)
 }
 
-/// Returns a frame with this body and a random header, whose flags are `flags`.
+/// Returns a frame with this body and a random header with the flags `flags`.
 ///
-/// If `flags` is 0, the frame has no authentication tag; otherwise it has a random tag.
+/// With flags 0 it has no tag, otherwise a random one.
 pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let header = Header {
         network: rng.random(),
@@ -42,7 +41,7 @@ pub(crate) fn around(body: &[u8], flags: u16, rng: &mut ChaCha8Rng) -> Vec<u8> {
     stuffed(&sealed(plain))
 }
 
-/// Damages a frame at random: changes, removes or adds bytes, or cuts off the end.
+/// Damages a frame at random: changes, removes or adds bytes, or cuts the end.
 pub(crate) fn hurt(mut wire: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let at = rng.random_range(0..wire.len() - 1);
     match rng.random_range(0..5) {

@@ -1,7 +1,6 @@
-//! Comparison of the dissector in `tshark` with `cargo decode`. Both show the same names and values, for random and damaged frames
-//! of every kind.
+//! Tests that `tshark` with the dissector shows the same names and values as `cargo decode`.
 //!
-//! Without `tshark` these tests fail and say how to install it.
+//! The frames are random and damaged ones of every kind. Without `tshark` the tests fail and say how to install it.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -144,7 +143,7 @@ fn tshark_and_cargo_decode_reject_for_the_same_reason() {
     for (bytes, packet) in frames.iter().zip(&packets) {
         let whole = bytes.strip_suffix(&[0]);
         if whole.unwrap_or(bytes).contains(&0) || bytes == &[0] {
-            // Several pieces in one packet; `cargo decode` shows each.
+            // Packet with several pieces; `cargo decode` shows each.
             continue;
         }
         let refusal = frame::read(&format, bytes, bytes.len()).refusal;

@@ -77,9 +77,9 @@ pub(crate) struct Wanted<'f> {
     value: Value<'f>,
 }
 
-/// Returns the fields that Wireshark should show for a message, in this order. Their names begin with `prefix`.
+/// Returns the fields that Wireshark should show for a message, in order. Their names begin with `prefix`.
 ///
-/// The count of each list, and each flag of a flags byte, is a field of its own.
+/// The count of a list and each flag of a flags byte are fields, too.
 pub(crate) fn flat<'f>(prefix: &str, fields: &Fields<'f>) -> Vec<Wanted<'f>> {
     let mut all = Vec::new();
     for (field, value) in &fields.0 {
@@ -122,7 +122,7 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 impl Wanted<'_> {
-    /// Asserts that Wireshark has shown this field. Compares bytes where Wireshark rounds numbers to six digits.
+    /// Asserts that Wireshark shows this field. Compares bytes where Wireshark rounds to six digits.
     pub(crate) fn is(&self, shown: &Shown) {
         assert_eq!(shown.name, self.name);
         let show = shown.show.as_str();

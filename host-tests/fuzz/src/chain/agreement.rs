@@ -1,4 +1,4 @@
-//! Agreement of all relays from any state, after faults have ended.
+//! Check that all relays agree, from any state, after the faults have ended.
 
 use uav_relay::{Phase, Schedule, ViewId};
 
@@ -6,20 +6,19 @@ use super::{Chain, Member};
 
 /// Maximum number of rounds until all relays agree. In a round each relay receives one frame.
 ///
-/// The limit is enough for the slowest agreement. This agreement takes a few minutes of virtual time, in which the
-/// relays do not use links that were lost repeatedly, and then 24 passes of messages along 4 relays.
+/// In the slowest agreement, the relays first do not use links that were lost repeatedly, for some minutes of virtual
+/// time. Then 24 passes go along 4 relays.
 const PATIENCE: usize = 40_000;
 
 impl Chain {
     /// Runs the chain without faults until all relays agree in one view (membership of the chain).
     ///
-    /// Panics if the relays do not agree within [`PATIENCE`] rounds. Returns at once if the leader finds that no target
-    /// SIR can be met. Does nothing if a relay lowers the target in fixed steps, because such an agreement takes too
-    /// long.
+    /// Panics if that takes more than [`PATIENCE`] rounds. Returns at once if the leader finds that no target SIR can
+    /// be met. Does nothing if a relay lowers the target in fixed steps, which takes too long.
     pub(super) fn agree(&mut self) {
         let fixed = |member: &Member| member.settings.schedule != Schedule::Bracketed;
         if self.members.iter().any(fixed) {
-            // A fixed-step schedule takes ten thousand sweeps, too many here.
+            // Such a schedule takes ten thousand sweeps.
             return;
         }
         for member in &mut self.members {
@@ -63,8 +62,7 @@ fn phase(member: &Member) -> Phase {
     member.watched.relay().phase()
 }
 
-/// Returns a relay's state for a failure message: phase, view, index, number of relays, neighbours. A view is a
-/// membership of the chain.
+/// Returns a relay's state for a failure message: phase, view, index, number of relays, neighbours.
 fn state(member: &Member) -> (Phase, ViewId, u16, u16, [Option<u16>; 2]) {
     let relay = member.watched.relay();
     let left = relay.mission().relays();

@@ -19,7 +19,7 @@ const SITES: Option<Sites> = Some(Sites {
 });
 
 impl Chain {
-    /// Uploads a mission with another interferer to relay `at`. The mission's version is newer than all earlier ones.
+    /// Uploads a mission with another interferer to relay `at`, with a newer version than all before.
     pub(super) fn upload(&mut self, at: usize, input: &mut Input<'_>) {
         let config = *self.mission.config();
         let Some(interferer) = self.mission.interferer() else {
@@ -38,7 +38,7 @@ impl Chain {
         let Ok(upload) = Upload::new(&self.mission, self.version, config) else {
             return;
         };
-        // One time in four it has sites of its own, if its length is that between them.
+        // One mission in four has Tx and Rx positions, if they fit its distance.
         let sited = SITES.filter(|_| moved.x_m.to_bits() % 4 == 3);
         let upload = sited
             .and_then(|sites| upload.with_sites(sites).ok())

@@ -19,26 +19,26 @@ use crate::input::Input;
 
 const MAX_OPERATIONS: usize = 256;
 
-/// Maximum number of frames that the link may send in one turn of the main loop. If it sends more, the test assumes
-/// that it never stops.
+/// Maximum number of frames that the link may send per cycle. With more it seems never to stop.
 ///
-/// The limit is twice 13 frames: a heartbeat, three message requests, a command answer, a flight target, three status
+/// It is twice 13: heartbeat, three message requests, command answer, flight target, three status texts and four
+/// named values; a TIMESYNC can be added.
 /// texts and four named values. A clock request (TIMESYNC) can come in addition.
 const MAX_FRAMES: usize = 26;
 
 /// Maximum distance of a flight target from the line Tx-Rx, m.
 ///
-/// The link allows 5 km. The test adds 40 m, because it computes the distance on a flat earth, which is less exact.
+/// The link permits 5 km. The test computes the distance on a flat earth, so it adds 40 m.
 const AROUND_M: f64 = 5_040.0;
 
-/// Surveyed position of Tx: latitude and longitude in degrees, height in m above the sea.
+/// Position of Tx: latitude and longitude, degrees; height above the sea, m.
 const TX: [f64; 3] = [47.40, 8.54, 420.0];
-/// Surveyed position of Rx: latitude and longitude in degrees, height in m above the sea.
+/// Position of Rx: latitude and longitude, degrees; height above the sea, m.
 const RX: [f64; 3] = [47.41, 8.55, 431.0];
 
 const MOVED: [f64; 3] = [47.408, 8.556, 440.0];
 
-/// Lengths of a degree of latitude and of a degree of longitude near the test's Tx and Rx, m.
+/// Length of a degree of latitude and of longitude near Tx and Rx, m.
 const DEGREE_M: [f64; 2] = [111_180.0, 75_470.0];
 
 struct Link {
@@ -190,8 +190,8 @@ impl Link {
         }
     }
 
-    /// Delivers a frame of the autopilot to the link. If the link requires signatures, the frame is first signed;
-    /// `input` chooses whether the signature is right.
+    /// Delivers a frame of the autopilot to the link. If the link requires signatures, `input` chooses if it is
+    /// right.
     fn deliver_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) {
         match &mut self.peer {
             Some(peer) => {
@@ -202,8 +202,9 @@ impl Link {
         }
     }
 
-    /// Delivers bytes to the link in one piece, and to a copy of the link in several pieces. The pieces have two
-    /// alternating lengths. The results must be equal.
+    /// Delivers bytes to the link in one piece, and to a copy in pieces. The results must be equal.
+    ///
+    /// The pieces have two alternating lengths.
     fn deliver_bytes(&mut self, bytes: &[u8], lengths: u16) {
         let mut other = self.autopilot.clone();
         without_allocation(|| self.autopilot.handle_bytes(self.now, bytes));
@@ -256,8 +257,7 @@ impl Link {
         self.deliver_frame(input, &frame(HEARTBEAT, [1, component], &payload, 0));
     }
 
-    /// Reports a lost relay to the link, then delivers an operator's command. The command states that the drones of
-    /// lost relays are gone.
+    /// Reports a lost relay to the link, then delivers the operator's command that lost relays have landed.
     fn clear_lost_relay(&mut self, input: &mut Input<'_>) {
         let node = 1 + u16::from(input.below(9));
         let side = if input.flag() {
@@ -284,7 +284,7 @@ impl Link {
         self.deliver_frame(input, &frame(COMMAND, [255, 190], &payload, 0));
     }
 
-    /// Delivers the drone's position to the link. `input` chooses the time stamp: right, old or wrong.
+    /// Delivers the drone's position to the link, with a right, old or wrong timestamp.
     fn position(&mut self, input: &mut Input<'_>, place: Placement) {
         let clock = input.byte();
         let Some(point) = self.axis.point(place) else {
@@ -315,7 +315,7 @@ impl Link {
                 Some(peer) => {
                     assert_eq!(frame.get(2), Some(&1));
                     let unsigned = peer.check_sent(self.now, &frame);
-                    // The checksum covers the signed flag.
+                    // The checksum covers the flag of a signed frame.
                     self.check_frame(&unsigned, 1);
                 }
                 None => self.check_frame(&frame, 0),
@@ -344,7 +344,7 @@ impl Link {
                 AutopilotEvent::LostCleared { .. } | AutopilotEvent::ClearRefused { .. }
             );
             events += 1;
-            // Eight events, and four kinds of mistrust.
+            // At most eight events, and four kinds of mistrust.
             assert!(events <= 12, "it never ends");
         }
         assert!(tells || cleared.is_none(), "cleared without a word");
@@ -356,9 +356,9 @@ impl Link {
         assert!(wakes > self.now, "it wants to be called for nothing");
     }
 
-    /// Checks a frame that the link has sent. The frame's signature is already removed.
+    /// Checks a frame sent by the link, without its signature.
     ///
-    /// `covered_flags` is the value of the flags byte from which the frame's checksum was computed.
+    /// `covered_flags` is the flags byte that the checksum covers.
     fn check_frame(&mut self, frame: &[u8], covered_flags: u8) {
         let Some((&[magic, length, flags, _, _, _, component, a, b, c], rest)) =
             frame.split_first_chunk()
@@ -389,8 +389,7 @@ impl Link {
         }
     }
 
-    /// Checks a flight target that the link has sent. It must be finite, near the line, within the speed limit, and
-    /// permitted in the link's state.
+    /// Checks a flight target: finite, near the line, within the speed limit, and permitted now.
     fn check_target(&mut self, payload: &[u8]) {
         let state = self.autopilot.state();
         let may = matches!(state, State::Engaged | State::Blind)
@@ -408,7 +407,7 @@ impl Link {
             velocity.iter().all(|part| part.abs() <= 20.5),
             "{velocity:?}"
         );
-        // Computed on a flat earth.
+        // On a flat earth.
         let [north_m, east_m] = DEGREE_M;
         let toward =
             |[to_lat, to_lon, _]: [f64; 3]| [(to_lat - TX[0]) * north_m, (to_lon - TX[1]) * east_m];
@@ -434,7 +433,7 @@ fn nearby_place(input: &mut Input<'_>) -> Placement {
     }
 }
 
-/// Reads a position near the line Tx-Rx. In some draws a coordinate is an arbitrary number.
+/// Reads a position near the line Tx-Rx. Sometimes a coordinate is an arbitrary number.
 fn any_place(input: &mut Input<'_>) -> Placement {
     Placement {
         x_m: input.mostly(|input| input.even(0.0, 1_400.0)),

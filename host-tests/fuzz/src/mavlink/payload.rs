@@ -1,4 +1,4 @@
-//! Payload access: padding, and numbers at an offset.
+//! Payloads: padding, and numbers at an offset.
 
 pub(super) fn sized(mut payload: Vec<u8>, length: usize) -> Vec<u8> {
     payload.resize(length, 0);

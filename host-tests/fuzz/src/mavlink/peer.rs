@@ -1,5 +1,6 @@
-//! Signing autopilot and an attacker without its key. The expected reaction of a link with a key follows from the definition of
-//! MAVLink's signatures.
+//! Signing autopilot, and an attacker without its key.
+//!
+//! The expected reaction of a link with a key follows from the definition of MAVLink's signatures.
 
 use sha2::{Digest as _, Sha256};
 use uav_relay::Instant;
@@ -11,39 +12,38 @@ use crate::input::Input;
 const KEY: [u8; 32] = *b"the key is the autopilot's alone";
 const OTHER: [u8; 32] = *b"somebody without it has this one";
 
-/// Length of a MAVLink signature, bytes: link number, time stamp and tag.
+/// Length of a MAVLink signature, bytes: link number, timestamp and tag.
 const SIGNATURE: usize = 13;
 
-/// Largest time stamp of a signature, in units of 10 µs.
+/// Largest timestamp of a signature, 10 µs.
 const LAST: u64 = (1 << 48) - 1;
-/// A minute in the unit of signature time stamps, 10 µs.
+/// A minute in units of 10 µs.
 const MINUTE: u64 = 6_000_000;
-/// Number of senders of signed frames that a link remembers.
+/// Number of senders that a link remembers.
 const SENDERS: usize = 8;
 
-/// Origin of signature time stamps: 2015-01-01, µs since 1970.
+/// Origin of the timestamps: 2015-01-01, µs since 1970.
 const BEGIN_US: u64 = 1_420_070_400_000_000;
-/// Signature time stamp of 2026-11-22.
+/// Timestamp of 2026-11-22.
 const TODAY: u64 = 37_527_840_000_000;
 
 const HISTORY: usize = 32;
 
-/// Sender of signed frames, and the signature time stamp of its last accepted frame. The sender is a system number, a
-/// component number and a link number.
+/// Sender (system, component and link number), and the timestamp of its last accepted frame.
 type Sender = ((u8, u8, u8), u64);
 
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// Current signature time stamp of the simulated autopilot, in units of 10 µs.
+    /// Timestamp of the simulated autopilot, 10 µs.
     stamp: u64,
-    /// Newest signed frames of the simulated autopilot, for replays.
+    /// Newest signed frames of the autopilot, for replays.
     history: Vec<Vec<u8>>,
-    /// Expected clock of the tested link at the instant `at`, as a MAVLink signature time stamp.
+    /// Expected clock of the tested link at the time `at`, 10 µs.
     time: u64,
     at: Instant,
-    /// Senders that the tested link should remember, with the time stamp of each sender's last frame.
+    /// Senders that the tested link should remember.
     senders: Vec<Sender>,
-    /// Signature time stamp of the last frame that the tested link sent.
+    /// Timestamp of the last frame that the tested link sent.
     sent: u64,
     parser: Parser,
     pub(super) refused: u32,
@@ -52,7 +52,7 @@ pub(super) struct Peer {
 impl Peer {
     /// Creates the autopilot's end of a signed link, and the signing settings of the tested link.
     ///
-    /// `input` chooses whether the tested link knows the present time at its start.
+    /// `input` chooses if the tested link knows the time at its start.
     pub(super) fn new(input: &mut Input<'_>, now: Instant) -> (Self, Signing) {
         let time = match input.below(4) {
             0 => 0,
@@ -76,12 +76,14 @@ impl Peer {
         (peer, Signing::new(KEY, 3, stamp, now))
     }
 
-    /// Signs a frame of the autopilot, mostly correctly. Otherwise leaves it unsigned, uses another key or an old
-    /// stamp, damages the frame, or replays an earlier frame.
+    /// Signs a frame of the autopilot, mostly correctly.
+    ///
+    /// Otherwise it stays unsigned, has another key or an old timestamp, is damaged, or is replaced by an earlier
+    /// frame.
     pub(super) fn sign_frame(&mut self, input: &mut Input<'_>, frame: &[u8]) -> Vec<u8> {
         let how = input.byte();
         let (key, link) = match how {
-            // Ten links, more than the senders remembered.
+            // Ten links, but only eight senders are remembered.
             160..192 => (KEY, how % 10),
             192..208 => (OTHER, 0),
             208..216 => return frame.to_vec(),
@@ -120,9 +122,9 @@ impl Peer {
         self.history.get(at).cloned()
     }
 
-    /// Sets the autopilot's clock to another time, which `input` chooses.
+    /// Sets the autopilot's clock to another time.
     ///
-    /// The new time is a day earlier or later, near the time of the tested link, or the largest time stamp.
+    /// It is a day earlier or later, near the tested link's time, or the largest timestamp.
     pub(super) fn set_clock(&mut self, input: &mut Input<'_>) {
         const DAY: u64 = 8_640_000_000;
         self.stamp = match input.below(6) {
@@ -135,8 +137,7 @@ impl Peer {
         };
     }
 
-    /// Processes the bytes that were delivered to the tested link. Counts in `refused` the frames that the link must
-    /// reject.
+    /// Processes the bytes delivered to the tested link. Counts frames that it must reject in `refused`.
     pub(super) fn expect_bytes(&mut self, now: Instant, bytes: &[u8]) {
         let mut parser = self.parser.clone();
         for &byte in bytes {
@@ -152,7 +153,7 @@ impl Peer {
 
     fn accepts(&mut self, now: Instant, received: &Received, frame: &[u8]) -> bool {
         match received.message {
-            // Unknown messages, and those of a radio, need no signature.
+            // Unknown messages and those of a radio need no signature.
             None | Some(Incoming::RadioStatus { .. }) => return true,
             Some(_) => {}
         }
@@ -174,7 +175,7 @@ impl Peer {
         if frame != sealed(KEY, unsigned, *link, stamp) || !is_new {
             return false;
         }
-        // With equal stamps the sender known longest is replaced, and the new one takes its place.
+        // If several senders have the same timestamp, the one known longest is replaced.
         let oldest = || {
             let places = (0..).zip(&self.senders);
             let oldest = places.min_by_key(|(_, (_, last))| *last);
@@ -192,16 +193,16 @@ impl Peer {
         true
     }
 
-    /// Advances the expected clock of the tested link to `now`.
+    /// Advances the expected clock of the tested link to `now`, by at most 71 minutes (2^32 µs).
     ///
-    /// The clock advances by at most 71 minutes (2^32 µs) in each call. The link's own clock has the same limit.
+    /// The link's clock has the same limit.
     fn advance(&mut self, now: Instant) {
         let passed = now.since(self.at).as_micros().min(u64::from(u32::MAX)) / 10;
         self.time = self.time.saturating_add(passed).min(LAST);
         self.at = self.at + uav_relay::Duration::from_micros(10 * passed);
     }
 
-    /// Checks the signature of a frame sent by the tested link at `now`; returns the frame without it.
+    /// Checks the signature of a frame sent by the tested link at `now`; returns it without the signature.
     ///
     /// # Panics
     /// The signature is wrong.
@@ -217,7 +218,7 @@ impl Peer {
             stamp >= self.time || stamp == LAST,
             "{stamp} is of the past"
         );
-        // While its own clock stops, a stamp advances by at most one for each frame.
+        // When its clock stands still, its timestamp advances by at most one per frame.
         assert!(
             stamp <= self.time.max(self.sent + 1),
             "{stamp} is of the future"
@@ -239,9 +240,9 @@ fn read(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(stamp)
 }
 
-/// Signs the unsigned frame `frame`. `link` and `stamp` are link number and time stamp of the signature.
+/// Signs `frame` with link number `link` and timestamp `stamp`.
 ///
-/// The frame's checksum is computed anew, because it covers the flag that marks a signed frame.
+/// The checksum covers the flag of a signed frame, so it is computed anew.
 fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.truncate(frame.len() - 2);
@@ -255,7 +256,7 @@ fn signed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     sealed(key, &frame, link, stamp)
 }
 
-/// Appends the signature (link number, time stamp, tag) to a frame with its checksum.
+/// Appends the signature (link number, timestamp, tag) to a frame with its checksum.
 fn sealed(key: [u8; 32], frame: &[u8], link: u8, stamp: u64) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame.push(link);

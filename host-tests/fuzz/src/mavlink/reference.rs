@@ -1,4 +1,4 @@
-//! Reference parser by the definition of frames. The earliest valid frame, then the search continues after it.
+//! Reference parser by the definition of frames: finds the earliest valid frame, then the next.
 
 use uav_relay::flight::mavlink::frame;
 
@@ -16,7 +16,7 @@ pub(super) struct Frame {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reference {
     pub(super) frames: Vec<Frame>,
-    /// Number of frames so far that have the header of a known message but are invalid.
+    /// Number of invalid frames with the header of a known message.
     pub(super) broken: usize,
     pub(super) checksums: usize,
 }
@@ -43,7 +43,7 @@ impl Reference {
             let checked = at + 10 + usize::from(length);
             let end = checked + 2 + if flags == 1 { 13 } else { 0 };
             let Some(frame) = bytes.get(at..end) else {
-                // An incomplete frame may still become valid; nothing behind it is examined until then.
+                // This incomplete frame may become valid, so nothing after it is examined.
                 break;
             };
             all.checksums += 1;

@@ -2,7 +2,7 @@
 
 use crate::input::Input;
 
-/// Returns the CRC-16/MCRF4XX over the bytes `covered` and then the byte `extra`, computed bit by bit.
+/// Returns the CRC-16/MCRF4XX of `covered` and `extra`, computed bit by bit.
 pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     covered.iter().chain([&extra]).fold(0xFFFF, |crc, &byte| {
         (0..8).fold(crc ^ u16::from(byte), |crc, _| {
@@ -11,7 +11,7 @@ pub(super) fn checksum(covered: &[u8], extra: u8) -> u16 {
     })
 }
 
-/// Type of a MAVLink message: number, extra byte of its checksum, and payload length.
+/// Kind of a MAVLink message: number, extra byte of its checksum, payload length.
 pub(super) type Kind = (u32, u8, usize);
 
 pub(super) const HEARTBEAT: Kind = (0, 50, 9);
@@ -32,7 +32,7 @@ pub(super) fn id(frame: &[u8]) -> u32 {
     u32::from_le_bytes([a, b, c, 0])
 }
 
-/// Returns the extra byte that a message adds to its checksum; 0 for an unknown message.
+/// Returns the extra byte in a message's checksum; 0 for an unknown message.
 pub(super) fn extra(id: u32) -> u8 {
     let known = [
         HEARTBEAT,
@@ -55,8 +55,9 @@ pub(super) fn extra(id: u32) -> u8 {
 
 pub(super) const SENT: [Kind; 7] = [HEARTBEAT, COMMAND, ACK, SET_POSITION, TIMESYNC, TEXT, VALUE];
 
-/// Builds a MAVLink frame from the system and component `from`. Trailing zeros of the payload are omitted, but at least
-/// one byte of the payload is kept.
+/// Builds a MAVLink frame from the system and component `from`, without trailing zeros of the payload.
+///
+/// At least one byte of the payload is kept.
 ///
 /// If `flags` has the bit for a signed frame (1), 13 arbitrary bytes follow as the signature.
 pub(super) fn frame(kind: Kind, from: [u8; 2], payload: &[u8], flags: u8) -> Vec<u8> {
@@ -82,14 +83,13 @@ pub(super) struct Placed {
     pub(super) at: usize,
 }
 
-/// Maximum number of frames and noise pieces in a stream. The limit bounds the work, because the test parses a stream
-/// twice.
+/// Maximum number of frames and noise pieces in a stream, which the test parses twice.
 const MAX_PARTS: usize = 64;
 
 /// Builds a stream of noise and of intact, damaged and truncated frames.
 ///
-/// Also returns the offsets of the intact frames. Zeros follow at the end, so that a parser does not wait for the rest
-/// of a truncated frame.
+/// Also returns the offsets of the intact frames. Zeros follow at the end, so that no parser waits for the rest of a
+/// truncated frame.
 pub(super) fn stream(input: &mut Input<'_>) -> (Vec<u8>, Vec<Placed>) {
     let (mut bytes, mut placed) = (Vec::new(), Vec::new());
     for _ in 0..MAX_PARTS {

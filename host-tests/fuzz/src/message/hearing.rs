@@ -1,4 +1,4 @@
-//! Sensing messages of a malicious neighbour. Sums as relays would compute them, or any eighteen numbers.
+//! Sensing messages of a malicious neighbour: sums as relays compute them, or any eighteen numbers.
 
 use super::parts::Body;
 use crate::input::Input;
@@ -39,7 +39,7 @@ impl Body<'_, '_> {
         self.float(|input| input.scaled(1e-30, 1e6));
     }
 
-    /// Appends to the message the interference power measured at Tx or Rx, W; 0 for no measurement.
+    /// Appends the interference power measured at Tx or Rx, W; 0 for none.
     fn level_or_none(&mut self) {
         if self.input.flag() {
             self.float(|input| input.scaled(1e-30, 1e6));
@@ -49,9 +49,9 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns the sums of a sensing message, computed from random measurements at up to eight positions.
+/// Returns the sums of a sensing message, for random measurements at up to eight positions.
 ///
-/// `input` chooses whether the powers are those of one interferer or arbitrary.
+/// `input` chooses if the powers are those of one interferer or arbitrary.
 fn of_places(input: &mut Input<'_>) -> [f32; SUMS] {
     let of_one = input.flag();
     let unit = input.scaled(1e-6, 1e12);

@@ -1,16 +1,16 @@
-//! Offers of a malicious neighbour. The numbers of a whole mission, most of them in range, some equal to the relay's.
+//! Mission offers of a malicious neighbour: mostly numbers in range, some equal to the relay's own.
 
 use super::parts::Body;
 
-/// Values of the paper's scenario in the order of an offer. They are distance and minimum separation, m, power of Tx,
-/// W, common altitude, m, common power, W.
+/// Numbers of the paper's scenario in the order of an offer.
+///
+/// Distance and minimum separation, m; power of Tx, W; common altitude, m; common power, W.
 const PAPER: [f32; 5] = [1000.0, 4.0, 80.0, 20.0, 1.0];
 
 /// Path-loss factors of the paper, with and without line of sight.
 const LOSSES: [f64; 2] = [7_191.8, 884_786.1];
 
-/// Surveyed positions of Tx and Rx: latitude, longitude (1e-7 degrees), height (mm). They are 1000 m apart to the
-/// millimetre.
+/// Tx and Rx: latitude, longitude (1e-7 degrees), height (mm), exactly 1000 m apart.
 const SITES: [i32; 6] = [
     474_000_000,
     85_400_000,
@@ -32,7 +32,7 @@ impl Body<'_, '_> {
         }
         let choice = self.input.byte();
         self.reals(&[if choice % 16 == 7 { 1e-12 } else { 0.0 }]);
-        // SIR needed on the way back, and power of Rx, W.
+        // SIR needed toward Tx, and power of Rx, W.
         self.reals(if choice % 16 == 9 {
             &[0.5, 5.0]
         } else {
@@ -44,10 +44,9 @@ impl Body<'_, '_> {
         self.answer(choice);
     }
 
-    /// Appends a hello number to the offer: the number of the hello message that the offer answers.
+    /// Appends the number of the hello that the offer answers.
     ///
-    /// If `choice` is below 240, the number is that of the relay's last hello, otherwise a number from the fuzzer's
-    /// input.
+    /// Below 240 `choice` gives the relay's last hello, otherwise the fuzzer's input gives any number.
     fn answer(&mut self, choice: u8) {
         let answer = match choice {
             0..240 => self.state.offer_number,
@@ -56,10 +55,10 @@ impl Body<'_, '_> {
         self.word(answer);
     }
 
-    /// Appends the surveyed positions of Tx and Rx to an offer; `choice` selects them.
+    /// Appends Tx and Rx positions, chosen by `choice`.
     ///
-    /// In most offers all numbers are 0, which means that there are no positions. In the others the positions are 1000
-    /// m apart, like Tx and Rx of the paper, or arbitrary.
+    /// Mostly all numbers are 0, which means none. Otherwise the positions are 1000 m apart as in the paper, or
+    /// arbitrary.
     fn sites(&mut self, choice: u8) {
         let sites = match choice % 16 {
             0..12 => [0; 6],
@@ -71,9 +70,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends a mission version to the offer.
-    ///
-    /// The version is the newest version stored by the tested relay, one of the next three versions, or any version.
+    /// Appends a mission version: the newest of the tested relay, one of the next three, or any.
     fn version(&mut self) {
         let held = self.state.held.version;
         let version = match self.input.byte() {
@@ -83,8 +80,7 @@ impl Body<'_, '_> {
         self.word(version);
     }
 
-    /// Appends the mission's number of relays to the offer. Mostly it is the number in the mission loaded before
-    /// flight, sometimes any number.
+    /// Appends the mission's number of relays, mostly that of the mission loaded before flight.
     fn all(&mut self) {
         let relays = match self.input.byte() {
             0..240 => self.state.relays,
@@ -93,8 +89,7 @@ impl Body<'_, '_> {
         self.word(relays);
     }
 
-    /// Appends the paper's mission, with another interferer, to the offer. The mission permits ranges of altitude and
-    /// of lateral position.
+    /// Appends the paper's mission with another interferer, an altitude range and a lateral range.
     fn paper(&mut self) {
         self.reals(&PAPER);
         self.float(|input| input.scaled(1.0, 1e4));
@@ -134,9 +129,7 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, 1e5));
     }
 
-    /// Appends the three path-loss factors `losses` to the offer.
-    ///
-    /// In rare cases, which the fuzzer's input selects, an arbitrary number replaces one of them.
+    /// Appends the three path-loss factors `losses`. Rarely one of them is replaced by any number.
     fn losses(&mut self, mut losses: [f64; 3]) {
         let which = usize::from(self.input.byte());
         if let Some(loss) = losses.get_mut(which) {

@@ -1,30 +1,30 @@
-//! Parts of a body: numbers that are mostly valid, otherwise arbitrary.
+//! Parts of a message body: mostly valid numbers, otherwise arbitrary ones.
 
 use uav_relay::ViewId;
 use uav_relay::wire::digest::MissionId;
 
 use crate::input::Input;
 
-/// State of the tested relay that a neighbour can know.
+/// State of the tested relay, as far as a neighbour can know it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct RelayState {
-    /// Digest of the mission that was loaded into the tested relay before flight.
+    /// Digest of the mission loaded before flight.
     pub digest: u16,
-    /// Number of relays in the mission that was loaded into the tested relay before flight.
+    /// Number of relays in the mission loaded before flight.
     pub relays: u16,
-    /// Digest of the mission that the tested relay uses now.
+    /// Digest of the mission in use.
     pub flown: u16,
-    /// Version and digest of the newest mission that the tested relay has stored, in use or not.
+    /// Version and digest of the newest stored mission, in use or not.
     pub held: MissionId,
-    /// View (agreed membership of the chain) that the tested relay has accepted last.
+    /// Last accepted view (membership of the chain).
     pub view: ViewId,
-    /// Number of the current pass, a message that travels along the chain and back.
+    /// Number of the current pass (message along the chain and back).
     pub number: u16,
-    /// Session number in the tested relay's last message of its collision guard (a fence); 0 for none.
+    /// Session number in the relay's last fence (message of the collision guard); 0 for none.
     ///
-    /// Each relay draws this number at random for the session with its neighbour.
+    /// The relay draws it at random for the session with this neighbour.
     pub association: u16,
-    /// Number in the last hello of the tested relay; 0 for none. A mission offer to this relay must repeat the number.
+    /// Number in the relay's last hello; 0 for none. A mission offer must repeat it.
     pub offer_number: u16,
     /// Distance from transmitter to receiver, m.
     pub distance_m: f32,
@@ -37,8 +37,7 @@ pub(super) struct Body<'a, 'b> {
 }
 
 impl Body<'_, '_> {
-    /// Appends the number of a pass (message along the chain and back) to the message. It is the next, the current, an
-    /// earlier or an arbitrary number.
+    /// Appends the number of a pass (message along the chain and back): next, current, earlier or any.
     pub(super) fn number(&mut self) {
         let number = match self.input.byte() {
             0..96 => self.state.number.wrapping_add(1),
@@ -58,10 +57,7 @@ impl Body<'_, '_> {
         self.bytes.extend_from_slice(&word.to_le_bytes());
     }
 
-    /// Appends the number of a pass to the message, and the digest of mission and view. A pass is a message along the
-    /// chain and back.
-    ///
-    /// Rarely the digest belongs to another view.
+    /// Appends the number of a pass, and the digest of mission and view, rarely of another view.
     pub(super) fn pass(&mut self) {
         self.number();
         let mark = mark(self.state.view);
@@ -73,10 +69,10 @@ impl Body<'_, '_> {
         self.word(self.state.flown.wrapping_add(mark));
     }
 
-    /// Appends the name of a view (membership of the chain) to the message.
+    /// Appends the name of a view (membership of the chain).
     ///
-    /// The view is the accepted view of the tested relay, an earlier view, or any view; or it is a view with one of the
-    /// next numbers and one of the first four relays as proposer.
+    /// It is the relay's accepted view, an earlier one or any one. Or it has one of the next numbers, with one of the
+    /// first four relays as proposer.
     pub(super) fn view(&mut self) {
         let own = self.state.view;
         let view = match self.input.byte() {
@@ -100,9 +96,7 @@ impl Body<'_, '_> {
         self.relay();
     }
 
-    /// Appends a sequence number to the message: mostly 0 (none) to 11.
-    ///
-    /// Heartbeats and other messages contain such numbers.
+    /// Appends a sequence number as in heartbeats, mostly 0 (none) to 11.
     pub(super) fn request_number(&mut self) {
         let number = match self.input.byte() {
             small @ 0..240 => u16::from(small % 12),
@@ -111,7 +105,7 @@ impl Body<'_, '_> {
         self.word(number);
     }
 
-    /// Appends the duration of a lease, mostly short, to the message. The unit is a tenth of a second.
+    /// Appends the duration of a lease, mostly short, in tenths of a second.
     pub(super) fn lease(&mut self) {
         let tenths = match self.input.byte() {
             few @ 0..240 => u16::from(few),
@@ -120,8 +114,9 @@ impl Body<'_, '_> {
         self.word(tenths);
     }
 
-    /// Appends the last part of a lease renewal to the message. This part is the flag `in_place` and, in half of the
-    /// messages, the node that leaves and the node that joins. At least one of these two nodes is not 0.
+    /// Appends the last part of a lease renewal: the flag `in_place`, and often two nodes.
+    ///
+    /// In half of the messages the leaving and the joining node follow. At least one of them is not 0.
     pub(super) fn renewal_nodes(&mut self) {
         self.small(0, 1);
         if self.small(0, 1) == 1 {
@@ -148,7 +143,7 @@ impl Body<'_, '_> {
         number
     }
 
-    /// Appends a byte to the message, mostly from `least` to `most`; returns the byte.
+    /// Appends a byte, mostly from `least` to `most`; returns it.
     pub(super) fn small(&mut self, least: u8, most: u8) -> u8 {
         let byte = self.input.byte();
         let small = if byte < 240 {
@@ -182,15 +177,13 @@ impl Body<'_, '_> {
         self.float(|input| input.even(0.0, distance_m));
     }
 
-    /// Appends a lateral position y, m, to the message. Its maximum distance from the line is 100 m in some draws and
-    /// 1e5 m in others.
+    /// Appends a lateral position y, m: within 100 m of the line, or within 1e5 m.
     pub(super) fn lateral(&mut self) {
         let most_m = if self.input.flag() { 1e5 } else { 100.0 };
         self.float(|input| input.even(-most_m, most_m));
     }
 
-    /// Appends a list of up to `most` floats, with its count, to the message. All floats are equal, or each is drawn
-    /// between `low` and `high`.
+    /// Appends a list of up to `most` floats, with its count. All are equal, or each is from `low` to `high`.
     pub(super) fn list(&mut self, most: u8, low: f32, high: f32) {
         let count = self.small(0, most);
         let same = self.input.flag();
@@ -204,10 +197,9 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the number of a lease renewal, mostly a small one, and a digest to the message.
+    /// Appends the number of a lease renewal, mostly small, and a digest.
     ///
-    /// The digest is usually the digest of the mission and the view (list of the chain's members), rarely a wrong
-    /// digest.
+    /// It is the digest of mission and view (membership of the chain), rarely a wrong one.
     pub(super) fn pulse_number(&mut self) {
         self.request_number();
         let wrong = u16::from(self.input.byte() == u8::MAX);
@@ -215,8 +207,9 @@ impl Body<'_, '_> {
         self.word(digest ^ wrong);
     }
 
-    /// Returns version and digest of a mission. The mission is the newest mission stored by the tested relay, the
-    /// mission loaded into this relay before flight, or another mission with a newer, older or arbitrary version.
+    /// Returns version and digest of a mission: the newest stored, the loaded one, or another.
+    ///
+    /// The loaded mission was loaded before flight. Another one has a newer, older or arbitrary version.
     pub(super) fn mission_id(&mut self) -> MissionId {
         let held = self.state.held;
         match self.input.byte() {
@@ -240,9 +233,7 @@ impl Body<'_, '_> {
         }
     }
 
-    /// Appends the session number of a fence, a message of the collision guard, to the message.
-    ///
-    /// The number is the session number of the tested relay, a small number, or any number.
+    /// Appends the session number of a fence (collision-guard message): the relay's, small, or any.
     pub(super) fn association(&mut self) {
         let word = match self.input.byte() {
             small @ 0..96 => u16::from(small),
@@ -253,8 +244,9 @@ impl Body<'_, '_> {
     }
 }
 
-/// Returns a 16-bit digest of a view, for the sum of mission digest and view digest in a message. It is the lower half
-/// of the view's name plus the byte-swapped upper half.
+/// Returns the 16-bit digest of a view, which messages add to the mission's digest.
+///
+/// It is the lower half of the view's name plus the byte-swapped upper half.
 fn mark(view: ViewId) -> u16 {
     let [a, b, c, d] = view.bits().to_le_bytes();
     u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

@@ -1,4 +1,4 @@
-//! Senders and ports of frames to a relay.
+//! Sender and port of a frame to a relay.
 
 use uav_relay::wire::frame::Header;
 use uav_relay::{Port, Wiring};
@@ -7,8 +7,7 @@ use super::super::watch::NETWORK;
 
 /// Returns header and port of a frame from a neighbour of relay `index`.
 ///
-/// `side` is 0 for the neighbour upstream, 1 for the neighbour downstream. With the `wiring` of a shared channel,
-/// both use the same port.
+/// `side` is 0 upstream, 1 downstream. On a shared channel both sides use the same port.
 pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Port) {
     let (sender, port) = if side == 1 {
         (index + 1, Port::Downstream)
@@ -27,9 +26,9 @@ pub(super) const fn from(index: u16, side: usize, wiring: Wiring) -> (Header, Po
     }
 }
 
-/// Returns the number of a node that is farther away than the neighbours of relay `index`, at least 0.
+/// Returns a node number beyond the neighbour of relay `index` at `side` (0 upstream, 1 downstream).
 ///
-/// The node is `more` places beyond the neighbour at `side` (0 upstream, 1 downstream).
+/// The node is `more` places beyond this neighbour; its number is at least 0.
 pub(super) const fn far(index: u16, side: usize, more: u8) -> u16 {
     let distance = 1 + more as u16;
     if side == 1 {

@@ -1,4 +1,4 @@
-//! Checks of the frames that a watched relay sends. Each is valid, from this relay, and to an existing node.
+//! Checks of the frames that the relay under test sends: valid, from this relay, to an existing node.
 
 use uav_relay::wire::deframe::Deframer;
 use uav_relay::wire::frame;
@@ -7,14 +7,13 @@ use uav_relay::{Port, Relay, Settings, Wiring};
 
 use super::number::number_of;
 
-/// Maximum difference between the node numbers of sender and receiver of a frame on a shared channel.
+/// Maximum difference of the sender's and receiver's node numbers on a shared channel.
 const NEAR: u16 = 4;
 
 /// Network number of every fuzzed relay.
 pub const NETWORK: u16 = 9;
 
-/// Checker of the frames that a relay sends. It stores the numbers in the relay's last frames, such as the number of
-/// the pass.
+/// Checker of a relay's frames. It stores numbers in its last frames, such as that of the pass.
 ///
 /// A pass is a message along the chain and back.
 #[derive(Clone, Debug)]
@@ -25,7 +24,7 @@ pub(super) struct Frames {
     all: u16,
     pub(super) sent: u32,
     pub(super) number: u16,
-    /// Session number in the relay's last message of its collision guard (a fence), 0 for none.
+    /// Session number in the relay's last fence (collision-guard message), 0 for none.
     pub(super) association: u16,
     pub(super) asked: u16,
 }
@@ -42,8 +41,7 @@ impl Frames {
         }
     }
 
-    /// Checks a frame sent by the relay. The frame must be valid, must name this relay as its sender, and must go to a
-    /// neighbour that is connected to `port`.
+    /// Checks a frame: it must be valid, from this relay, and to a neighbour at `port`.
     pub(super) fn look(&mut self, relay: &Relay, settings: &Settings, port: Port, bytes: &[u8]) {
         let mut deframer = Deframer::new();
         let mut frames = 0;
@@ -67,7 +65,7 @@ impl Frames {
             let off = self.node.abs_diff(header.destination) <= far;
             let upstream = off && header.destination < self.node;
             let downstream = off && header.destination > self.node;
-            // A passive relay, or one that defends its index, sends to its duplicate, but only unsigned.
+            // A relay sends to a duplicate of its own index, but only unsigned.
             let own = header.destination == self.node && !signs;
             let right = own
                 || match (settings.wiring, port) {
@@ -78,7 +76,7 @@ impl Frames {
                 };
             assert!(right, "{header:?} through {port:?}");
             let config = relay.mission().config();
-            // With a key Tx and Rx are informed of the held mission.
+            // With a key the relay informs Tx and Rx of its stored mission.
             let all = if signs {
                 0..=self.all + 1
             } else {

@@ -2,9 +2,9 @@
 
 use uav_relay::wire::message::Message;
 
-/// Returns the number of the pass to which a message belongs. A pass is a message along the chain and back.
+/// Returns the pass number of a message; `None` if it has none, such as a lease message.
 ///
-/// `None` for a message without such a number, such as a lease message.
+/// A pass is a message along the chain and back.
 pub(super) const fn number_of(message: &Message) -> Option<u16> {
     Some(match message {
         Message::Sweep(sweep) => sweep.number,

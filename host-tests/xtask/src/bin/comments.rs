@@ -1,10 +1,11 @@
 //! Checks the doc comments of `src`, `examples` and `host-tests`; run by `cargo ci --quick`.
 //!
-//! The first sentence of a doc comment is its summary: rustdoc shows it in every list. It has at most [`LONGEST`] characters, and its
-//! first word is a noun, an article, an adjective or a verb. Without a dictionary the check names the words that it must not be.
+//! The first sentence of a doc comment is its summary, which rustdoc shows in every list. It has at most [`LONGEST`]
+//! characters, and begins with a noun, an article, an adjective or a verb. Without a dictionary the check has a list
+//! of wrong words.
 //!
-//! No tracked file contains a name of `host-tests/xtask/data/old_names.txt`, except that list and CHANGELOG.md: after a rename the
-//! code, the documents and the tools use the new name.
+//! No tracked file contains a name of `host-tests/xtask/data/old_names.txt`, except that list and CHANGELOG.md: code,
+//! documents and tools use the new names.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -12,12 +13,12 @@ use std::process::{Command, ExitCode};
 /// Maximum length of a doc comment's first sentence, characters.
 const LONGEST: usize = 100;
 
-/// Folders whose Rust files are checked, with all their subfolders.
+/// Folders whose Rust files are checked, including all subfolders.
 const FOLDERS: [&str; 3] = ["src", "examples", "host-tests"];
 
 /// Words that must not begin a doc comment, several to a line.
 ///
-/// They are pronouns, prepositions, conjunctions, question words, adverbs and auxiliary verbs.
+/// Pronouns, prepositions, conjunctions, question words, adverbs and auxiliary verbs.
 const WRONG: [&str; 8] = [
     "i he she it they we you me him her them us his its ours your yours mine itself themselves this that these those such",
     "who whom whose which what whether why how when where while until till since unless because although though as so if than",
@@ -29,26 +30,22 @@ const WRONG: [&str; 8] = [
     "did can could may might must shall should will would whoever whatever whichever wherever whenever our ones maybe perhaps",
 ];
 
-/// Doc comments exempt from the check, each as path, colon and first sentence. The list stays empty.
+/// Exempt doc comments: path, colon and first sentence. The list stays empty.
 const EXEMPT: [&str; 0] = [];
 
-/// Old names of items that were renamed, one a line. The check rejects any file that still uses an old name.
-///
-/// Only words that nothing else uses are in the list.
+/// Old names of renamed items, one a line: words that nothing else uses.
 const OLD_NAMES: &str = include_str!("../../data/old_names.txt");
 
-/// Files in which old names of items are allowed. They are the list of the old names, and the table of old and new names.
+/// Files that may contain old names: their list, and the table of old and new names.
 const WITH_OLD_NAMES: [&str; 2] = ["host-tests/xtask/data/old_names.txt", "CHANGELOG.md"];
 
-/// Doc comment in a source file: number of its first line, from 1, and its first paragraph.
+/// Doc comment: number of its first line, from 1, and its first paragraph.
 struct Comment {
     line: usize,
     paragraph: String,
 }
 
 /// Returns the marker `///` or `//!` of a doc comment line, and the text after it.
-///
-/// `None` for other lines.
 fn text(line: &str) -> Option<(&str, &str)> {
     let line = line.trim();
     let marker = ["///", "//!"].into_iter().find(|m| line.starts_with(m))?;
@@ -105,7 +102,7 @@ fn summary(paragraph: &str) -> &str {
     end.and_then(|at| paragraph.get(..=at)).unwrap_or(paragraph)
 }
 
-/// Returns an error message if a doc comment's first sentence breaks a rule; `None` if it is correct.
+/// Returns an error message if a first sentence breaks a rule.
 fn fault(summary: &str) -> Option<String> {
     let length = summary.chars().count();
     if length > LONGEST {
@@ -133,7 +130,7 @@ fn sources(folder: &Path, into: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Returns the old names of renamed items in a text, each with its line number, from 1.
+/// Returns the old names in a text, each with its line number, from 1.
 fn old_names(text: &str) -> Vec<(usize, &'static str)> {
     let is_letter = |c: char| c.is_alphanumeric() || c == '_';
     let mut found = Vec::new();
@@ -145,18 +142,18 @@ fn old_names(text: &str) -> Vec<(usize, &'static str)> {
     found
 }
 
-/// Returns the paths of all files of the project that git tracks.
+/// Returns the paths of all files tracked by git.
 fn tracked() -> std::io::Result<Vec<String>> {
     let output = Command::new("git").arg("ls-files").output()?;
     let names = String::from_utf8_lossy(&output.stdout);
     Ok(names.lines().map(str::to_owned).collect())
 }
 
-/// Returns an error message for each old name of an item that a tracked text file still contains.
+/// Returns an error message for each old name in a tracked text file.
 fn check_names() -> std::io::Result<Vec<String>> {
     let mut faults = Vec::new();
     for file in tracked()? {
-        // A file that is deleted or not UTF-8 has no names.
+        // A file that is missing or not UTF-8 contains no names.
         let text = std::fs::read_to_string(&file).unwrap_or_default();
         if !WITH_OLD_NAMES.contains(&file.as_str()) {
             let found = old_names(&text).into_iter();

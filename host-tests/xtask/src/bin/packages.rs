@@ -1,12 +1,14 @@
-//! Checks the workspace's dependencies and the packaged crate. Licences, a single registry, no duplicate versions in the library, and
-//! no link of the README to a file that the package lacks; run by `cargo ci`.
+//! Checks the workspace's dependencies and the packaged crate; run by `cargo ci`.
 //!
-//! Advisories are not checked, because they change without a commit and have to be fetched.
+//! It checks licences, a single registry, that the library needs no package in two versions, and that the README
+//! links to no file that is not packaged.
+//!
+//! Security advisories are not checked: they change without a commit, and must be downloaded.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::{Command, ExitCode};
 
-/// Allowed licences, which require only attribution.
+/// Permitted licences, which require only attribution.
 const ALLOWED: [&str; 10] = [
     "0BSD",
     "Apache-2.0",
@@ -20,12 +22,12 @@ const ALLOWED: [&str; 10] = [
     "Zlib",
 ];
 
-/// Packages that only tests use, whose licence is not in [`ALLOWED`].
+/// Packages for tests only, with a licence that is not in [`ALLOWED`].
 const TESTS_ALONE: [&str; 2] = ["alterable_logger", "colored"];
 
-/// Returns true if [`ALLOWED`] licences are enough for a licence expression.
+/// Returns true if a licence expression permits the use under [`ALLOWED`] licences.
 ///
-/// Each operand of `AND` must offer one of them. An older `/` is read as `OR`.
+/// Each operand of `AND` must offer one of them. An older `/` counts as `OR`.
 fn is_allowed(expression: &str) -> bool {
     let plain = expression.replace(['(', ')'], " ").replace('/', " OR ");
     let one = |licence: &str| {
@@ -35,7 +37,7 @@ fn is_allowed(expression: &str) -> bool {
     plain.split(" AND ").all(|part| part.split(" OR ").any(one))
 }
 
-/// Packages of which the library is permitted to need two versions at once.
+/// Packages that the library may need in two versions.
 ///
 /// embedded-hal 1.0 needs the older defmt, which re-exports the newer defmt.
 const TWICE: [&str; 1] = ["defmt"];
@@ -56,9 +58,9 @@ fn cargo(arguments: &[&str]) -> Result<String, String> {
     }
 }
 
-/// Returns the output of `cargo tree` for the locked packages, with every target and feature.
+/// Returns the output of `cargo tree` for the locked packages, all targets and all features.
 ///
-/// `arguments` are further options of `cargo tree`.
+/// `arguments` are more options.
 fn tree(arguments: &[&str]) -> Result<String, String> {
     let common = [
         "tree",
@@ -85,7 +87,7 @@ fn licences() -> Result<Vec<String>, String> {
 
 /// Returns an error message for each package that the library needs in several versions.
 ///
-/// Packages in [`TWICE`], and packages that only tests or the build need, are not counted.
+/// Packages in [`TWICE`] and packages for tests or the build only are not counted.
 fn twice() -> Result<Vec<String>, String> {
     let text = tree(&[
         "--package=uav-relay",
@@ -121,7 +123,7 @@ fn links(page: &str) -> impl Iterator<Item = &str> {
     targets.filter(|target| !target.is_empty() && !target.contains("://"))
 }
 
-/// Returns an error message for each link of the README to a file that the packaged crate lacks.
+/// Returns an error message for each link of the README to a file that is not packaged.
 fn broken_links() -> Result<Vec<String>, String> {
     let list = cargo(&[
         "package",

@@ -1,4 +1,4 @@
-//! Block with sites: the autopilot gets targets, once its pilot engages it.
+//! Block with Tx and Rx positions: the autopilot gets targets once its pilot engages the relay.
 
 use relay_app::drone::Refused;
 use uav_relay::flight::course::CourseError;
@@ -14,9 +14,10 @@ fn apart(a: Placement, b: Placement) -> f32 {
     apart.map(|part| part * part).iter().sum::<f32>().sqrt()
 }
 
-/// Checks the targets that the autopilot receives. On the ground it receives none, and while the pilot flies, it
-/// receives the drone's present position. Once the pilot chooses OFFBOARD, the drone flies to its relay's position
-/// within the speed limit.
+/// Checks the targets that the autopilot receives.
+///
+/// On the ground there are none. While the pilot flies, they are the drone's position. Once the pilot chooses
+/// OFFBOARD, the drone flies to its relay's position within the speed limit.
 #[test]
 fn a_drone_with_sites_is_flown_to_its_place_and_released() {
     let start = Placement::on_line(100.0, 20.0);

@@ -1,4 +1,6 @@
-//! Test bench: a drone with the application as relay 1. It is wired to relay 2 of 2, or by radio with relays 2 and 3 of 3.
+//! Test bench: a drone with the application as relay 1.
+//!
+//! It is wired to relay 2 of 2, or has a radio channel with relays 2 and 3 of 3.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -29,13 +31,13 @@ use crate::vehicle::Vehicle;
 
 pub(crate) const KEY: [u8; 32] = [7; 32];
 
-/// Lock by which the tests take turns, because they share the mock clock.
+/// Lock that lets one test run at a time, because all share the mock clock.
 static CLOCK: Mutex<()> = Mutex::new(());
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pipe {
     bytes: Rc<RefCell<VecDeque<u8>>>,
-    /// Simulated time for which each poll of a hanging UART writer lasts, ms; 0 while the writer works.
+    /// Simulated duration of each poll of a hanging UART writer, ms; 0 while the writer works.
     stall_ms: Rc<Cell<u64>>,
 }
 
@@ -44,7 +46,7 @@ impl ErrorType for Pipe {
 }
 
 impl Read for Pipe {
-    /// Reads the available bytes, or waits for bytes. No waker is needed, because the test bench polls every millisecond.
+    /// Reads the available bytes, or waits. No waker is needed, because the test bench polls every millisecond.
     async fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.take(into) {
             0 => Poll::Pending,
@@ -55,7 +57,7 @@ impl Read for Pipe {
 }
 
 impl Write for Pipe {
-    /// Writes all bytes; never completes if the simulated writer hangs. No waker is needed, because the test bench polls every millisecond.
+    /// Writes all bytes; never completes while the simulated writer hangs.
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         poll_fn(|_| match self.stall_ms.get() {
             0 => Poll::Ready(()),
@@ -75,7 +77,7 @@ impl Write for Pipe {
 }
 
 impl Pipe {
-    /// Moves received bytes to `into`, as many as are available and fit; returns their number.
+    /// Moves received bytes to `into`, as many as fit; returns their number.
     pub(crate) fn take(&self, into: &mut [u8]) -> usize {
         let mut bytes = self.bytes.borrow_mut();
         let count = bytes.len().min(into.len());
@@ -108,7 +110,7 @@ pub(crate) struct Bench {
     wiring: Wiring,
     others: Vec<Relay>,
     pub(crate) events: Vec<Event>,
-    /// Bytes in transit: [0] from the drone to the other relays, [1] from the other relays to the drone.
+    /// Bytes in transit: first from the drone to the other relays, second to the drone.
     wire: [Pipe; 2],
     drone: Option<Running>,
     vehicle: Option<Vehicle>,
@@ -175,12 +177,12 @@ pub(crate) fn block_of_three() -> Block {
     write(&config(3, 1, None), &numbers(), Some(secret), None)
 }
 
-/// Returns the configuration block of a chain's only relay, between these Tx and Rx positions.
+/// Returns the configuration block of a chain's only relay, with these Tx and Rx positions.
 pub(crate) fn block_alone(sites: Sites) -> Block {
     write(&config(1, 1, Some(sites)), &numbers(), None, None)
 }
 
-/// Returns the position that the only relay of a chain chooses between these Tx and Rx positions.
+/// Returns the position that the only relay of a chain chooses, with these Tx and Rx positions.
 pub(crate) fn alone(sites: Sites) -> Placement {
     let parsed = config(1, 1, Some(sites));
     let now = Instant::ZERO;
@@ -192,7 +194,7 @@ pub(crate) fn alone(sites: Sites) -> Placement {
     relay.setpoint().unwrap()
 }
 
-/// Positions of transmitter and receiver for the tests. They are 1343.795 m apart, as the test mission requires.
+/// Tx and Rx positions for the tests, 1343.795 m apart as in the test mission.
 pub(crate) const SITES: Sites = Sites {
     ends: [
         [474_000_000, 85_400_000, 420_000],
@@ -242,12 +244,12 @@ fn running(board: Board<Ram>, rx: Pipe, tx: Pipe, autopilot: Option<(Pipe, Pipe)
 }
 
 impl Bench {
-    /// Creates a test bench whose drone has relay 2 as its only neighbour, by wire. Relay 2 has just started.
+    /// Creates a test bench whose drone is wired to relay 2. Relay 2 has just started.
     pub(crate) fn new() -> Self {
         Self::wired(Wiring::Pair, 2)
     }
 
-    /// Creates a test bench whose drone shares a radio channel with relays 2 and 3. These have just started.
+    /// Creates a test bench whose drone shares a radio channel with relays 2 and 3. They have just started.
     pub(crate) fn radio() -> Self {
         Self::wired(Wiring::Shared, 3)
     }
@@ -278,7 +280,7 @@ impl Bench {
         }
     }
 
-    /// Starts the drone again with `board`. Bytes on the wires are lost.
+    /// Restarts the drone with `board`. Bytes on the wires are lost.
     pub(crate) fn boot(&mut self, board: Board<Ram>) {
         for wire in &self.wire {
             wire.bytes.borrow_mut().clear();
@@ -313,13 +315,12 @@ impl Bench {
         self.drone = None;
     }
 
-    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. With 0 it works
-    /// again.
+    /// Lets the drone's UART hang: each poll of its driver takes `millis` ms and sends nothing. 0 ends this.
     pub(crate) fn stall_uart(&mut self, millis: u64) {
         self.wire[0].stall_ms.set(millis);
     }
 
-    /// Simulates `millis` ms; returns the events that relay 2, the drone's neighbour, reported meanwhile.
+    /// Simulates `millis` ms; returns the events of relay 2, the drone's neighbour.
     pub(crate) fn run(&mut self, millis: u32) -> Vec<Event> {
         self.events.clear();
         let mut cx = Context::from_waker(Waker::noop());

@@ -14,8 +14,7 @@ mod vehicle;
 mod votes;
 mod watchdog;
 
-/// Logger that discards all lines. With this logger the firmware formats each line, so a panic in a log line makes a
-/// test fail.
+/// Logger that discards all lines, but formats them, so that a panic in a log line makes a test fail.
 #[defmt::global_logger]
 struct Logger;
 

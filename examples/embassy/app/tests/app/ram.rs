@@ -19,7 +19,7 @@ impl Ram {
         Self(Rc::new(RefCell::new(vec![0xFF; 16 * UNIT as usize])))
     }
 
-    /// Writes the configuration block to this flash, into the first erase unit. Returns a board with the flash.
+    /// Writes the configuration block into the first erase unit. Returns a board with this flash.
     pub(crate) fn board(&self, block: &Block, seed: u32) -> Board<Self> {
         self.0.borrow_mut()[..block.len()].copy_from_slice(block);
         Board::new(seed, self.storage())

@@ -10,7 +10,7 @@ use crate::bench::{Pipe, SITES};
 const STEP_M: f32 = 0.008;
 
 pub(crate) struct Vehicle {
-    /// Serial bytes in transit: from the autopilot to the relay, and from the relay to the autopilot.
+    /// Bytes in transit: first from the autopilot to the relay, second to the autopilot.
     uart: [Pipe; 2],
     axis: Axis,
     millis: u32,
@@ -19,11 +19,11 @@ pub(crate) struct Vehicle {
     pub(crate) place: Placement,
     /// True if the drone is armed and in the air.
     pub(crate) flies: bool,
-    /// True in PX4's OFFBOARD mode, in which the relay controls the drone; otherwise the pilot does.
+    /// True in PX4's mode OFFBOARD, in which the relay controls the drone; otherwise the pilot does.
     pub(crate) granted: bool,
     /// Text messages for the operator that the autopilot has received from the relay.
     pub(crate) texts: Vec<String>,
-    /// Target positions that the autopilot has received since a test last cleared them.
+    /// Targets that the autopilot has received; tests may clear them.
     pub(crate) targets: Vec<Placement>,
 }
 
@@ -120,7 +120,7 @@ impl Vehicle {
                 self.texts.push(String::from_utf8(text.to_vec()).unwrap());
             }
             if frame[7..HEADER] == id::TIMESYNC.to_le_bytes()[..3] {
-                // Answers with the request's time stamp, and a time of its own.
+                // Echoes the request's timestamp, and adds a time of its own.
                 let mut answer = vec![0; 16];
                 answer[0] = 1;
                 let asked = &frame[HEADER + 8..end - CHECKSUM];

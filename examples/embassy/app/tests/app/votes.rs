@@ -14,14 +14,18 @@ fn newest(flash: &Ram) -> Option<ViewRecord> {
     log.newest::<WORDS>().and_then(|kept| unpack_record(&kept))
 }
 
-/// Returns the number of the view (agreed set of members) for which the relay has promised its vote. `record` stores
-/// this number in 4 bytes, from offset 10 of `ViewRecord::to_bytes`.
+/// Returns the number of the view (agreed set of members) for which the relay has promised its vote.
+///
+/// `ViewRecord::to_bytes` has it in 4 bytes from offset 10.
 fn promised(record: &ViewRecord) -> u32 {
     u32::from_le_bytes(record.to_bytes()[10..14].try_into().unwrap())
 }
 
-/// Checks that a relay which is restarted three times never votes for an older view. The view number in its stored
-/// votes must never fall. The other two relays fly on and readmit the relay.
+/// Checks that a relay restarted three times never votes for an older view.
+///
+/// The promised view number must never fall.
+///
+/// The other two relays fly on and readmit it.
 #[test]
 fn no_promise_is_forgotten_over_reboots() {
     let flash = Ram::blank();

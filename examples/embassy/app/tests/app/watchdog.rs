@@ -20,10 +20,10 @@ fn a_loop_that_hangs_stops_feeding_the_watchdog() {
     for pair in fed.windows(2) {
         assert_eq!(pair[1].since(pair[0]), Duration::from_millis(500));
     }
-    // A turn hangs for longer than the watchdog's timeout.
+    // The relay's task hangs for longer than the watchdog's timeout.
     bench.hang(12_000);
     assert!(FED.with_borrow(Vec::is_empty));
-    // The watchdog restarts the chip; the relay rejoins before its neighbour has lost it.
+    // The watchdog restarts the chip, and the relay rejoins before its neighbour counts it as lost.
     let board = Ram::blank().board(&block(Some(2), None), 2);
     bench.boot(board.reset_by(Reset::Watchdog));
     let events = bench.run(30_000);
@@ -32,8 +32,9 @@ fn a_loop_that_hangs_stops_feeding_the_watchdog() {
     assert!(FED.with_borrow(Vec::len) >= 60);
 }
 
-/// Checks that the watchdog is not fed if the relay's task hangs for 12 s each time it runs. The executor still polls
-/// the future that feeds the watchdog, but the relay's timers are late.
+/// Checks that the watchdog is not fed if the relay's task hangs for 12 s each time it runs.
+///
+/// The executor still polls the future that feeds the watchdog, but the relay's timers are late.
 #[test]
 fn late_timers_stop_feeding_the_watchdog() {
     let mut bench = Bench::new();
@@ -48,7 +49,7 @@ fn late_timers_stop_feeding_the_watchdog() {
     FED.with_borrow_mut(Vec::clear);
     bench.run(100);
     assert!(FED.with_borrow(Vec::is_empty));
-    // A task that recovers feeds it again.
+    // A task that recovers feeds the watchdog again.
     bench.stall_uart(0);
     bench.run(10_000);
     assert!(FED.with_borrow(Vec::len) >= 18);

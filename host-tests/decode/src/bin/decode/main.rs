@@ -43,7 +43,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     let (name, input) = open(options.file.as_deref())?;
     match source::read(input, |item| printer.take(item)) {
         Ok(()) => Ok(()),
-        // A reader that closes the pipe, such as `head`, is not an error.
+        // The reader has closed the pipe, as `head` does: no error.
         Err(SourceError::Taken(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(SourceError::Taken(error)) => {
             let line = format!("standard output: cannot be written: {error}");
@@ -58,8 +58,7 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// Returns the signing key that a simulation has written at the end of the capture's comment. `None` if there is no
-/// key.
+/// Returns the signing key at the end of the capture's comment, where a simulation writes it, if any.
 fn of_comment(comment: &str) -> Option<[u8; 32]> {
     let (_, digits) = comment.rsplit_once(", key ")?;
     key::parse(digits).ok()
@@ -93,7 +92,7 @@ impl<W: Write> Printer<'_, W> {
     fn take(&mut self, item: Item<'_>) -> io::Result<()> {
         match item {
             Item::Comment(comment) => {
-                // A simulation's capture comment contains the key.
+                // A simulation writes the key into the capture's comment.
                 if let Some(key) = of_comment(comment)
                     && !self.tags.has_key()
                 {

@@ -2,8 +2,8 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
-/// Prints the frames of a capture or of a byte stream field by field. A frame is printed as soon as it is complete, a rejected one
-/// with the reason.
+/// Prints the frames of a capture or of a byte stream field by field. A frame is printed as soon as it is complete; a
+/// rejected frame is printed with the reason.
 #[derive(Parser, Debug)]
 #[command(
     name = "decode",
@@ -17,7 +17,8 @@ pub(crate) struct Options {
     /// Print one JSON object per frame and line. Numbers are as on the wire
     #[arg(long)]
     pub(crate) json: bool,
-    /// File with the network key, 64 hexadecimal digits. Tags of two nodes are checked once their handshake was captured
+    /// File with the network key, 64 hexadecimal digits. Tags of two nodes are checked once their handshake was
+    /// captured
     #[arg(long, value_name = "FILE")]
     pub(crate) key: Option<PathBuf>,
     /// Write the dissector for Wireshark to this file instead, or with `-` to standard output

@@ -1,7 +1,8 @@
-//! Runs all checks; `cargo ci`. The last lines name the failed ones, with their output.
+//! Runs all checks: `cargo ci`. The last lines name the failed ones, with their output.
 //!
-//! The steps run in three lanes. Steps that share a target folder run one after the other. Those with a folder of their own run
-//! beside them, one after the other, at low priority. Tests that mostly wait for the wall clock run beside both.
+//! The steps run in three sequences (lanes) at the same time. Steps with the same target folder are in the main lane.
+//! Steps with a folder of their own are in a second lane, at low priority. Tests that mostly wait for the wall clock
+//! are in a third.
 
 mod prepare;
 mod steps;
@@ -80,25 +81,26 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs the numbered steps of `lane` in sequence, beside the main lane. A lane is a sequence of steps. Returns the
-/// failures.
+/// Runs the numbered steps of `lane` one after the other; returns the failures.
 ///
-/// The output of a step is printed in one piece at its end, so that it does not mix with other steps' output. `all`
-/// is the number of all steps, for the headings.
+/// The main lane runs at the same time.
+///
+/// The output of a step is printed at its end, so that it does not mix with others. `all` is the number of all steps,
+/// for the headings.
 fn run_in_one_piece(lane: Vec<(usize, &Step)>, all: usize) -> Vec<(&str, Evidence)> {
     let run = |(number, step)| {
         let mut output = Vec::new();
         let failure = run(number, all, step, &mut output);
-        // In one piece, so that these lines do not mix with those of the other steps.
+        // At once, so that these lines do not mix with those of other steps.
         _ = stdout().write_all(&output);
         failure
     };
     lane.into_iter().filter_map(run).collect()
 }
 
-/// Runs step `number` of `all` and writes its output and result to `out`.
+/// Runs step `number` of `all`, and writes its output and result to `out`.
 ///
-/// Returns `None` if it passed, otherwise its name and the relevant lines of its output.
+/// Returns `None` if it passed, otherwise its name and the relevant output.
 fn run<'a>(
     number: usize,
     all: usize,
@@ -119,18 +121,18 @@ fn run<'a>(
     failure.map(|evidence| (&**name, evidence))
 }
 
-/// Number of last output lines that are repeated at the end for a failed step without tests.
+/// Number of last output lines repeated at the end for a failed step without tests.
 const LAST_LINES: usize = 20;
 
-/// Largest number of lines repeated from each list of failures: panics, or names of failed tests.
+/// Maximum number of lines repeated from a list of failures: panics, or names of failed tests.
 const LINES_OF_FAILURES: usize = 100;
 
-/// Relevant part of a failed step's output: the `failures:` of each test binary, or the last lines.
+/// Relevant output of a failed step: the `failures:` of each test binary, or the last lines.
 #[derive(Default)]
 pub(crate) struct Evidence {
     failures: Vec<String>,
     last: VecDeque<String>,
-    /// Number of further lines to keep of the failure list that is being read; `None` outside a list.
+    /// Number of lines still to keep of the present list of failures; `None` outside a list.
     remaining: Option<usize>,
 }
 
@@ -147,7 +149,7 @@ impl Evidence {
     }
 
     pub(crate) fn add(&mut self, line: &str) {
-        // The heading appears twice: before the panics, and before the names.
+        // This heading is before the panics, and again before the names.
         if line == "failures:" {
             self.remaining = Some(LINES_OF_FAILURES);
         }

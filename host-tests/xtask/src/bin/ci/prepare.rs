@@ -8,12 +8,12 @@ use super::steps::{CARGO_FUZZ, NIGHTLY, OLDEST, TARGET, TARGET_V8M};
 
 /// Debian packages that the steps need, each with a program of the same name.
 ///
-/// They are the emulator that runs the firmware, Wireshark's command line, which reads captures, and a browser.
+/// They are the emulator for the firmware, Wireshark's command line for captures, and a browser.
 const OF_DEBIAN: [&str; 3] = ["qemu-system-arm", "tshark", "chromium"];
 
 /// Component or target of the Rust toolchain that the steps need.
 ///
-/// It has a name, a command that succeeds if it is installed, and the rustup arguments that add it.
+/// Name, command that succeeds if it is installed, and rustup arguments that add it.
 type Needed = (
     &'static str,
     &'static [&'static str],
@@ -77,13 +77,13 @@ const FOR_THE_REST: [Needed; 5] = [
     ),
 ];
 
-/// Version of cargo-fuzz that is installed if it is missing.
+/// Version of cargo-fuzz to install.
 const CARGO_FUZZ_VERSION: &str = "0.13.2";
 
-/// Installs the missing tools: the tools of the quick steps if `quick` is true, otherwise all tools.
+/// Installs the missing tools, only those of the quick steps if `quick` is true.
 ///
 /// # Errors
-/// The command to type, for a tool that cannot be installed.
+/// The command to type for a tool that cannot be installed.
 pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     add(&TO_EDIT)?;
     if quick {
@@ -94,7 +94,7 @@ pub(crate) fn prepare(quick: bool) -> Result<(), String> {
     OF_DEBIAN.into_iter().try_for_each(prepare_program)
 }
 
-/// Installs cargo-fuzz in the target folder if it is missing there. Only this project uses that copy.
+/// Installs cargo-fuzz in the target folder, for this project only, if it is missing there.
 fn prepare_fuzzer() -> Result<(), String> {
     if succeeds(CARGO_FUZZ, &["fuzz", "--version"]) {
         return Ok(());
@@ -145,10 +145,10 @@ fn add(needed: &[Needed]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs the Debian package of `program` if it is missing. The installation needs root rights.
+/// Installs the Debian package of `program` if it is missing. This needs root rights.
 ///
 /// # Errors
-/// The command to type, for a user without root rights.
+/// The command to type without root rights.
 fn prepare_program(program: &str) -> Result<(), String> {
     if succeeds(program, &["--version"]) {
         return Ok(());
@@ -174,8 +174,7 @@ fn prepare_program(program: &str) -> Result<(), String> {
 
 /// Returns true if the libraries of a compilation target are installed.
 ///
-/// `arguments` make rustc print their folder. rustc prints the path even if it does not exist, so the folder is
-/// looked for.
+/// With `arguments` rustc prints their folder, even if it does not exist.
 fn target_is_there(arguments: &[&str]) -> bool {
     let output = Command::new("rustc").args(arguments).output();
     output.is_ok_and(|output| {

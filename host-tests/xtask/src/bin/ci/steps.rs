@@ -10,15 +10,13 @@ use super::Evidence;
 /// Target triple of the STM32F4 firmware: Arm Cortex-M4F.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Target triple of the one Embassy board that is not an STM32, the Pico 2: Arm Cortex-M33.
+/// Target triple of the Pico 2: Arm Cortex-M33.
 pub(crate) const TARGET_V8M: &str = "thumbv8m.main-none-eabihf";
 
-/// Version of the oldest supported Rust compiler: `rust-version` in Cargo.toml.
+/// Oldest supported Rust version: `rust-version` in Cargo.toml.
 pub(crate) const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 
-/// Feature sets with which the library's tests and a simulated flight are run.
-///
-/// All other tests use the full set.
+/// Feature sets for the library's tests and a simulated flight. All other tests use all features.
 const SETS: [&str; 9] = [
     "",
     "guard",
@@ -31,7 +29,7 @@ const SETS: [&str; 9] = [
     "telemetry",
 ];
 
-/// Integration tests of the quick check. They take seconds, and touch each area of the project.
+/// Integration tests of the quick check: seconds each, for every area of the project.
 const QUICK_TESTS: [&str; 10] = [
     "asynch",
     "exact",
@@ -53,32 +51,30 @@ pub(crate) struct Step {
     pub(crate) lane: Lane,
 }
 
-/// Lane in which a step runs. A lane is a sequence of steps; the lanes run beside each other.
+/// Sequence of steps. The lanes run at the same time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Lane {
-    /// The step runs after the previous step of the main lane.
+    /// Main lane, one step after the other.
     Main,
-    /// The step starts after the previous step of the main lane.
+    /// Starts after the previous step of the main lane, which then goes on at once.
     ///
-    /// The main lane does not wait for the end of this step, because the step mostly waits for the wall clock.
+    /// The step mostly waits for the wall clock.
     Waiting,
-    /// The step runs at low priority, beside the steps of the other lanes. It starts when the previous `Background`
-    /// step has ended, and builds into a target folder of its own.
+    /// Low priority, after the previous `Background` step, with a target folder of its own.
     Background,
 }
 
 /// Nightly compiler for the fuzzer and for Miri.
 ///
-/// Its date is fixed, so that the checks of a commit always have the same result.
+/// Its date is fixed, so that a commit always has the same result.
 pub(crate) const NIGHTLY: &str = "nightly-2026-10-30";
 
-/// Path of the cargo-fuzz program that [`super::prepare`] installs.
+/// Path of cargo-fuzz, which [`super::prepare`] installs.
 pub(crate) const CARGO_FUZZ: &str = "target/tools/bin/cargo-fuzz";
 
-/// Number of inputs that are run for each fuzz target.
+/// Number of inputs per fuzz target.
 ///
-/// With a fixed seed the inputs are the same in each run, so that the run finds regressions. A long run finds new
-/// faults.
+/// The seed is fixed, so this finds regressions; only a long run finds new faults.
 const EXECUTIONS: u32 = 10_000;
 
 fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
@@ -90,9 +86,9 @@ fn step(name: impl Into<String>, command: impl Into<String>) -> Step {
     }
 }
 
-/// Returns `steps` marked to run in the background lane: beside the others, at low priority.
+/// Returns `steps` for the background lane: at the same time as others, at low priority.
 ///
-/// They use idle time: many tests of the other steps wait for the wall clock.
+/// They use idle time: many tests wait for the wall clock.
 fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
     let moved = |step| Step {
         lane: Lane::Background,
@@ -102,12 +98,12 @@ fn in_background(steps: Vec<Step>) -> impl Iterator<Item = Step> {
 }
 
 impl Step {
-    /// Runs the command of the step and copies its standard output to `out`.
+    /// Runs the step's command, and copies its standard output to `out`.
     ///
-    /// The error output goes to `out` too for a step beside the main lane, otherwise to this program's error output.
+    /// The error output goes to `out` beside the main lane, otherwise to this program's error output.
     ///
     /// # Errors
-    /// The relevant lines of the output, if the command fails.
+    /// The relevant output, if the command fails.
     pub(crate) fn run(&self, out: &mut impl Write) -> Result<(), Evidence> {
         let mut evidence = Evidence::default();
         let passed = self.start().and_then(|(mut child, output)| {
@@ -124,7 +120,7 @@ impl Step {
         }
     }
 
-    /// Starts the command of the step. Returns its process, and the pipe from which its output is read.
+    /// Starts the step's command. Returns its process, and the pipe with its output.
     fn start(&self) -> Result<(Child, PipeReader), Error> {
         let (reader, writer) = pipe()?;
         let priority = if self.lane == Lane::Background {
@@ -212,12 +208,12 @@ pub(crate) fn all() -> Vec<Step> {
     steps
 }
 
-/// Name of the integration test whose processes mostly wait for the wall clock.
+/// Integration test that mostly waits for the wall clock.
 const WAITING_TEST: &str = "companion";
 
-/// Number of test functions of [`WAITING_TEST`] that run at a time.
+/// Number of tests of [`WAITING_TEST`] that run at a time.
 ///
-/// It may exceed the number of cores, because each of the test functions uses a few per cent of a core.
+/// It may exceed the number of cores: each test uses a few per cent of a core.
 const WAITING_TESTS: &str = "6";
 
 /// Returns the steps that run all tests of the workspace.
@@ -295,7 +291,7 @@ fn clippy() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that check, test and build the Embassy examples, a separate workspace.
+/// Returns the steps for the Embassy examples, a separate workspace.
 ///
 /// They build the examples for each chip, and test the application on the host.
 fn embassy() -> Vec<Step> {
@@ -337,10 +333,8 @@ fn embassy() -> Vec<Step> {
 
 /// Returns the step that tests the library and a simulated chain with the features in `set` only.
 ///
-/// `set` is a list of features with commas between them.
-///
-/// The exhaustive model of views depends on no feature and takes most of the time of the library's tests. It runs with no feature and
-/// with all features.
+/// `set` is a list with commas. The exhaustive model of views depends on no feature, and takes most of the time of
+/// the library's tests. So it runs without features and with all features only.
 fn with_features(set: &str) -> Step {
     let features: Vec<String> = set
         .split_terminator(',')
@@ -383,13 +377,13 @@ fn firmware() -> Vec<Step> {
     ]
 }
 
-/// Returns the steps that need the nightly compiler: all fuzz targets, and the fuzz corpora with Miri.
+/// Returns the steps for the nightly compiler: fuzz targets, and their corpora with Miri.
 ///
-/// Each fuzz target starts from its stored inputs, the corpus.
+/// Each fuzz target starts from its corpus, the stored inputs.
 fn nightly() -> Vec<Step> {
     let mut steps = Vec::new();
     for target in FUZZ_TARGETS {
-        // Findings go to a folder that is not part of the corpus; libFuzzer fails if the folder does not exist.
+        // Findings are not added to the corpus. libFuzzer fails without this folder.
         let found = format!("target/fuzz/{target}");
         _ = std::fs::create_dir_all(&found);
         let fuzz = format!(
@@ -401,8 +395,8 @@ fn nightly() -> Vec<Step> {
         );
         steps.push(step(format!("fuzz smoke, {target}"), command));
     }
-    // Miri runs with the pointer width of the target: on x86 libm computes square roots in assembly, which Miri does not support.
-    // With isolation Miri could not read the corpora.
+    // Miri has the target's pointer width: on x86 libm computes square roots in assembly, which Miri does not
+    // support. With isolation it could not read the corpora.
     steps.push(Step {
         environment: &[("MIRIFLAGS", "-Zmiri-disable-isolation")],
         ..step(

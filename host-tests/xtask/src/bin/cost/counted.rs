@@ -1,4 +1,4 @@
-//! Figures that the counting image reports, and their table rows.
+//! Figures of the image that counts instructions, and their table rows.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -45,7 +45,7 @@ pub(crate) fn of_the_counting_image() -> Result<Vec<Row>, String> {
     ));
     rows.extend(table(&counted, SIGNED)?);
     rows.extend(table(&counted, UPLOADED)?);
-    // A separate image: more code would change the compiler's choices everywhere.
+    // A separate image, because more code would change how the rest is compiled.
     let runners = count(&build("cost", &["--features", "async,internals"])?)?;
     rows.extend(table(&runners, RUNNERS)?);
     rows.extend(table(&runners, FLOWN)?);
@@ -110,7 +110,7 @@ const SIGNED: &[Counted] = &[
     ),
 ];
 
-/// Rows of the cost table for the runners: functions that move bytes between ports and a relay.
+/// Table rows for the runners, which move bytes between ports and a relay.
 const RUNNERS: &[Counted] = &[
     (
         "a sweep message of 16 targets on polled ports, from bytes to bytes",
@@ -145,7 +145,7 @@ const RUNNERS: &[Counted] = &[
     ),
 ];
 
-/// Rows of the cost table for the upload of a new mission in flight.
+/// Table rows for the upload of a new mission in flight.
 const UPLOADED: &[Counted] = &[
     (
         "an offer of a new mission, accepted",
@@ -156,9 +156,7 @@ const UPLOADED: &[Counted] = &[
     ("length of its frame", "bytes", &["offer_bytes"], Some(149)),
 ];
 
-/// Row of the cost table: description, unit, names of measured figures, and budget.
-///
-/// The row shows the largest of the figures.
+/// Table row: description, unit, names of measured figures, and budget. It shows the largest figure.
 pub(crate) type Counted = (
     &'static str,
     &'static str,
@@ -416,9 +414,9 @@ const COUNTED: &[Counted] = &[
     ),
 ];
 
-/// Rows of the cost table for conversions between latitude, longitude and positions on the line Tx-Rx.
+/// Table rows for conversions between latitude, longitude and positions on the line Tx-Rx.
 ///
-/// They are measured in the image that also measures the runners.
+/// The image of the runners measures them.
 const FLOWN: &[Counted] = &[
     (
         "conversion set-up for the line between two sites",
@@ -440,9 +438,7 @@ const FLOWN: &[Counted] = &[
     ),
 ];
 
-/// Names of the measured figures that are single calls of a relay's functions.
-///
-/// The largest of them has a budget.
+/// Names of figures that are single calls of a relay's functions. The largest has a budget.
 const CALLS: &[&str] = &[
     "begin_sweep",
     "sweep",
@@ -469,7 +465,7 @@ const CALLS: &[&str] = &[
     "estimate",
 ];
 
-/// Runs the image `elf`, which counts instructions, in QEMU and returns its figures by name.
+/// Runs the image `elf` in QEMU; returns its instruction counts by name.
 pub(crate) fn count(elf: &Path) -> Result<BTreeMap<String, u64>, String> {
     let arguments = [
         "300",

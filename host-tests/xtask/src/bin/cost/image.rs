@@ -1,4 +1,4 @@
-//! Figures of the relay image: sizes, largest stack, and the proof that no panic is reachable.
+//! Figures of the relay image: sizes and largest stack; and the proof that it cannot panic.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -13,10 +13,10 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 
 const RELAY: &str = "stm32f405";
 
-/// Name of the firmware image with one port, which leads to a shared radio.
+/// Firmware image with one port, to a shared radio.
 const RADIO: &str = "stm32f405_radio";
 
-/// Name of the firmware image that uses asynchronous ports.
+/// Firmware image with asynchronous ports.
 const ASYNC: &str = "stm32f405_async";
 
 const ASYNC_FEATURES: &[&str] = &["--no-default-features", "--features", "async"];
@@ -47,10 +47,10 @@ type Image = (
     [u64; 3],
 );
 
-/// Firmware images whose costs are measured, with the largest permitted flash, static RAM and stack.
+/// Measured firmware images, with the maximum of flash, static RAM and stack.
 ///
-/// Relay and ground station share some code. This sharing costs an image with `auth` 0.4 KB of flash, and saves it 0.8
-/// KB of stack.
+/// Relay and ground station share some code, which costs an image with `auth` 0.4 KB of flash, and saves 0.8 KB of
+/// stack.
 const IMAGES: &[Image] = &[
     (
         "flash of the relay image, Algorithm 1 alone",
@@ -103,21 +103,22 @@ const IMAGES: &[Image] = &[
         RELAY,
         &[],
         // Shares of this image, and of others where stated:
-        // - autopilot (f64 geodesy in software, MAVLink, a port, the guard): 26 KiB flash, 2.3 KiB RAM; signed MAVLink: 3 KiB
+        // - autopilot (f64 geodesy in software, MAVLink, a port, the guard): 26 KiB flash, 2.3 KiB RAM; signed MAVLink:
+        //   3 KiB
         // - noise in every method: 3 to 4 KiB of each image
         // - sensing, which solves in f64: 20 KiB and the largest stack; of these 1.4 KiB are settings and measurements
-        // - uploads that move the sites: 3.5 KiB
-        // - failsafes are never undone, lagging and late bytes distrusted, reasons to wait reported: 10 KiB
-        // - halt of a chain out of order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
+        // - uploads that move Tx and Rx: 3.5 KiB
+        // - no undone failsafes, distrust of late bytes, reports of reasons to wait: 10 KiB
+        // - halt of a chain in the wrong order: 2 KiB; claims to a duplicate index: 1 to 2 KiB
         // - clock tree and watchdog: 1 to 2 KiB of every image; cells of the best start: 600 bytes RAM
-        // - no stuck part of a chain, wrong sensors named, clock steps tolerated: 3 KiB of each image, 7 KiB of this one
-        // - losses of four links per side, unflown drones as obstacles, copies of a relay with a key: 1 KiB flash, 300 bytes RAM,
-        //   up to 900
-        //   bytes stack of each image with a guard; the operator's command to clear a lost relay: 1 KiB of those with an
-        //   autopilot
+        // - recovery of stuck parts of a chain, reports of faulty sensors, tolerated clock steps: 3 KiB of each image,
+        //   7 KiB of this one
+        // - losses of four links per side, unflown drones as obstacles, copies of a relay with a key: 1 KiB flash, 300
+        //   bytes RAM, up to 900 bytes stack of each image with a guard; the operator's command to clear a lost relay:
+        //   1 KiB of those with an autopilot
         // - both directions by Algorithms 1, 2 and 4, in sensing and uploads, and longer texts: 7 KiB
         // - both directions by the joint method: 11 KiB flash, 1.6 KiB RAM, 0.5 KiB stack
-        // - exact hops of both directions in a field: 1.5 KiB
+        // - exact hops of both directions with interference along x: 1.5 KiB
         // - fitted slots: 5 KiB flash, 104 bytes RAM
         // - departures, spares, and motions that end together: 6 KiB flash, 280 bytes RAM
         // - endurance: 4 KiB flash of this image, 1 KiB of the others with an autopilot; 180 bytes RAM
@@ -177,7 +178,7 @@ fn cargo(command: &str, example: &str) -> Command {
     cargo
 }
 
-/// Builds a firmware example with the cargo options `more`, and returns the path of its ELF file.
+/// Builds a firmware example with the cargo options `more`; returns the path of its ELF file.
 pub(crate) fn build(example: &str, more: &[&str]) -> Result<PathBuf, String> {
     run(cargo("build", example).args(more))?;
     Ok(PathBuf::from("target")
@@ -205,8 +206,8 @@ pub(crate) fn sizes(elf: &Path) -> Result<(u64, u64), String> {
 
 /// Returns the largest stacks of the main thread and of one interrupt, bytes.
 ///
-/// The thread begins with the function that `Reset` calls; the interrupt includes the frame that the processor saves
-/// with its FPU registers. `pair` is true for two ports to neighbours, `flies` for a port to an autopilot.
+/// The thread begins with the function that `Reset` calls. The interrupt includes the frame saved by the processor
+/// with its FPU registers. `pair` is true for ports to two neighbours, `flies` for a port to an autopilot.
 pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64, u64), String> {
     const EXCEPTION_FRAME: u64 = 104;
     let missing = "llvm-objdump is missing; type: rustup component add llvm-tools";
@@ -237,7 +238,7 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     let (thread, path) = deepest("main")?;
     println!("deepest stack: {thread} bytes by {}", path.join(" > "));
     let mut handler = 0;
-    // A radio needs one port, and without the feature `flight` the autopilot's is not used.
+    // A radio needs one port. Without the feature `flight` the autopilot's port is not used.
     let others = [pair.then_some("USART3"), flies.then_some("USART1")];
     for name in ["USART2", "SysTick"]
         .into_iter()
@@ -248,9 +249,9 @@ pub(crate) fn deepest_stack(elf: &Path, pair: bool, flies: bool) -> Result<(u64,
     Ok((thread, EXCEPTION_FRAME + handler))
 }
 
-/// Proves that no relay image can panic: each links with a handler that calls an undefined function.
+/// Proves that no relay image can panic: each links with a panic handler that cannot be linked.
 ///
-/// The control is an image with a deliberate panic, which must not link.
+/// To test the proof, an image with a deliberate panic must fail to link.
 pub(crate) fn no_panic() -> Result<(), String> {
     only_finished_futures_panic()?;
     let link = |example: &str, features: &[&str], flags: &[&str]| {
@@ -273,10 +274,10 @@ pub(crate) fn no_panic() -> Result<(), String> {
     }
 }
 
-/// Checks that the asynchronous image has no panics except those for polling a completed future.
+/// Checks that the asynchronous image can only panic when a completed future is polled.
 ///
-/// The compiler adds such a panic to each `async fn`, so this image cannot be linked without a panic handler. An
-/// `await` never reaches the panic.
+/// The compiler adds this panic to each `async fn`, so the image cannot link without a panic handler. An `await`
+/// never reaches it.
 fn only_finished_futures_panic() -> Result<(), String> {
     const FINISHED: &str = "panic_const_async_fn_resumed";
     let image = build(ASYNC, ASYNC_FEATURES)?;
@@ -299,7 +300,7 @@ fn only_finished_futures_panic() -> Result<(), String> {
             finished += 1;
         }
     }
-    // Finding none would mean that the search pattern is wrong.
+    // None at all would mean a wrong search pattern.
     if finished == 0 {
         return Err("the asynchronous image has no panic at all: link it with the others".into());
     }

@@ -1,8 +1,10 @@
-//! Compares the firmware's costs with budgets and documents, and proves that it cannot panic. Run by `cargo cost`.
+//! Compares the firmware's costs with budgets and documents; run by `cargo cost`.
 //!
-//! Builds the relay image and the counting image with the firmware profile, reads sizes and the largest stack from the relay's
-//! ELF, runs the counting image in QEMU, and links the relay image with a panic handler that cannot be linked.
-//! `cargo cost --write` writes the measured costs to the documents.
+//! It also proves that the firmware cannot panic.
+//!
+//! It builds the relay image and the image that counts instructions, with the firmware profile. It reads sizes and
+//! the largest stack from the relay's ELF, and runs the counting image in QEMU. It links the relay image with a panic
+//! handler that cannot be linked. `cargo cost --write` writes the measured costs to the documents.
 
 mod counted;
 mod image;
@@ -117,10 +119,10 @@ pub(crate) const fn row(
 const HEAD: &str =
     "| | measured | at 168 MHz, an instruction a cycle | budget |\n| --- | --- | --- | --- |\n";
 
-/// Clock of the STM32F405, MHz: instructions per microsecond, at one instruction a cycle.
+/// Clock of the STM32F405, MHz: instructions per microsecond at one per cycle.
 const CLOCK_MHZ: u64 = 168;
 
-/// Document that states costs: its present text, and the text with the measured costs.
+/// Document with costs: its present text, and its text with the measured costs.
 pub(crate) struct Document {
     name: &'static str,
     path: PathBuf,
@@ -160,7 +162,7 @@ pub(crate) fn table(rows: &[Row]) -> String {
     std::iter::once(HEAD.to_owned()).chain(lines).collect()
 }
 
-/// Formats the time that a number of instructions takes, in ms with three decimals.
+/// Formats the duration of a number of instructions, in ms with three decimals.
 fn milliseconds(instructions: u64) -> String {
     let micros = (instructions + CLOCK_MHZ / 2) / CLOCK_MHZ;
     format!("{}.{:03} ms", micros / 1_000, micros % 1_000)
@@ -185,9 +187,9 @@ pub(crate) fn all(root: &Path, rows: &[Row]) -> Result<[Document; 2], String> {
     Ok([results, readme])
 }
 
-/// Returns true if the costs in the documents are for the installed versions of compiler and emulator.
+/// Returns true if the documented costs are for the installed compiler and emulator.
 ///
-/// The costs depend on both, so costs for other versions are not compared.
+/// The costs depend on both versions, so other ones are not compared.
 pub(crate) fn are_of(root: &Path, rustc: &str, qemu: &str) -> bool {
     let results = std::fs::read_to_string(root.join("examples/RESULTS.md"));
     results.is_ok_and(|text| text.contains(&format!("(rustc {rustc}, QEMU {qemu}, ")))
@@ -210,7 +212,7 @@ fn with(
     })
 }
 
-/// Returns the README's table rows with costs, each as its fixed beginning and its measured text.
+/// Returns the README's table rows with costs: fixed beginning, and measured text.
 fn lines(rows: &[Row]) -> Option<[(&'static str, String); 4]> {
     let image = |what: &str| {
         let at = rows.iter().position(|row| row.what == what)?;

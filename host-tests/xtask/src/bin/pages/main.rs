@@ -1,7 +1,10 @@
-//! Tests the commands in the user documentation. Runs them in a folder like a clean clone and compares their output with the page.
+//! Tests the commands in the user documentation.
 //!
-//! A block of commands is a fence `sh`, `bash` or `console`; in a `console` only lines that begin with `$ ` are commands. A
-//! following block `text` under the same heading is the expected output, and so are the other lines of a `console`.
+//! They run in a folder like a clean clone; their output is compared with the page.
+//!
+//! A block of commands is a fence `sh`, `bash` or `console`. In a `console` only lines that begin with `$ ` are
+//! commands. A following block `text` under the same heading is the expected output, and so are the other lines of a
+//! `console`.
 //!
 //! | word after `sh`, `bash` or `console` | the block |
 //! | --- | --- |
@@ -13,15 +16,15 @@
 //! | `tested` | is run by a test of its own |
 //! | `window` | opens a window |
 //!
-//! A block that needs hardware is not run. The options of this project's commands in it are checked: a program must not refuse
-//! them (status 2).
+//! A block that needs hardware is not run. But the options of this project's commands in it are checked: a program
+//! must not reject them (status 2).
 //!
-//! A command must succeed, unless its comment begins with `exit status N`: then it must end with that status.
+//! A command must succeed, unless its comment begins with `exit status N`: then it must exit with that status.
 //!
-//! Output is compared line by line: every line of the page must occur, in order, with others in between. Trailing spaces are
+//! Every line of the page must occur in the output, in order, with other lines in between. Trailing spaces are
 //! ignored. A line `...` matches any lines. In a block `text noisy` each number matches any number.
 //!
-//! The commands of `.cargo/config.toml` are binaries built beforehand, so no block waits for the compiler.
+//! The commands of `.cargo/config.toml` are built beforehand, so no block waits for the compiler.
 
 mod page;
 
@@ -33,7 +36,7 @@ use clap::Parser;
 
 use page::{Block, Kind};
 
-/// Pages of the documentation whose commands are run, in the order in which a new user reads them.
+/// Pages whose commands are run, in the order for a new user.
 const PAGES: [&str; 15] = [
     "README.md",
     "examples/LINUX.md",
@@ -56,7 +59,7 @@ const PAGES: [&str; 15] = [
 #[derive(Parser)]
 #[command(name = "pages")]
 struct Options {
-    /// Run for pages whose names contain this only
+    /// Run only the pages whose names contain this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
     /// Run only the slow commands of the pages
@@ -82,8 +85,8 @@ fn main() -> ExitCode {
 
 /// Runs the commands of all pages whose name contains `only`; returns the number of faulty blocks.
 ///
-/// A block of commands is faulty if a command fails or its output differs from the page. If `slow`, the blocks marked
-/// as slow are run, otherwise the unmarked ones.
+/// A block is faulty if a command fails or its output differs from the page. With `slow` only blocks marked as slow
+/// are run, otherwise only the others.
 fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     let shell = page::Shell::build(root)?;
     let (mut faults, mut run, mut left_out, mut checked) = (0, 0, 0, 0);
@@ -138,10 +141,10 @@ fn walk(root: &Path, only: &str, slow: bool) -> Result<usize, String> {
     Ok(faults)
 }
 
-/// Names of the programs for Linux, each with its cargo alias in `.cargo/config.toml`.
+/// Programs for Linux, each with its cargo alias in `.cargo/config.toml`.
 const PROGRAMS: [(&str, &str); 2] = [("linux_companion", "companion"), ("linux_ground", "ground")];
 
-/// Cargo aliases of programs that are built beforehand and run without the compiler.
+/// Cargo aliases of programs that are built beforehand.
 const ALIASES: [&str; 7] = [
     "chain",
     "companion",
@@ -152,12 +155,10 @@ const ALIASES: [&str; 7] = [
     "replay",
 ];
 
-/// Exit statuses that show that a program has accepted its options.
-///
-/// It succeeded, found no hardware, or was still running at the time limit.
+/// Exit statuses of a program that has accepted its options: success, no hardware, or the time limit.
 const ACCEPTED: [i32; 3] = [0, 1, TIMEOUT];
 
-/// Exit status of the command `timeout` when its time limit has passed.
+/// Exit status of the command `timeout` after its time limit.
 const TIMEOUT: i32 = 124;
 
 /// Returns the commands of this project in a shell script, each as `cargo ALIAS OPTIONS`.
@@ -168,7 +169,7 @@ pub(crate) fn own_commands(script: &str) -> Vec<String> {
 }
 
 fn own_command(line: &str) -> Option<String> {
-    // The last program of a pipe reads nothing instead.
+    // The last program of a pipe reads nothing.
     let command = line.rsplit(" | ").next()?.trim().trim_end_matches('&');
     let (first, rest) = command.split_once(' ')?;
     if first == "cargo" {
@@ -183,9 +184,7 @@ fn own_command(line: &str) -> Option<String> {
     with_alias(first.rsplit('/').next()?, rest)
 }
 
-/// Adds `--dry-run` to a command that would ask the operator to confirm an upload.
-///
-/// Reason: there is no terminal for the question.
+/// Adds `--dry-run` to a command that would ask for a confirmation, as there is no terminal.
 fn confirmed(command: String) -> String {
     let asks = command.starts_with("cargo ground ") && command.contains(" --version ");
     if asks && !command.contains(" --yes") {
@@ -200,7 +199,7 @@ fn with_alias(program: &str, options: &str) -> Option<String> {
     Some(format!("cargo {alias} {options}"))
 }
 
-/// Checks that a program has accepted its options, by its exit status; `None` after a signal.
+/// Checks by its exit status that a program has accepted its options. `None` is a signal.
 ///
 /// # Errors
 /// The command, its status, and the last line of its output.

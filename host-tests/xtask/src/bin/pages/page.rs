@@ -1,17 +1,17 @@
-//! Parses the code blocks of a page.
+//! Code blocks of a page: parsing, running and comparison.
 
 use std::fmt::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 
-/// Words after the language of a code block that mark its commands as not run.
+/// Words that mark the commands of a block as not run.
 const WHY_NOT: [&str; 6] = ["hardware", "itself", "root", "slow", "tested", "window"];
 
 /// Kind of a code block on a page.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
-    /// Shell commands. `Some` holds the word that marks them as not run.
+    /// Shell commands; with the word that marks them as not run, if any.
     Commands(Option<String>),
     /// Block `text`: the output of the preceding commands, or any other text.
     Text,
@@ -21,14 +21,14 @@ pub(crate) enum Kind {
 /// Fenced code block of a Markdown page.
 #[derive(Clone, Debug)]
 pub(crate) struct Block {
-    /// Line number, from 1, of the fence that opens the block.
+    /// Line number of the opening fence, from 1.
     pub(crate) line: usize,
-    /// Number of headings on the page before this block.
+    /// Number of headings before this block.
     heading: usize,
     pub(crate) kind: Kind,
-    /// True for a block `console`: lines that begin with `$ ` are commands, the others are output.
+    /// True for a block `console`: lines with `$ ` are commands, the others are output.
     is_console: bool,
-    /// True if numbers in the output, such as times, are permitted to differ from those on the page.
+    /// True if numbers in the output may differ from the page.
     pub(crate) noisy: bool,
     lines: Vec<String>,
 }
@@ -49,7 +49,7 @@ impl Block {
         commands.join("\n")
     }
 
-    /// Returns the expected lines of output in a code block of a page, without the lines of commands.
+    /// Returns the expected output lines of a block, without commands.
     pub(crate) fn printed(&self) -> Vec<&str> {
         let lines = self.lines.iter().map(String::as_str);
         match self.kind {
@@ -58,15 +58,13 @@ impl Block {
         }
     }
 
-    /// Returns true if this block is the expected output of `commands`, the block of commands before it.
+    /// Returns true if this block is the expected output of the preceding block `commands`.
     pub(crate) fn prints(&self, commands: &Self) -> bool {
         self.kind == Kind::Text && self.heading == commands.heading
     }
 }
 
-/// Returns a command and the exit status that its comment expects; `None` without such a comment.
-///
-/// The comment begins with `# exit status N`.
+/// Returns a command and its expected exit status, from a comment `# exit status N`, if any.
 fn status(line: &str) -> Option<(&str, u8)> {
     let (command, comment) = line.split_once(" # exit status ")?;
     let digits = comment.split(|sign: char| !sign.is_ascii_digit()).next()?;
@@ -125,7 +123,7 @@ fn block(line: usize, heading: usize, info: &str) -> Result<Block, String> {
     })
 }
 
-/// Packages of this workspace whose programs the pages use.
+/// Packages with programs that the pages use.
 const PACKAGES: [&str; 5] = [
     "uav-relay-sim",
     "uav-relay-tools",
@@ -134,19 +132,19 @@ const PACKAGES: [&str; 5] = [
     "uav-relay-replay",
 ];
 
-/// Time limit for the commands of one block, s. Blocks marked as slow have a limit of their own.
+/// Time limit of one block, s. Slow blocks have another limit.
 const LIMIT_S: u32 = 60;
 const SLOW_S: u32 = 1_800;
 
-/// Time limit for a command whose hardware is missing, s. It is enough to check the options.
+/// Time limit of a command without its hardware, s: enough to check the options.
 const BEGUN_S: u32 = 2;
 
-/// Names of key files that the pages use. The user is expected to have made them.
+/// Key files that the pages use; the user is expected to have made them.
 const KEYS: [&str; 2] = ["network.key", "network7.key"];
 
 const NOT_CLONED: [&str; 2] = ["target", ".git"];
 
-/// Shell in which the blocks of a page are run: its folder, and the script that precedes each block.
+/// Shell for the blocks of a page: folder, and script before each block.
 #[derive(Debug)]
 pub(crate) struct Shell {
     folder: PathBuf,
@@ -183,7 +181,7 @@ impl Shell {
         })
     }
 
-    /// Empties the shell's folder and fills it like a new clone of the project, for the next page.
+    /// Fills the shell's folder like a new clone of the project, for the next page.
     pub(crate) fn clean(&self) -> Result<(), String> {
         let failed = |error: std::io::Error| format!("{}: {error}", self.folder.display());
         // The folder may not exist.
@@ -206,9 +204,9 @@ impl Shell {
             .map_err(failed)
     }
 
-    /// Runs a script until its first command that fails, and returns its output.
+    /// Runs a script until its first failing command; returns its output.
     ///
-    /// If `slow`, the time limit is longer.
+    /// With `slow` the time limit is longer.
     ///
     /// # Errors
     /// The exit status and the last lines of the output, if a command fails.
@@ -225,9 +223,7 @@ impl Shell {
         Err(format!("ends with {status} after\n  {}", last.join("\n  ")))
     }
 
-    /// Starts a command whose hardware is missing, and returns its exit status and output.
-    ///
-    /// The status is `None` after a signal.
+    /// Starts a command without its hardware; returns its exit status (`None` after a signal) and output.
     pub(crate) fn begin(&self, command: &str) -> Result<(Option<i32>, String), String> {
         let (status, said) = self.ended(command, BEGUN_S)?;
         Ok((status.code(), said))
@@ -248,11 +244,10 @@ impl Shell {
     }
 }
 
-/// Returns the definition of a shell function `cargo` for the commands of a documentation page.
+/// Returns the definition of a shell function `cargo` for the commands of a page.
 ///
-/// For an alias of `config` the shell function runs the program that is already built in `bin`. For any other command
-/// it runs the real cargo in the folder `root`. In another folder cargo would build everything again, because the
-/// paths differ.
+/// For an alias in `config` it runs the program already built in `bin`, otherwise the real cargo in the folder
+/// `root`. Elsewhere cargo would build everything again, because the paths differ.
 fn functions(config: &str, bin: &Path, root: &Path) -> String {
     let mut cases = String::new();
     for line in config.lines() {
@@ -272,9 +267,9 @@ fn functions(config: &str, bin: &Path, root: &Path) -> String {
     )
 }
 
-/// Checks that the lines of the page occur in the output, in order. Other lines may be in between.
+/// Checks that the lines of the page occur in the output, in order, with other lines in between.
 ///
-/// If `noisy`, each number matches any number.
+/// With `noisy` each number matches any number.
 ///
 /// # Errors
 /// The first missing line, and the most similar line of the output.
@@ -304,7 +299,7 @@ pub(crate) fn compare(page: &[&str], output: &str, noisy: bool) -> Result<(), St
     Ok(())
 }
 
-/// Replaces each number in a line by `#`, and each run of spaces by one space.
+/// Replaces each number in a line with `#`, and each run of spaces with one space.
 fn unnumbered(line: &str) -> String {
     let (mut out, mut in_number) = (String::new(), false);
     for sign in line.trim_end().chars() {
@@ -321,7 +316,7 @@ fn unnumbered(line: &str) -> String {
     out
 }
 
-/// Returns the number of words in the line `one` that also occur in the line `other`.
+/// Returns how many words of the line `one` also occur in `other`.
 fn alike(one: &str, other: &str) -> usize {
     let words: Vec<&str> = other.split_whitespace().collect();
     let common = one.split_whitespace().filter(|word| words.contains(word));

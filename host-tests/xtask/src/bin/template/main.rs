@@ -17,7 +17,8 @@ struct Arguments {
     /// Folder to write to; it must be empty or missing
     #[arg(required_unless_present = "check")]
     folder: Option<PathBuf>,
-    /// Write every template into an empty folder of its own, check its formatting, lint it and build it. `cargo ci` does so
+    /// Write every template into an empty folder of its own, check its formatting, lint it and build it. `cargo ci`
+    /// does so
     #[arg(long, conflicts_with_all = ["name", "folder"])]
     check: bool,
 }
@@ -48,8 +49,7 @@ fn write(name: &str, folder: &Path) -> Result<(), Box<dyn Error>> {
 
 /// Writes a firmware template to a folder, checks its formatting, lints it and builds it.
 ///
-/// The folder is outside this checkout, because inside it the checkout's cargo settings would hide missing linker
-/// arguments.
+/// The folder is outside this checkout, whose cargo settings would hide missing linker arguments.
 fn check(name: &str) -> Result<(), Box<dyn Error>> {
     let above = std::env::temp_dir().join(format!("uav-relay-template-{}", std::process::id()));
     let folder = above.join(name);
