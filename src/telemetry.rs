@@ -40,11 +40,11 @@ pub struct Report {
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node that the relay refuses for another mission; `None` for none.
+    /// Number of the nearest node whose messages the relay ignores because of another mission; `None` for none.
     pub other_mission: Option<u16>,
     /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
     pub other_key: Option<u16>,
-    /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
+    /// Interference last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
     pub version: u16,
@@ -86,9 +86,9 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the number of the node that the relay of this entry refuses; `None` for none.
+/// Returns the number of the node whose messages the relay of this entry ignores; `None` for none.
 ///
-/// `first` is 1 for refusals because of another mission, and 9 for refusals because of another key.
+/// `first` is 1 if another mission is the reason, and 9 if another key is the reason.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),

@@ -50,8 +50,8 @@ impl ViewId {
         }
     }
 
-    /// Returns `view` with its number limited to this view's number plus `most`. So a received view raises the known
-    /// number only by bounded steps.
+    /// Returns `view` with its number limited to this view's number plus `most`. This bounds the step by which a
+    /// received view can raise the known number.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {

@@ -30,8 +30,8 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. In this format no sum of samples or squares
-/// overflows.
+/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. Sums of samples and of squares do not overflow
+/// in this format.
 const ONE: f32 = 2_147_483_648.0;
 
 /// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
@@ -182,13 +182,13 @@ impl Estimator {
     }
 }
 
-/// Beta distribution that has the mean and the variance of the samples.
+/// Beta distribution with the mean and the variance of the samples.
 struct Fit {
-    /// Mean m of the accepted samples, each the interference power I divided by `I_max`.
+    /// Mean m of the accepted samples I / `I_max`.
     m: f32,
-    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without loss of digits.
+    /// Difference 1 - m, where m is the mean of the samples; computed without loss of digits.
     rest: f32,
-    /// Standard deviation s of the accepted samples, each the interference power I divided by `I_max`.
+    /// Standard deviation of the accepted samples I / `I_max`.
     s: f32,
     /// Sum alpha + beta of the two shape parameters of the fitted Beta distribution.
     w: f32,

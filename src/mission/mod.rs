@@ -1,4 +1,4 @@
-//! The mission: everything the relays agree on before flight, validated once.
+//! Mission: everything that the relays must know alike before flight, validated once.
 //!
 //! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has checked parameters, and
 //! quantities derived from them.
@@ -47,8 +47,7 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: one transmitter at a known or unknown position, or a field. A field is a
-    /// distribution along x.
+    /// Interference on the hops: one transmitter at a known or unknown position, or a distribution along x (a field).
     pub interference: Interference,
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
@@ -179,7 +178,8 @@ pub struct Interferer {
     pub power_w: f32,
     /// Position of the interferer along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
     pub x_m: f32,
-    /// Lateral offset of the interferer from the line Tx to Rx, m: to its right above 0, to its left below.
+    /// Lateral offset of the interferer from the line Tx to Rx, m: positive to the right of the line, negative to the
+    /// left.
     pub y_m: f32,
 }
 
@@ -315,9 +315,8 @@ pub struct Mission {
     pub(super) relay_gain_per_w: f64,
     /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's
     /// power, divided by the squared distance.
-    ///
     /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
-    /// field it is Upsilon(D) / eta. With noise, it refers to the interference plus noise at Rx.
+    /// field it is Upsilon(D) / eta. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
     /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
     /// noise and in an interference field.
@@ -601,8 +600,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions. The order is toward Rx (relay 1 to relay N). In
-    /// an interference field it is toward Tx (relay N to relay 1).
+    /// Returns the order in which the relays compute their positions: toward Rx (relay 1 to N), or in an interference
+    /// field toward Tx (relay N to 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
@@ -611,8 +610,7 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, the first relay to compute its position. It is 1, or N in an interference
-    /// field.
+    /// Returns the index of the leader, the first relay to compute its position: 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -665,8 +663,8 @@ impl Mission {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// Returns the factor K of the last hop, m^2. The SIR at Rx is K divided by the squared distance to the last
-    /// relay. The last relay sends with `power_w` watts.
+    /// Returns the factor K of the last hop, m^2, for a last relay of `power_w` watts. The SIR at Rx is K divided by
+    /// the squared length of this hop.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -676,10 +674,11 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Returns G, m^2, which determines the optimal position of a single relay. The relay sends with `power_w` watts.
+    /// Returns G, m^2, which determines the optimal position of a single relay of `power_w` watts.
+    ///
     /// G is K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is
-    /// (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and
-    /// of Tx. `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
+    /// (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and of
+    /// Tx. `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
     /// ground.
     #[doc(hidden)]
     pub fn last_to_first(&self, power_w: f32) -> f64 {
@@ -699,8 +698,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x, m, that keeps two neighbours at their minimum separation. `across_squared`,
-    /// m^2, is their squared distance across the line, in y and altitude.
+    /// Returns the minimum step in x, m, that keeps two neighbours at their minimum separation. `across_squared`, m^2,
+    /// is their squared distance in y and altitude.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -710,25 +709,24 @@ impl Mission {
     }
 
     /// Returns the minimum step in x for the separation of two neighbours, m, plus a margin for rounding.
-    /// `across_squared`, m^2, is their squared distance across the line, in y and altitude.
+    /// `across_squared`, m^2, is their squared distance in y and altitude.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m. At this x the relays that are computed after relay `index`
-    /// can still keep their minimum separation.
+    /// Returns the farthest allowed x of relay `index`, m, that leaves the relays computed after it room for their
+    /// separation.
     ///
-    /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
-    /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the
-    /// steps in x.
+    /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the largest squared
+    /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, without the separation of the relays after it.
+    /// Returns the farthest allowed x of relay `index`, m, without room for the separation of the relays computed after
+    /// it.
     ///
-    /// The relays after it are those whose positions are computed later. Farthest means toward Rx, or toward Tx in an
-    /// interference field.
+    /// Farthest means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
@@ -741,8 +739,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves enough room toward Rx. The relays between it and Rx
-    /// then have room for their minimum separation.
+    /// Returns the largest x of relay `index`, m, that leaves the relays between it and Rx room for their separation.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -776,8 +773,8 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or last hop with which this hop is half as long as the other hops. In the best chain
-/// all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of the first or last hop that makes this hop half as long as the others. In the best chain all
+/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
@@ -792,8 +789,8 @@ impl Mission {
     /// Returns the mission with another `interference`.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` has a flag for the first hop and a flag for the last hop. If a flag is true, the relays are placed so
-    /// that this hop is half as long as the others.
+    /// `halved` has a flag for the first hop and a flag for the last hop. A hop with a true flag becomes half as long
+    /// as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -834,9 +831,10 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns three gains for an unknown interferer. With these gains the best chain has hops of equal length. They are
-/// the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the transmit
-/// power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
+/// Returns the gains for an unknown interferer, with which the best chain has hops of equal length.
+///
+/// They are the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the
+/// transmit power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

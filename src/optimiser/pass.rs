@@ -1,13 +1,13 @@
-//! Pass of targets along the chain. Each relay's reaches, the last relay's verdict, and the positions on the way back.
+//! Pass of target SIRs along the chain: the relays' reaches, the last relay's verdict, and the positions.
 //!
-//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it receives the relay before it, if that relay is at the
-//! best of its positions up to its own reach. Toward Tx (Algorithm 4) it is the x closest to Tx from which the relay before it on
-//! the pass receives it at the best of its positions. So no chain that meets the target is excluded, and a missed target is
-//! out of reach of every chain. See [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may
-//! have to hold back.
-//!
-//! On the way back each relay has a position, and [`required_position`](Link::required_position) returns the required position of the relay before it on
-//! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
+//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it receives the previous relay. The previous
+//! relay may be at any x up to its own reach; the best of these x counts. Toward Tx (Algorithm 4) the reach is the x
+//! closest to Tx from which the previous relay of the pass receives this relay; again the best x of the previous relay
+//! counts. So no chain that meets the target is excluded, and a missed target is out of reach of every chain. See
+//! [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may have to hold back.
+//! When the verdict travels back along the chain, each relay takes its position, and
+//! [`required_position`](Link::required_position) returns the position that the previous relay of the pass must take.
+//! In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
 //! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0 if the target is
 //! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
@@ -31,8 +31,8 @@ use crate::sir::{self, Sender, square, transmitter_gain};
 /// both directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of points of an interference field that one call evaluates. The evaluation of one target is completed
-/// even if it needs more points.
+/// Maximum number of field points that one call evaluates. The evaluation of one target is completed even if it needs
+/// more.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay of a pass along the chain, as its message describes it.
@@ -73,11 +73,11 @@ pub struct Link<'a> {
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
     /// stay short of that x to help the next relay on the pass.
     pub plain: bool,
-    /// Maximum x of the relay, m. It leaves the relays toward Rx enough space for their separation. Only the joint
-    /// method computes it; `None` with other methods. Not used in an interference field.
+    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. Only the joint method
+    /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets at this x. `None` unless
-    /// the mission has fitted slots (time slots as long as each hop needs).
+    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets there. `None` unless the
+    /// mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
@@ -231,8 +231,8 @@ impl<'a> Link<'a> {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop with which the x of this relay, its sender, is smallest. The hop's receiver is at x from `low`
-    /// to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop that allows this relay, its sender, the smallest x. The hop's receiver is at x from `low` to
+    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -307,9 +307,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x at which this relay receives the previous relay of the pass, m. The result is at most
-    /// `most_m`. The previous relay is allowed to take any x up to `from_m`, its farthest x. `None` if there is no such
-    /// x.
+    /// Returns the largest x, m, up to `most_m`, at which this relay receives the previous relay of the pass. The
+    /// previous relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -354,7 +353,7 @@ impl<'a> Link<'a> {
     ///
     /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
     /// position. The search assumes that the possible positions of the previous relay are one interval, although this
-    /// interval can have gaps. Bounded by two reaches, in an interference field by three for each of its points.
+    /// interval can have gaps. Work: at most two reaches; in an interference field three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -381,11 +380,11 @@ impl<'a> Link<'a> {
                 );
                 let low = from_m.max(place + apart).max(place.next_up());
                 let interference = HopInterference::new(self.mission, behind.measured_per_w);
-                // A position that leaves all relays toward Rx room along the line, at any altitude, is preferred.
+                // A position with room along the line for all relays toward Rx, at any altitude, is preferred.
                 let clear = self.mission.latest(self.index.saturating_add(1));
                 let to = |high| {
                     let high = heard_m.min(high);
-                    // With a way back the nearest one is preferred, because the way back is best from there.
+                    // With data in both directions the closest one is preferred: it is best for data from Rx to Tx.
                     let near = if heard_m < f32::INFINITY { low } else { high };
                     let step = |high| {
                         let step = hop.longest_there(interference, target, low, high)?;

@@ -23,7 +23,7 @@ use crate::root::sqrt;
 use crate::side::Heading;
 use crate::sir::{self, Sender};
 
-/// Schedule by which the leader selects the target SIRs of the next sweep, a pass along the chain.
+/// Schedule of the target SIRs that the leader tries, one pass along the chain after another.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
@@ -58,13 +58,12 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit of the
-/// difference is the gap between two targets.
+/// Maximum difference between cubic and linear interpolation for which the cubic result is used. The unit is the gap
+/// between two targets.
 const BEND: f32 = 0.25;
 
-/// Maximum ratio of the bracket's width after a pass to its width before the pass. The bracket is the interval that
-/// contains the best target. With a larger ratio the next targets are spread evenly over the bracket, and not around an
-/// interpolated optimum.
+/// Maximum ratio of the bracket's width after a pass to its width before. With a larger ratio the next targets are
+/// spread evenly over the bracket (the interval that contains the best target), not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -87,14 +86,13 @@ pub struct Search {
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule
-    /// has only such passes. Plain passes are also used after a relay has refused a target. A relay refuses a target
-    /// if it cannot take the x that the next relay requires.
+    /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule has
+    /// only plain passes. They are also used after a relay has refused a target, because it cannot take the x that the
+    /// next relay requires.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if no such target is known.
     most: Option<f32>,
-    /// Bisection for a target that all relays accept. `None` until a relay has refused a target, because it cannot
-    /// take its required position.
+    /// Bisection for a target that all relays accept. `None` until a relay has refused a target.
     trials: Option<StandTrials>,
     /// True for a mission with traffic in both directions.
     both_ways: bool,
@@ -163,15 +161,16 @@ impl Search {
     }
 
     /// Replaces the next targets by `ladder`, which the leader expects to end the search. If `ladder` is for a plain
-    /// pass, in which every relay takes its farthest x, all later passes are plain, too.
+    /// pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target known to be infeasible for every chain. `slacks` are the chain's slacks, m, for the targets of the last
-    /// pass. Plain passes prove nothing, because they do not try all chains. `None` if no such target is known, and for traffic in both
-    /// directions.
+    /// Returns the lowest target known to be infeasible for every chain; `None` if no such target is known.
+    ///
+    /// `slacks` are the chain's slacks, m, for the targets of the last pass. Plain passes prove nothing, because they
+    /// do not try all chains. `None` for data in both directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if REVERSE && self.both_ways {
             // Reaches and held positions of both directions are not proven to exclude no chain.
@@ -283,10 +282,10 @@ impl Search {
     }
 }
 
-/// Lowers the targets `start` and `met` to include the traffic from Rx to Tx, and returns both.
+/// Lowers the targets `start` and `met` to allow for data from Rx to Tx, and returns both.
 ///
-/// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a
-/// feasible target, becomes a target that this hop and the backward hop from Rx also meet.
+/// `start` is the upper bound of the search. It becomes at most the maximum SIR of the backward hop to Tx. `met` is a
+/// feasible target. It becomes a target that this hop and the backward hop from Rx also meet.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -360,9 +359,8 @@ struct StandTrials {
 impl Search {
     /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the
-    /// commit from `verdict`, the result of the pass. This function finds the refused target from the slacks in
-    /// `verdict`.
+    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the commit
+    /// from `verdict`, the result of the pass. The refused target follows from the slacks in `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -387,9 +385,8 @@ impl Search {
 
     /// Continues after a relay refused its required position for `target`.
     ///
-    /// First a plain pass, in which every relay takes the farthest x that meets the target, finds a target that no
-    /// relay can refuse. The interval up to the refused target is then bisected. `most` is a target that no chain can
-    /// meet, if known.
+    /// A plain pass first finds a target that no relay can refuse: every relay takes the farthest x that meets it. The
+    /// interval up to the refused target is then bisected. `most` is a target that no chain can meet, if known.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.

@@ -22,9 +22,9 @@
 //! targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed case distinction
 //! selects wrong roots once the chain has passed the interferer.
 //!
-//! If the sender may be anywhere in [0, x0], only the one closest to the receiver matters: it is received best, and the
-//! interference does not depend on it. For a receiver at x up to x0 plus the minimum step s, that sender is s before it, and the
-//! target is met if
+//! If the sender may be anywhere in [0, x0], only the position closest to the receiver matters: it is received best,
+//! and the interference at the receiver does not depend on it. For a receiver at x up to x0 plus the minimum step s,
+//! that sender is s before it, and the target is met if
 //! ```text
 //! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
 //! ```
@@ -47,7 +47,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::{bisected, sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position of the previous relay that lets this relay's hop meet the target SIR.
+/// Position that the previous relay must take so that this relay's hop meets the target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
@@ -95,18 +95,18 @@ pub struct Hop {
     from_tx: bool,
     /// Largest permitted x of this hop's receiver, m from Tx.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m. With these x the relays nearer to Rx have room for their
-    /// minimum separation.
+    /// Maximum x of the receiver and of the sender, m. They leave the relays nearer to Rx room for their minimum
+    /// separation.
     gathered_m: [f32; 2],
-    /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
+    /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.
     back: Option<Back>,
 }
 
 impl Hop {
     /// Creates the hop from `sender` to relay `index`, which has the lateral offset and altitude `at`.
     ///
-    /// `spread_squared` is the maximum squared distance across the line between two neighbours among the relays after
-    /// `index`, m^2.
+    /// `spread_squared` concerns the relays after `index`: it is the largest squared distance between two neighbours
+    /// perpendicular to x, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -164,8 +164,8 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Returns this hop together with the backward hop, if the mission has traffic in both directions. The backward
-    /// hop is toward Tx. `power_w` is the power of the relay that receives this hop, W.
+    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx. `power_w` is the power
+    /// of the relay that receives this hop and sends the backward hop, W.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -174,8 +174,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver at any x up to Rx. No separation is reserved for the relays between `index` and
-    /// Rx.
+    /// Returns this hop with a receiver at any x up to Rx: relays nearer to Rx need no separation along x.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -210,8 +209,8 @@ impl Hop {
         self.ending(place).onward(target, from_m)
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, for traffic toward Rx only. The sender is at x
-    /// = `from_m`. `None` if no x meets `target`.
+    /// Returns the largest x at which the receiver meets `target`, m, for data toward Rx only. The sender is at x =
+    /// `from_m`. `None` if no x meets `target`.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -277,9 +276,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The x of the sender is in
-    /// [0, `from_m`]. `back` is the backward hop. `place` is the receiver's largest x if the sender is at `from_m`.
-    /// The result is larger than `place` if a sender at a smaller x receives the backward hop better.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`, for a sender in [0, `from_m`].
+    /// `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The result is larger
+    /// than `place` if a sender at a smaller x receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -398,7 +397,8 @@ impl Hop {
             return at(from_m);
         }
         let near = from_m.min(self.before(place));
-        // If all relays gather at the end, they are spaced as evenly as by a pass that leaves them room from the start.
+        // If all relays gather at the end, they are spaced as evenly as by a pass that plans room for them from the
+        // start.
         let [own, sender] = self.gathered_m;
         let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
         let required = gathered.flatten().or_else(|| at(near));
@@ -408,11 +408,11 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. Without
-    /// this step the result is a smooth function, as the joint method requires.
+    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. So the result
+    /// is a smooth function, as the joint method requires.
     ///
-    /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance across the
-    /// line alone exceeds the hop's maximum length.
+    /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance perpendicular to
+    /// x alone exceeds the hop's maximum length.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -505,7 +505,7 @@ impl Hop {
     }
 
     /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. Without the feature
-    /// `noise` the result is the constant 0, so that the compiler drops the search in noise.
+    /// `noise` it is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }

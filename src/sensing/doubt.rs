@@ -1,11 +1,12 @@
-//! Identification of a relay or an end of the chain with measurements that do not fit the others.
+//! Search for a relay, or an end of the chain, whose measurements do not fit the others.
 //!
 //! # Relay
 //!
 //! A relay's measurements do not fit those of the others because its receiver is faulty or it reports false values.
 //!
-//! If the measurements do not fit a single source, the leader excludes one relay after the other from a pass. Without the faulty
-//! relay the others are consistent; without any other relay they are not.
+//! If the measurements do not fit a single source, the leader repeats the sensing pass (the collection of measurements)
+//! without one relay after the other. Without the faulty relay the others are consistent; without any other relay they
+//! are not.
 //!
 //! | pass | excluded | result | next |
 //! | --- | --- | --- | --- |
@@ -18,8 +19,8 @@
 //! | first notice | faulty relay | | second notice |
 //! | second notice | faulty relay | measurements of the others | usual, and the result counts |
 //!
-//! A relay with an absurd measurement, a factor of 300 off the estimate and inconsistent with the others, excludes itself at
-//! once, and reports that on the way back.
+//! A relay with an absurd measurement, a factor of 300 off the estimate and inconsistent with the others, excludes
+//! itself at once, and reports that in the reply of the pass.
 //!
 //! A relay that is excluded from two successive passes excludes itself from then on, until it fits the others again. No new
 //! estimate is adopted from the first pass of a trial to its last.
@@ -45,44 +46,42 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of the measurements' errors, divided by the variance that the operator expects. If the variance
-/// is larger, the search for a faulty relay starts.
+/// Ratio of the measurements' variance to the variance that the operator expects, above which the search for a faulty
+/// relay starts.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum squared deviation of a faulty relay's measurement, as a multiple of the variance. Without this relay, the
-/// fit's residual must be smaller by at least this multiple of the variance.
+/// Minimum drop of the fit's residual without the faulty relay, as a multiple of the variance of the other
+/// measurements.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit to all measurements for which a faulty relay is searched. The residual is the sum of
-/// squared relative errors. One measurement that is wrong by some 15 % causes this residual.
+/// Minimum residual of the fit at which the search for a faulty relay starts, and its minimum drop without this relay.
+/// The residual is the sum of squared relative errors. One measurement that is wrong by some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the second smallest variance to the smallest variance that shows one faulty relay. Each variance
-/// belongs to a fit that leaves out one relay.
+/// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
+/// to a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative differences between consistent measurements and their fit. The value is a standard
-/// deviation of 0.32, or some 1.5 dB.
+/// Maximum variance of the relative differences between consistent measurements and their fit: a standard deviation of
+/// 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
-/// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
-/// measurements.
+/// Number of sensing passes (collections of measurements) between a failed search for a faulty relay and the next one.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay's measurement fits the other measurements, and is used again. The first limit
-/// is a multiple of the variance, the second a squared relative difference. The larger of the two limits counts.
+/// Limits within which an excluded relay's measurement fits the others again. The first is a multiple of the variance,
+/// the second a squared relative difference. The larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
 /// Minimum number of relays to identify a faulty relay. With four relays, an exclusion leaves three measurements, and
 /// the three unknowns fit any three measurements.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions with which a faulty relay can be found. Older positions count less, see
-/// [`Sums::count`].
+/// Minimum number of measured positions to find a faulty relay. Older positions count less, see [`Sums::count`].
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above this ratio, rounding
-/// errors of the sums exceed the share of this relay in the sums.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above it, rounding errors
+/// of the sums exceed this relay's part of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -103,20 +102,19 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
-    /// Node whose exclusion has given the fit with the smallest variance so far.
+    /// Node whose exclusion has given the smallest variance so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
     /// Residual of the fit without the node `best`: sum of the squared relative errors.
     seen_best: f32,
-    /// Smallest variance of relative errors among the fits that each leave out one node. This fit leaves out the node
-    /// `best`.
+    /// Smallest variance of relative errors among the fits that each leave out one node. The node left out is `best`.
     least: f32,
     /// Second smallest variance of relative errors among the fits that each leave out one node.
     second: f32,
 }
 
-/// Action after a collection of measurements, as decided by the search for a faulty relay.
+/// Action after a sensing pass (a collection of measurements), as decided by the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the measurements of this sensing pass for the interference estimate.
@@ -138,7 +136,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node whose measurements the next collection along the chain leaves out; 0 for none.
+    /// Node whose measurements the next sensing pass leaves out; 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Normal => 0,
@@ -146,8 +144,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of collected measurements in the search for a faulty relay. The chain has agreed on
-    /// `relays` members, whose node numbers are within 1 to `nodes`.
+    /// Evaluates the `sums` of a sensing pass in the search for a faulty relay. The chain has `relays` members, whose
+    /// node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -235,8 +233,7 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Ratio of a relay's measurement to the estimate above which the relay doubts its measurement. A ratio below the
-/// inverse of this value has the same effect.
+/// Factor between a relay's measurement and the estimate, up or down, above which the relay doubts its measurement.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far off the estimate
@@ -262,9 +259,9 @@ pub(crate) fn is_absurd(
 
 /// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// The measurement v = 1e-12 W / I at `place` is compared with a value e. e is the value at this place by the fit to
-/// the other relays' sums, `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v
-/// by the current estimate, and sets the measurement's weight.
+/// The measurement v = 1e-12 W / I at `place` is compared with e, the value of the fit to the other relays' sums,
+/// `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the current
+/// estimate, and sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -315,9 +312,8 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first limit is a
-/// multiple of the variance, the second a squared relative difference, here a factor of 1.5. The larger of the two
-/// limits counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple of
+/// the variance, the second a squared relative difference, here a factor of 1.5. The larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
@@ -344,7 +340,7 @@ pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Compares the levels measured at Tx and Rx with the relays' measurements. Returns which of the two do not fit.
+/// Compares the levels measured at Tx and Rx with the relays' measurements. Returns which of them do not fit.
 ///
 /// `fit` is the source that was fitted to the relays' measurements.
 pub(super) fn judge_ends(
@@ -384,7 +380,7 @@ pub(super) fn judge_ends(
             let alike = !is_apart(tx.ratio / rx.ratio, tx.unsure + rx.unsure, APART);
             off(false, false, !alike)
         }
-        // A faulty end remains faulty; about the other one nothing new is known.
+        // A faulty end stays faulty; nothing new is known about the other end.
         (None, Some(rx)) if before.receiver && !rx.fits() => before,
         (Some(tx), None) if before.transmitter && !tx.fits() => before,
         (None, Some(end)) | (Some(end), None) => off(false, false, !end.fits()),

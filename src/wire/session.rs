@@ -48,13 +48,13 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the other node certainly sent the claim after this relay's start. The proof is this relay's own claim number in the message,
-    /// or a signature.
+    /// True if the other node certainly sent the claim after this relay's start. The proof is a signature, or this
+    /// relay's own claim number in the message.
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number. With this bit the relay wins against a node that starts
-/// later. Of two nodes with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number, so that it wins against a node that starts later. Of two
+/// nodes with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -62,9 +62,9 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the numbers in two nonces that one node uses in one epoch. A nonce's number is its
-/// lower half. A node draws a random first number at its start, and counts up from it. A larger difference therefore
-/// shows that two nodes use the same node number.
+/// Maximum difference between the numbers in two nonces of one node and epoch. A nonce's number is its lower half. A
+/// node draws a random first number at its start, and counts up from it. A larger difference therefore shows that two
+/// nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
 /// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. A smaller number
@@ -76,16 +76,16 @@ struct Peer {
     node: u16,
     /// True if an authentication handshake to this node must be sent.
     handshake: bool,
-    /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only until
-    /// the node has proved its presence.
+    /// True if the next handshake requests a reply in any case. If false, it requests one only until the node has
+    /// proved its presence.
     requests_reply: bool,
     /// True if the node has repeated this relay's nonce. The repetition proves that the node is present, and that
     /// both nodes know each other's nonce.
     proven: bool,
     /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
-    /// Time of the last frame that proved the node present. A handshake with a larger nonce than all earlier nonces
-    /// also counts as proof.
+    /// Time of the last frame that proved the node present. A handshake with the largest nonce so far also counts as
+    /// proof.
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
@@ -150,7 +150,7 @@ pub(crate) struct Session {
     /// Claim of another node to this relay's node number, as shown by a handshake. `None` once the claim has been
     /// read.
     rival: Option<Rival>,
-    /// Number of uses of session table entries so far, wrapping. By this number the entries are ordered by their last use.
+    /// Number of uses of table entries so far, wrapping. Each entry stores it at its last use.
     clock: u32,
     /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
@@ -162,11 +162,11 @@ pub(crate) struct Session {
 /// Result of authenticating a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid message that was not received before. It proves that its sender is present. `first` is true if the
-    /// sender had not proved this before in the present session.
+    /// Valid message that was not received before, so its sender is present. `first` is true for the sender's first
+    /// proof of this in the present session.
     Fresh { first: bool },
-    /// New handshake that contains this relay's current nonce, which proves that its sender is present. `first` is
-    /// true if the sender had not proved this before in the present session.
+    /// New handshake that contains this relay's current nonce, so its sender is present. `first` is true for the
+    /// sender's first proof of this in the present session.
     Handshake { first: bool },
     /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
     /// not prove that its sender is present.
@@ -175,16 +175,15 @@ pub(crate) enum Checked {
     Unsigned,
     /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that was received before. Also a frame whose counter is so old that it is unknown if the frame
-    /// was received before.
+    /// Authentic frame that was received before, or whose counter is too old to know that.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
 }
 
 impl Session {
-    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. If a node is silent
-    /// for `gone_after`, another node with its number can replace it.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. After a silence of
+    /// `gone_after`, another node with the same number can replace a node.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {

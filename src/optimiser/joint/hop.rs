@@ -42,9 +42,10 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop that just meets its target SIR. The joint method computes the moves of relays with
-/// these derivatives. Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w,
-/// of the hop's start p, and of the target SIR.
+/// Derivatives of the end of a hop that just meets its target SIR.
+///
+/// Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w, of the hop's start
+/// p, and of the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -54,21 +55,20 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate of the hop's end, with respect to w and p. w are the other two
-    /// coordinates of the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value
-    /// for each coordinate of p.
+    /// Second derivatives of the dependent coordinate of the hop's end by w and p. w are the other two coordinates of
+    /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
+    /// of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end. They are with respect to the other two
-    /// coordinates w_1 and w_2 of the end. The order is w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end by the other two coordinates of the end, w_1 and
+    /// w_2. The order is w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end with respect to the target ln(SIR), m. The other two
-    /// coordinates of the end are constant.
+    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m, with the other two coordinates
+    /// constant.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx, or at the hop's farthest
-    /// x.
+    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx or at the hop's farthest x.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -215,8 +215,8 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
 }
 
 /// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s is the squared distance from the hop's receiver
-/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain. Noise makes
-/// `c` larger.
+/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain; noise makes
+/// it larger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,

@@ -2,9 +2,9 @@
 //!
 //! It computes the x of all relays for one target, in portions.
 //!
-//! The pass to Rx computes the farthest x of each relay, exactly as the relays compute it from their messages. With data in one
-//! direction this is enough, unless a relay has to stay short of its farthest x. Otherwise the pass back to Tx computes the x that each
-//! relay has to take, and whether it can.
+//! The pass to Rx computes the farthest x of each relay, exactly as the relays compute it from their messages. With
+//! data in one direction this is enough, unless a relay has to stay short of its farthest x. Otherwise a pass back to
+//! Tx computes the x that each relay has to take, and checks that it can.
 
 use crate::optimiser::joint::chain::{Chain, SeatOf};
 use crate::optimiser::joint::outlook::Outlook;
@@ -15,7 +15,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Number of relays that one call computes: with data in one direction, and in both.
+/// Number of relays per call: with data in one direction, and in both.
 const AT_ONCE: [u16; 2] = [20, 2];
 
 /// Memory of a relay during Algorithm 1: its x, and the upper limit of its x, m.
@@ -32,7 +32,7 @@ impl Noted for [f32; 2] {
 /// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
+    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx and at the end of the pass
     /// back.
     index: u16,
     /// True while the solver passes along the chain from Rx back to Tx.

@@ -1,7 +1,7 @@
 //! Relay of a trial chain: its position, given the hop to it, and its backward pass.
 //!
-//! Positions across the line are stored in six bytes each, and are limited to the relay's room. The first and the last hop have a
-//! ceiling, and the last one a slack at Rx.
+//! A lateral offset and altitude are stored in six bytes, and are limited to the relay's room. The first and the last
+//! hop have a maximum SIR, and the last one a slack at Rx.
 //!
 //! The backward pass computes the derivatives of the slack by the position of the relay before it.
 
@@ -98,11 +98,10 @@ impl<'a> Site<'a> {
 
     /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
-    /// The x of the hop's end must not be smaller than the x of the sender. The search starts at the permitted
-    /// position closest to the middle of the reachable positions, and goes along the straight line to `wanted`.
-    /// `None` if no allowed position is reached. With the sender at p, the interferer at m and c = target / gain > 1
-    /// the reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius
-    /// sqrt(c) |p - m| / (c - 1).
+    /// The x of the hop's end must not be smaller than the x of the sender. The search goes along a straight line to
+    /// `wanted`. It starts at the permitted position closest to the middle of the reachable positions. `None` if no
+    /// permitted position is reached. With the sender at p, the interferer at m and c = target / gain > 1 the reachable
+    /// positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -115,8 +114,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the centre
-    /// and the squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`: its centre and squared
+    /// radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -167,9 +166,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest position that the hop reaches on a straight path across the line Tx to Rx. The path leads
-    /// from the sender's lateral offset and altitude to `wanted`. The farthest position on the path is searched by
-    /// bisection.
+    /// Returns the farthest position that the hop reaches on the way to `wanted`, found by bisection. The way is
+    /// straight in lateral offset and altitude, and starts at those of the sender.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -432,8 +430,8 @@ impl Room {
     }
 }
 
-/// Factor that turns the maximum SIR of the first or last hop into the upper bound of the chain's SIR. The margin
-/// leaves the first and the last relay a choice of position.
+/// Factor from the maximum SIR of the first or last hop to the upper bound of the chain's SIR. The margin leaves the
+/// first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
 /// Number of bisection steps for the position with the largest SIR of a first hop with noise.
@@ -442,9 +440,9 @@ const END_HALVINGS: u8 = 24;
 /// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
 /// allowed lateral offsets and altitudes.
 ///
-/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are
-/// the squared distances from Tx to the interferer along that line and across it; h is the altitude, and nu the
-/// noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
+/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are the
+/// squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude, and nu
+/// the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
 /// which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
@@ -480,22 +478,23 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of the penalty for a violated minimum separation. The unit is the distance from Tx to Rx. The weight is so large that no gain of
+/// Weight of the penalty for a violated minimum separation, in distances from Tx to Rx. It is so large that no gain of
 /// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Tolerance within which a relay counts as at a limit of its allowed range. It is a fraction of the distance from Tx
-/// to Rx.
+/// Distance from a limit of its range within which a relay counts as at the limit, as a fraction of the distance from
+/// Tx to Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative tolerance up to which the squared length of a hop counts as its maximum. The tolerance applies to hops that
-/// end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
+/// Relative difference up to which the squared length of a hop counts as its maximum, for hops that end at the x of Rx.
+/// With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns three numbers about a relay at `to` that can be too near the interferer. The first number is the squared
-    /// distance that the relay lacks, m^2; 0 if the relay is far enough away. The second number is the weight of the
-    /// penalty for this. The third number is the derivative of the first number with respect to ln(target SIR).
+    /// Returns the penalty terms of a relay at `to` that may be too near the interferer.
+    ///
+    /// The first number is the squared distance that the relay lacks, m^2; 0 if it is far enough away. The second is
+    /// the weight of the penalty. The third is the derivative of the first by ln(target SIR).
     ///
     /// `c` is the target SIR divided by the sender's gain. A hop of maximum length from p to p' that ends near the
     /// interferer at m is short. It violates the minimum separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2,

@@ -23,9 +23,9 @@ pub(super) enum Start {
     /// `aside` and `up` are the direction from the interferer to P. `far` is the distance of P from the interferer,
     /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
-    /// Initial chain on a parabola as for `Arch`, but computed without a minimum separation. The solver then searches
-    /// the highest target of this chain. For the search it computes the hops exactly as the relays do in flight; a
-    /// relay is allowed to stay short of its farthest position.
+    /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
+    /// highest target of this chain. It computes the hops exactly as the relays do in flight, and a relay is allowed to
+    /// stay short of its farthest position.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
@@ -82,11 +82,11 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral about the interferer. The logarithm of the distance from the interferer changes linearly with the angle.
+/// Spiral about the interferer: the logarithm of the distance from the interferer changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,
-    /// Logarithm of the distance from the interferer at the spiral's end, minus the logarithm at its start.
+    /// Logarithm of the distance from the interferer at the spiral's end, minus that at its start.
     rise: f32,
     length: f32,
 }
@@ -270,8 +270,8 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from the target `sigma`, in ln(SIR), to the precision `width`. The first step has
-    /// the length `step`. Each further step is `growth` times as long as the previous step.
+    /// Creates a search downward from the target `sigma`, in ln(SIR), to the precision `width`. The first step is
+    /// `step`; each further step is `growth` times the previous one.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -284,8 +284,8 @@ impl Seek {
     }
 
     /// Creates a search upward from the feasible target `sigma`, in ln(SIR), to the precision `width`. The first step
-    /// has the length `step`. Each further step is three times as long as the previous step. `holds_back` is true if
-    /// some relays have to stay short of their farthest position to meet `sigma`.
+    /// is `step`; each further step is three times the previous one. `holds_back` is true if some relays have to stay
+    /// short of their farthest position to meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),

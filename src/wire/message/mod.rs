@@ -1,9 +1,9 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
-//! Each kind of message has its type, its encoder and its decoder beside each other: in `round` those of passes, in `view` those of view
-//! changes and leases, in `link` those between two neighbours, in `offer` uploads, in `report` telemetry. A decoder checks all ranges: a decoded message has no
-//! invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
-//! shared parts.
+//! Each kind of message has its type, its encoder and its decoder beside each other: in `round` the messages of passes,
+//! in `view` those of view changes and leases, in `link` those between two neighbours, in `offer` uploads, in `report`
+//! telemetry. A decoder checks all ranges: a decoded message has no invalid number. A body is a byte, the tag, and a
+//! tuple encoded by postcard; the order of its fields is the format. `parts` has the tags and shared parts.
 
 mod link;
 #[cfg(feature = "upload")]
@@ -54,8 +54,10 @@ impl Upload {
     }
 }
 
-/// Message between neighbours. A *pass* is a message that travels along the chain once; its result travels back.
-/// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
+/// Message between neighbours.
+///
+/// A *pass* is a message that travels along the chain once; its result travels back. *Onward* is the direction of a
+/// pass: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
     /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
@@ -134,8 +136,8 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest in the message; `None` for a message without one. The receiver uses it to check that both
-    /// nodes have the same mission, view or x axis.
+    /// Returns the digest in the message; `None` for a message without one. It shows the receiver if both nodes have
+    /// the same mission, view or x axis.
     pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -185,8 +187,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass (onward). These are messages of
-    /// passes, proposals and lease renewals, but not the replies.
+    /// Returns true for messages that relays forward in the direction of a pass: passes, proposals and lease renewals,
+    /// but not the replies.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

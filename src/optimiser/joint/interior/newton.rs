@@ -40,13 +40,13 @@ pub(super) struct Front {
     bend: Symmetric,
     slope: Triple,
     column: Triple,
-    /// Amount that the elimination of earlier relays has subtracted from the diagonal of `bend`.
+    /// Amount that the elimination of earlier relays subtracted from the diagonal of `bend`.
     taken: Triple,
 }
 
-/// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the
-/// next relay's steps in x, y and h. The last two values are the right side: its constant part, and its part per unit
-/// of the target's change.
+/// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the next
+/// relay's steps in x, y and h. The last two are the right side: its constant part, and its part per unit of the
+/// target's change.
 type Row = [f32; 5];
 
 /// Equations of one relay after its elimination, from which its Newton step follows.
@@ -103,8 +103,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of this relay; on return
-    /// `self` has the rows of the node at `spot`, where `hop` ends.
+    /// Eliminates the relay before `hop` from the Newton system. On entry `self` has the rows of this relay, on return
+    /// the rows of the node at `spot`, where `hop` ends.
     ///
     /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
     /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
@@ -191,8 +191,8 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds this
-    /// contribution to `sums`.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations, and adds it to
+    /// `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -224,9 +224,8 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of one coordinate's barrier to `slope` and `bend`. The barrier is mu (ln a + ln b); its
-/// second derivative is negated before it is added. a and b are the distances to the lower and the upper limit, mu is
-/// the barrier weight.
+/// Adds the derivatives of one coordinate's barrier, mu (ln a + ln b), to `slope` and `bend`. The second derivative is
+/// negated before. a and b are the distances to the lower and the upper limit, and mu is the barrier weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {
