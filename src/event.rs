@@ -18,9 +18,10 @@ pub enum Event {
     /// The chain has agreed on positions. If the interference is known, the chain has also agreed on a target SIR
     /// (`Relay::target`).
     Converged,
-    /// Every allowed target SIR is infeasible, and all relays keep their positions. Raised at the leader, which is
-    /// relay 1, or relay N if the mission gives the interference as a distribution along x. `Relay::restart`, a new
-    /// view or a new mission makes the leader try again.
+    /// Every allowed target SIR is infeasible, and all relays keep their positions.
+    ///
+    /// Raised at the leader, which is relay 1, or relay N if the mission gives the interference as a distribution along
+    /// x. The leader tries again after `Relay::restart`, in a new view, or with a new mission.
     Infeasible,
     /// The neighbour at `side` is lost.
     ///
@@ -56,10 +57,12 @@ pub enum Event {
         /// Index of the node with the other mission.
         node: u16,
     },
-    /// A node signs its handshakes with another key than this relay. Raised after three such handshakes in a row; a
-    /// handshake with the right key starts the count again. An operator should give both nodes the same key. A single
-    /// forged frame does not raise this event. But an attacker without the key can raise it with three forged
-    /// handshakes in a row: if the node is received at the same time, this is an attack and the node is fine.
+    /// A node signs its handshakes with another key than this relay.
+    ///
+    /// Raised after three such handshakes in a row; a handshake with the right key starts the count again. An operator
+    /// should give both nodes the same key. An attacker without the key can raise this event with three forged
+    /// handshakes in a row, but not with one forged frame. If the node is received at the same time, this is an attack
+    /// and the node is fine.
     KeyMismatch {
         /// Index of the node that signs with another key.
         node: u16,
@@ -109,10 +112,12 @@ pub enum Event {
     /// The measurements do not fit a single source on the ground, are too few or contradict each other. Raised at the
     /// leader. `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit. An operator should
-    /// check the receiver of this node. For the transmitter and the receiver only the leader raises this event. For a
-    /// relay that measures nothing at all only this relay itself raises it. With four relays or fewer the faulty relay
-    /// cannot be identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
+    ///
+    /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
+    /// the receiver. A relay that measures nothing at all raises it itself, and no other node does. With four relays or
+    /// fewer the faulty relay cannot be identified
+    /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,
@@ -120,8 +125,8 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
-    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap: the
-    /// drone of this relay may fly away.
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap, and
+    /// this relay's drone may fly away.
     MayLeave,
     /// The drone's remaining time of flight is unknown. Raised only with a reserve (`Relay::set_reserve`).
     ///

@@ -11,8 +11,8 @@ use crate::place::Placement;
 
 /// Direction and distance of a position relative to a relay.
 ///
-/// Frame: x toward the receiver, y to the side, h up, left-handed as in the paper: seen from above, y points to the right of x,
-/// so azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
+/// Frame: x toward the receiver, y to the right of x as seen from above, h up. So the frame is left-handed, as in the
+/// paper, and azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {

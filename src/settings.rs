@@ -142,8 +142,8 @@ pub struct Settings {
     pub probe_after: Duration,
     /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the
-    /// previous view, or half of them including its proposer. Without this rule, the parts of a split chain would
+    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the previous view's
+    /// members, or exactly half including the view's proposer. Without this rule, the parts of a split chain would
     /// interfere with each other.
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
@@ -164,9 +164,9 @@ pub struct Settings {
     /// its drone, which still waits at its place. At an end of the chain they come as close as a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
-    /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
-    /// mission without such positions is then rejected if its distance differs from the distance of the surveyed
-    /// positions. Set it on all relays of a chain, or on none.
+    /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
+    /// mission without Tx and Rx positions is then rejected if its distance differs from that of the surveyed ones. Set
+    /// it on all relays of a chain, or on none.
     pub sited: bool,
 }
 

@@ -105,7 +105,7 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 impl Report {
     /// Creates the report of one relay from its `entry` of time `at` and its last details.
     ///
-    /// Not part of the public interface: for captures, which tests and tools of this workspace decode.
+    /// Not part of the public interface: tests and tools of this workspace decode captures with it.
     #[doc(hidden)]
     pub fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
         let state = entry.state();

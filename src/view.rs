@@ -61,9 +61,8 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. Views with the same
-    /// number and different proposers have different values. Thousands of consecutive views also have different
-    /// values.
+    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. It differs for views with
+    /// the same number and different proposers, and for thousands of consecutive views.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

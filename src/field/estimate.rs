@@ -81,8 +81,8 @@ pub struct Estimate {
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// An estimate from so few samples can still be bad. Example: 100 samples, and a true alpha below 1.5. Then most
-    /// estimates exist only because alpha is overestimated by chance, and the estimated Upsilon is too low.
+    /// An estimate from so few samples can still be bad. With 100 samples and a true alpha below 1.5, most estimates
+    /// exist only because alpha is overestimated by chance. The estimated Upsilon is then too low.
     pub const MIN_SAMPLES: u32 = 100;
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.

@@ -18,7 +18,7 @@ pub(crate) mod tests;
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
 /// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least two steps of an
-/// f32 even near Rx, so that positions stay distinct.
+/// f32 even near Rx, so that no two positions are equal.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
@@ -645,19 +645,20 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the gain A of the first hop. The SIR of this hop is A times [`crate::sir::quiet`], the inverse
-    /// interference, divided by the squared length. With one interferer A is the power of Tx divided by the power of
-    /// the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
+    /// Returns the gain A of the first hop. The SIR of this hop is A times the inverse interference
+    /// ([`crate::sir::quiet`]), divided by the squared length. With one interferer A is the power of Tx divided by the
+    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Returns the gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
-    /// [`crate::sir::quiet`], the inverse interference, divided by the squared length. With one interferer the gain
-    /// is (`p_u` / `p_MSI`) (eta / `mu_los`): the powers of relay and interferer, and the path-loss factors drone to
-    /// ground and drone to drone. In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's
-    /// largest E[1/I].
+    /// Returns the gain of a hop from a relay of `power_w` watts to another drone.
+    ///
+    /// The hop's SIR is this gain times the inverse interference ([`crate::sir::quiet`]), divided by the squared
+    /// length. With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). `p_u` and `p_MSI` are the powers of
+    /// relay and interferer, eta and `mu_los` the path-loss factors drone to ground and drone to drone. In an
+    /// interference field the gain is `p_u` `Upsilon_max` / `mu_los`, with the field's largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)

@@ -127,8 +127,8 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx (`None` for Tx itself),
-    /// `after` the node toward Rx (`None` for Rx).
+    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx (`None` for Tx), `after` the
+    /// node toward Rx (`None` for Rx).
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,

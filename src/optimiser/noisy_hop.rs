@@ -49,12 +49,12 @@ const STEPS: u8 = 32;
 /// Maximum number of steps of a search by bisection, each of which at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
-/// Number of Newton steps for the hop length at which the margin g changes its curvature. g is 0 or above where a hop
-/// with noise meets its target.
+/// Number of Newton steps for the hop length at which the curvature of the margin g changes its sign. g is 0 or above
+/// where a hop with noise meets its target.
 const TURNS: u8 = 5;
 
-/// Rounding error of the margin of a hop with noise, relative to the value that the target requires. A target that is
-/// missed by at most this error counts as met.
+/// Rounding error of the margin of a hop with noise, relative to the required value. A target that is missed by at most
+/// this error counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of the hop length below which the search for the maximum length ends.
@@ -82,8 +82,8 @@ pub(super) struct NoisyHop {
 }
 
 impl NoisyHop {
-    /// Returns the maximum hop length along x, m, at which the SNR alone meets the target, at most 1e9. `None` if the
-    /// SNR is too low at every length.
+    /// Returns the hop length along x, m, up to which the SNR alone meets the target, at most 1e9. `None` if no length
+    /// does.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -119,8 +119,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the margin g changes its curvature's sign. `None` if g
-    /// is concave everywhere. g, the hop's margin, is 0 or above where the target is met.
+    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes its sign. `None` if
+    /// g is concave everywhere. g is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -134,9 +134,8 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
-    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually
-    /// five.
+    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m; `None` if there is none.
+    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -166,8 +165,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if none does. This
-    /// length is a root of the margin g, which is 0 or above at lengths that meet the target.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if there is none. The
+    /// margin g is 0 there; at lengths that meet the target it is 0 or above.
     ///
     /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
@@ -192,8 +191,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target. This length is the root of the
-    /// margin g, which is 0 or above at lengths that meet the target.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 there; at
+    /// lengths that meet the target it is 0 or above.
     ///
     /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {

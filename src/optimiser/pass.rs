@@ -160,8 +160,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
-    /// meet `target` in both directions, and two relays must be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target` in both
+    /// directions. Two relays must also be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -225,8 +225,7 @@ impl<'a> Link<'a> {
 
     /// Returns the maximum x of the previous relay in a pass toward Tx, m.
     ///
-    /// No separation in x is reserved for the relays toward Rx, because relays at different altitudes can be above each
-    /// other.
+    /// Relays nearer to Rx need no separation in x: at different altitudes they can be above each other.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
@@ -316,9 +315,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to
-    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. If the SIR from Rx would be too low
-    /// at `reach`, the relay stays short of `reach`.
+    /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
+    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if its
+    /// SIR from Rx would be too low there.
     fn held(
         &self,
         hop: &FromRx,
@@ -416,8 +415,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the
-/// reaches of this last relay, and `from` the reaches of the relay before it on the pass, m.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the reaches
+/// of this relay, and `from` those of the previous relay of the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -432,8 +431,8 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this
-    /// target. `None` if no target is committed and the search goes on.
+    /// Index of the committed target in the pass's list of targets. The relays take their positions for this target.
+    /// `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
     /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
     /// target.
@@ -472,8 +471,7 @@ impl Verdict {
 }
 
 /// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different altitudes,
-/// some lower targets can be missed. They count all the same.
+/// is 0 or more. In a varying field, or with different altitudes, lower targets can be missed; they count all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -532,8 +530,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. No relay has
-    /// the index 0. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. `index` is 0
+    /// for no relay: the result is then `Some` if all relays can take their reaches.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -562,8 +560,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. No relay has the
-    /// index 0. With index 0 the result is `Some` if all relays can take their required positions, else `None`.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. `index` is 0 for no
+    /// relay: the result is then `Some` if all relays can take their required positions.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

@@ -125,7 +125,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// Some relays may have to stay short of their farthest position; their positions are then checked, too.
+/// If some relays have to stay short of their farthest position, their positions are checked, too.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.

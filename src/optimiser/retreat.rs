@@ -68,9 +68,10 @@ const ULPS: u8 = 8;
 /// target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A of the hop, m^2. The SIR of the hop is A times `quiet`, divided by the squared length. Upsilon = E[1/I]
-    /// is the mean inverse of the interference power I. `quiet` is Upsilon at the receiver divided by the field's
-    /// largest Upsilon. For the hop to Rx, A includes Upsilon at Rx, and `quiet` is 1.
+    /// Gain A of the hop, m^2. The hop's SIR is A times `quiet`, divided by the squared length.
+    ///
+    /// `quiet` is Upsilon at the receiver divided by the field's largest Upsilon. Upsilon = E[1/I] is the mean inverse
+    /// of the interference power I. For the hop to Rx, A includes Upsilon at Rx, and `quiet` is 1.
     gain: f32,
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
@@ -107,10 +108,10 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns this hop together with the backward hop, if the mission has traffic in both directions.
+    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx.
     ///
-    /// The sender of the backward hop has `power_w` watts; with `None` the sender is Rx. The receiver of the backward
-    /// hop is the sender of this hop. It has measured `measured_per_w`: Upsilon, the mean inverse interference power,
+    /// The backward hop's sender, which receives this hop, has `power_w` watts; `None` if it is Rx. The backward hop's
+    /// receiver, which sends this hop, has measured `measured_per_w`: Upsilon, the mean inverse interference power,
     /// 1/W.
     pub(super) fn both_ways(
         self,
@@ -362,8 +363,7 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions. There are at most
-    /// two such hops.
+    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions: at most two.
     ///
     /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
     /// backward gain, each divided by the target.

@@ -132,8 +132,8 @@ impl Back {
         }
     }
 
-    /// Returns the distance along x from the interferer below which a receiver misses `target`, m. The backward hop
-    /// has the squared length `squared`, m^2. `None` if every receiver misses the target.
+    /// Returns the distance along x from the interferer, m, below which a receiver misses `target`. `None` if every
+    /// receiver misses it. The backward hop has the squared length `squared`, m^2.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
@@ -141,9 +141,9 @@ impl Back {
 
 /// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
 ///
-/// q is s / (1 + `noise` s). s is the squared distance from the interferer, m^2; `aside_squared` is the part of s
-/// across x. q is the inverse of interference plus noise. `None` if q is less than `needed` at any distance, because
-/// of the noise.
+/// q = s / (1 + `noise` s) is the inverse of interference plus noise. s is the squared distance from the interferer,
+/// m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed` at any distance, because of
+/// the noise.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

@@ -81,8 +81,7 @@ pub struct Search {
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the bracket before the last pass: `infeasible` / `feasible` - 1. The bracket is the interval
-    /// that contains the best target.
+    /// Relative width of the bracket before the last pass: `infeasible` / `feasible` - 1.
     width: f32,
     ladder: Ladder,
     tried: u32,
@@ -306,9 +305,10 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The cubic curve passes
-/// through the four points next to the change of sign. `None` if the cubic curve and a straight line give very
-/// different roots: the slack then jumps, and neither root is meaningful.
+/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target).
+///
+/// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
+/// different target: the slack then jumps, and neither target is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -417,7 +417,7 @@ impl Search {
     }
 
     /// Selects the next target of the bisection. Once the interval is small enough, it selects the best accepted
-    /// target, with which the search ends.
+    /// target, and the search ends.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

@@ -68,10 +68,7 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for the computation of its maximum length for many targets.
-///
-/// The terms that do not depend on the target are precomputed, so that each target takes three divisions and a square
-/// root.
+/// Hop toward Rx, prepared so that its maximum length for a target takes three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -298,8 +295,8 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. The receiver is at
-    /// `place`; `None` if there is no such x.
+    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`; `None` if there is
+    /// none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -465,8 +462,8 @@ impl Hop {
 /// Relative tolerance of a hop's SIR for rounding errors, when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the rounded value equals `from_m`, because two
-/// relays must not have the same x.
+/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the result equals `from_m`: two relays must not have
+/// the same x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"

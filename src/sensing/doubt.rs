@@ -73,8 +73,8 @@ const REST: u8 = 4;
 /// the second a squared relative difference. The larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays to identify a faulty relay. With four relays, an exclusion leaves three measurements, and
-/// the three unknowns fit any three measurements.
+/// Minimum number of relays to identify a faulty relay. With four relays only three measurements are left, which always
+/// fit the three unknowns.
 const FEWEST: u16 = 5;
 
 /// Minimum number of measured positions to find a faulty relay. Older positions count less, see [`Sums::count`].
@@ -90,9 +90,10 @@ enum Stage {
     /// Trial: a sensing pass that leaves out the measurements of the node with this number. If the measurements of
     /// the other nodes fit far better then, that node is faulty.
     Trying(u16),
-    /// Notice: a sensing pass that informs the faulty node, which has this number, that it is excluded. There are two
-    /// such passes in a row. In the first pass the flag is false, and the measurements of the other nodes are
-    /// discarded. In the second pass the flag is true, and the measurements of the other nodes give the estimate.
+    /// Notice: a sensing pass that tells the faulty node, which has this number, that it is excluded.
+    ///
+    /// There are two such passes. In the first one the flag is false, and the measurements of the other nodes are
+    /// discarded. In the second one the flag is true, and they give the estimate.
     Announcing(u16, bool),
 }
 
@@ -236,7 +237,7 @@ fn narrow(number: f64) -> f32 {
 /// Factor between a relay's measurement and the estimate, up or down, above which the relay doubts its measurement.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far off the estimate
+/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. It is then far off the estimate
 /// `expected` at that place, and does not fit the other relays' measurements, whose sums are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
@@ -302,8 +303,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. The squared difference
-/// ((ratio - 1 / ratio) / 2)^2 must exceed two numbers: `deviations` times the variance `unsure`, and `least`.
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. ((ratio - 1 / ratio) /
+/// 2)^2 must then exceed both `deviations` times the variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -333,8 +334,8 @@ impl EndLevel {
     }
 }
 
-/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it. The conversion
-/// uses the mission's path loss over the ground.
+/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it by the mission's
+/// path loss.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)

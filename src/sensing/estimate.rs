@@ -132,8 +132,8 @@ const LEARNED: f64 = 1.1;
 /// interference changes.
 const REFINED: u8 = 4;
 
-/// Time that drones are assumed to need to fly a few metres. The position of a moving interferer is predicted this
-/// far ahead, plus half the interval between two collections of measurements.
+/// Time that drones are assumed to need for a few metres. A moving interferer is predicted this far ahead, plus half
+/// the interval between two sensing passes.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
 /// Mean square relative error of measurements above which they contradict the estimated source. The relays then treat
@@ -273,8 +273,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit to all measurements, and the source of interference that the fit gives. If the level measured at Tx
-/// or at Rx does not fit, it is cleared in `levels`.
+/// Returns the fit to all measurements, and the source of interference by this fit. Clears a level in `levels`,
+/// measured at Tx or Rx, that does not fit.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -359,9 +359,10 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean of two
-/// powers, weighted by their variances: the power measured at Rx, and the power computed for Rx from `source` and the
-/// path loss. If the two differ too much, the measured power is returned.
+/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it.
+///
+/// It is the mean of the power measured at Rx and the power computed from `source` and the path loss, weighted by their
+/// variances. If the two differ too much, it is the measured power.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,

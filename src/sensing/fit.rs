@@ -57,8 +57,8 @@ struct Factor {
     full_rank: bool,
 }
 
-/// Minimum pivot of the matrix factorisation, relative to the first pivot. With a smaller pivot the measured positions
-/// cannot separate the unknowns of the fit.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
+/// separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -223,8 +223,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and small errors. The errors are small if their
-    /// variance is below four times the variance that the operator expects.
+    /// Returns true if the fit has more positions than unknowns, and a variance below four times the variance that the
+    /// operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -339,9 +339,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from the terms of a position to the inverse interference v = 1e-12 W / I there. I is the
-/// interference power of the mission's interferer. The function gives `None` without a known source, or outside of
-/// the measurable range.
+/// Returns a function that converts the terms of a position to v = 1e-12 W / I there, by the mission's interferer. I is
+/// the interference power. The function gives `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()

@@ -82,8 +82,8 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is the middle of the measurable
-/// range, so that the square of v is in the range of an f32.
+/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is in the middle of the measurable
+/// range, so that an f32 holds the square of v.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
@@ -132,8 +132,8 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums that a pass along the chain collects. They are products of terms, terms times v, v squared, number
-/// of positions, number of measurements, and age.
+/// Number of sums that a sensing pass collects: products of terms, terms times v, v squared, number of positions,
+/// number of measurements, and age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.

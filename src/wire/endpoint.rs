@@ -71,8 +71,8 @@ impl Endpoint {
         None
     }
 
-    /// Checks the authentication tag of `frame`. Counts every result but a valid new message in `stats`. `None` if
-    /// this node does not use authentication.
+    /// Checks the authentication tag of `frame`; `None` if this node does not use authentication. Counts every result
+    /// but a valid new message in `stats`.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -91,14 +91,14 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once a signing node has used all frame counters. It must not send any more frames until it restarts
-    /// with a new epoch, because a counter must not be used twice.
+    /// Returns true once a signing node has used all frame counters. It must not send before it restarts with a new
+    /// epoch, because a counter must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Encodes `message`, which goes to node `to`, into `frame`. If node `to` cannot verify this node's tags yet, a
-    /// handshake is written instead, and the caller sends the message later.
+    /// Encodes `message` to node `to` into `frame`. If node `to` cannot verify this node's tags yet, a handshake is
+    /// written instead, and the caller sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,

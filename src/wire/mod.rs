@@ -30,6 +30,5 @@ pub const MAX_NODE: u16 = 4094;
 /// Number of nearest nodes in one direction to which hellos are sent. One of them becomes the neighbour.
 pub(crate) const CANDIDATES: u16 = 4;
 
-/// Maximum length on the wire of a sweep message with its frame, bytes. A sweep is a pass of up to sixteen target
-/// SIRs.
+/// Maximum length on the wire of a sweep message with its frame, bytes. A sweep carries up to sixteen target SIRs.
 pub const MAX_SWEEP: usize = 100 + auth::TAG_ROOM;

@@ -67,8 +67,8 @@ const PEERS: usize = 8;
 /// nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
-/// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. A smaller number
-/// can be due to delayed frames.
+/// Number of consecutive handshakes of an older epoch that show that the node's epoch went back. Delayed frames can
+/// cause a smaller number.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -79,8 +79,8 @@ struct Peer {
     /// True if the next handshake requests a reply in any case. If false, it requests one only until the node has
     /// proved its presence.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce. The repetition proves that the node is present, and that
-    /// both nodes know each other's nonce.
+    /// True if the node has repeated this relay's nonce. The node is then present, and both nodes know each other's
+    /// nonce.
     proven: bool,
     /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
@@ -254,8 +254,8 @@ impl Session {
 
     /// Schedules a handshake that requests a reply from the silent node `to`.
     ///
-    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce;
-    /// with it the node could continue its former session and use frame counters twice.
+    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce.
+    /// The node could then continue its former session, and use frame counters twice.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
@@ -453,9 +453,11 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates a table entry for `node` if there is none. If the table is full, it replaces an entry that is not
-    /// pinned: if possible the entry of a node without proof of presence, otherwise the least recently used entry.
-    /// After four billion entries the function creates no more, because a nonce must not be used twice.
+    /// Creates a table entry for `node` if there is none.
+    ///
+    /// If the table is full, it replaces an entry that is not pinned: if possible the entry of a node without proof of
+    /// presence, otherwise the least recently used one. After four billion entries it creates no more, because a nonce
+    /// must not be used twice.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;

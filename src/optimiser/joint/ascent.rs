@@ -107,8 +107,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain. `slack` is the chain's slack, m, for the target `sigma`. Targets are in ln(SIR), and never fall
-    /// below `floor`.
+    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR), and
+    /// never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -161,8 +161,8 @@ impl Ascent {
         true
     }
 
-    /// Continues after the upper limit on the chain's slack was lowered; returns the next action. `slack` is the
-    /// chain's slack under the new limit, m.
+    /// Returns the next action after the upper limit on the chain's slack was lowered. `slack` is the chain's slack
+    /// under the new limit, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -297,8 +297,8 @@ impl Ascent {
         turn
     }
 
-    /// Accepts the trial chain, in which the relays made the fraction `share` of their computed moves. Returns the next action. `slack` is
-    /// the chain's slack, m, for the target `sigma`, in ln(SIR).
+    /// Accepts the trial chain, in which the relays made the fraction `share` of their computed moves; returns the next
+    /// action. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -317,8 +317,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR). Returns the next action. `slack` is the chain's
-    /// slack for this target, m.
+    /// Returns the next action after the target of the unchanged chain was raised to `sigma`, in ln(SIR). `slack` is
+    /// the chain's slack at this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

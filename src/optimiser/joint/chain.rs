@@ -102,9 +102,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. If `level` is
-    /// true, the altitude is constant before the first and after the last of these relays. Otherwise it falls to the
-    /// band's lowest altitude at Tx and at Rx.
+    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude.
+    ///
+    /// Before the first and after the last of them the altitude is constant if `level` is true. Otherwise it falls to
+    /// the lowest permitted altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -141,8 +142,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (slack, outlook)
     }
 
-    /// Returns an upper bound on the chain's SIR, as ln(SIR). The bound is the smaller of the maximum SIRs of the
-    /// first and the last hop.
+    /// Returns an upper bound on the chain's SIR, in ln(SIR): the smaller of the maximum SIRs of the first and the last
+    /// hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = self.seat(self.relays());
         let first = self.room(1);
@@ -151,8 +152,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the lowest target, as ln(SIR), for which every hop has a maximum length. It is just above the largest
-    /// gain of a hop. With a lower target, a hop beyond the interferer could have any length.
+    /// Returns the lowest target, in ln(SIR), that limits the length of every hop. It is just above the largest gain of
+    /// a hop. With a lower target, a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);

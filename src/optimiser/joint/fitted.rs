@@ -91,7 +91,7 @@ pub struct SlotShares {
     /// direction both are 1: the slot is empty.
     pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
-    /// times this value.
+    /// times this.
     pub bits_per_hz: f32,
 }
 

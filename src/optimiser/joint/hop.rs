@@ -178,8 +178,8 @@ impl Coordinate {
         self.restored(at)
     }
 
-    /// Returns a symmetric 3 x 3 matrix with its rows and columns reordered: the coordinate `self` first. The other
-    /// two coordinates follow in the order x, y, h.
+    /// Returns a symmetric 3 x 3 matrix with reordered rows and columns: the coordinate `self` first, then the other
+    /// two in the order x, y, h.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.ordered(bend).map(|row| self.first(row))
     }

@@ -56,7 +56,7 @@ impl Line {
     };
 
     /// Continues Algorithm 1 by some relays, for the target `sigma`, in ln(SIR). Ready with `None` if the target cannot
-    /// be met, otherwise with true if some relay has to stay short of its farthest x.
+    /// be met. Otherwise ready with true if some relay has to stay short of its farthest x, else false.
     ///
     /// `cells` has the lateral offsets and altitudes, and `notes` receives the x. Relay 1 stays at least the first of
     /// `closed` away from Rx, and the last relay at least the second away from Tx, as fractions of the distance from Tx to
@@ -179,8 +179,8 @@ fn hop<const RELAYS: usize>(
     .ending(end_m)
 }
 
-/// Returns the chain's slack, m, and the final x of the last relay, m. `reaches` are the farthest x of the last but one
-/// and of the last relay, m, and `end_m` is the upper limit of the last relay's x.
+/// Returns the chain's slack, m, and the final x of the last relay, m. `reaches` are the farthest x of the last two
+/// relays, m, and `end_m` is the upper limit of the last relay's x.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,

@@ -58,8 +58,8 @@ impl Outlook {
     }
 
     /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
-    /// distance that the relay lacks, m^2; `slope` and `by_target` are the derivatives of `near` with respect to the
-    /// position and to ln(target SIR).
+    /// distance that the relay lacks, m^2. `slope` and `by_target` are the derivatives of `near` by the position and by
+    /// ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -73,9 +73,9 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (slack) of a hop's receiver to the value function of the hop's sender. Returns the
-    /// receiver's policy: its move in two coordinates, within [`low`, `high`], m, relative to its present position.
-    /// The third coordinate, `axis`, then follows from the hop's maximum length.
+    /// Replaces the value function of a hop's receiver by that of the hop's sender, and returns the receiver's policy.
+    /// The policy is a move in two coordinates, within [`low`, `high`], m, relative to the present position. The third
+    /// coordinate, `axis`, follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -156,8 +156,8 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 
 /// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
 ///
-/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the
-/// move of the sending relay, the next relay toward Tx.
+/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the move
+/// of the sender, the next node toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,

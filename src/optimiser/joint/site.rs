@@ -83,8 +83,8 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the position of largest x at the lateral offset and altitude `at` that meets `target`. The sender is
-    /// at x = `from_m`. `None` if no x meets `target`.
+    /// Returns the position of largest x that meets `target` at the lateral offset and altitude `at`; `None` if there
+    /// is none. The sender is at x = `from_m`.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -185,8 +185,8 @@ impl<'a> Site<'a> {
 
     /// Returns the relay's new lateral offset and altitude after a fraction of its computed move.
     ///
-    /// `policy` gives the move, and `share` the fraction of the move. The sender has already moved by `change` to
-    /// `from`. The relay itself is still at `nominal`. The hop has to meet `target`.
+    /// `policy` gives the move, and `share` the fraction. The sender has already moved by `change` to `from`, but the
+    /// relay is still at `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -291,9 +291,9 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point at which the line from `best` to `wanted` leaves a circle. The points are lateral offsets and
-/// altitudes. `middle` is the circle's centre, and `rim` its squared radius, m^2. `None` if `best` is outside of the
-/// circle.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle; `None` if `best` is outside of the
+/// circle. The points are lateral offsets and altitudes. `middle` is the circle's centre, and `rim` its squared radius,
+/// m^2.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -514,8 +514,8 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if its distance suffices. The penalty is subtracted from the
-    /// chain's slack.
+    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The chain's
+    /// slack is reduced by the penalty.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
@@ -581,9 +581,9 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// The selected coordinate is not at a limit of its permitted range, `low` to `high`, and F changes most with it.
-    /// x is preferred. F is half the margin of the hop to its target: 0 for a hop of
-    /// maximum length (see `hop`). The second result is the derivative of F with respect to the selected coordinate.
+    /// It is not at a limit of its permitted range, `low` to `high`, and F changes most with it; x is preferred. F is
+    /// half the margin of the hop to its target: 0 for a hop of maximum length (see `hop`). The second result is the
+    /// derivative of F by the selected coordinate.
     fn axis(
         &self,
         c: f32,

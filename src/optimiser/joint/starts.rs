@@ -34,9 +34,10 @@ pub(super) enum Start {
     /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
     /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation. The relays
-    /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
-    /// it. The corner is at the highest altitude, on the side away from the interferer.
+    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation.
+    ///
+    /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position one
+    /// separation beside it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
     /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
     Near,
@@ -135,9 +136,10 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer. The sender of the hop to
-    /// this relay is at `from`. `c` is the target SIR divided by the sender's gain; it determines the length of the
-    /// hop. `room` has the permitted ranges.
+    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer.
+    ///
+    /// The hop to this relay comes from `from`. `c` is the target SIR divided by the sender's gain; it determines the
+    /// length of the hop. `room` has the permitted ranges.
     pub(super) fn around(
         self,
         distance_m: f32,

@@ -130,13 +130,13 @@ impl Hello {
     }
 }
 
-/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions, so
-/// that two nodes with the same number detect each other.
+/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions along
+/// the chain, so that two nodes with the same number detect each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim number wins. A node
-    /// draws the number at its start, and raises it at most once while it is active.
+    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim
+    /// number wins. A node draws it at its start, and raises it at most once while it is active.
     pub number: u32,
     /// Last claim number received from another node with the claiming node's node number; 0 for none.
     pub other_number: u32,

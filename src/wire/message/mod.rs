@@ -32,8 +32,8 @@ const SWEEP: usize = 88;
 /// Maximum length of a message body other than a mission offer, bytes.
 const LONG: usize = if SENSING { round::HEARD } else { SWEEP };
 
-/// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it
-/// is the collection of measurements, or a sweep.
+/// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it is
+/// a sensing message (with measurements) or a sweep.
 pub const MAX_BODY: usize = if Upload::OFFER > LONG {
     Upload::OFFER
 } else {
@@ -102,8 +102,8 @@ pub enum Message {
     Decision(Decision),
     /// Either direction: limit of x (fence) that keeps two neighbouring relays apart.
     Fence {
-        /// Digest by which two neighbours check that they have the same x axis. It covers the mission loaded before
-        /// flight, and the Tx and Rx positions of an uploaded mission.
+        /// Digest that shows two neighbours if they have the same x axis. It covers the mission loaded before flight,
+        /// and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
         /// Content of the message: the sender's limit of x, its agreed position, and flags.
         fence: Fence,

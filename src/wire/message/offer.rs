@@ -47,8 +47,8 @@ impl Upload {
     }
 }
 
-/// Uploaded mission on the wire. The struct is packed, so its size in memory is the length on the wire, from which
-/// [`Upload::LENGTH`] is computed.
+/// Uploaded mission on the wire. The struct is packed: its size in memory is the length on the wire, see
+/// [`Upload::LENGTH`].
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {

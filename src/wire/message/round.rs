@@ -415,8 +415,8 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes: the sum of the lengths of its fields. The fields are the tag, the pass,
-/// the estimate, the sums, the interference level at Rx, and the excluded node.
+/// Length of a sensing message's body, bytes: the tag, the pass, the estimate, the sums, the interference level at Rx,
+/// and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
 /// Sensing message: interference estimate, and sums of measurements. In a pass the sums cover the relays up to the

@@ -36,8 +36,8 @@ pub struct Poll {
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Relays
-    /// must not use positions of the new view before.
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second; 65535 if unknown. Until
+    /// then relays must not use positions of the new view.
     pub earlier_lease_left: u16,
     /// Latest view after `agreed` that a polled member has accepted; `None` without such a view. It may be agreed on
     /// already.

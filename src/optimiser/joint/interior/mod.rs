@@ -171,8 +171,8 @@ enum Work {
     Accept(u16),
     /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and a flag: `true` for
-    /// the second half of the segment. The second half is computed before the first half.
+    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and a flag: true for the
+    /// segment's second half, which is computed before its first half.
     Substitute(u16, bool),
 }
 
@@ -337,8 +337,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and Lagrange multipliers of hop `k`. This hop leads to relay `k`, or to Rx if `k` is
-    /// N + 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`, which leads to relay `k`, or to Rx if `k` is N +
+    /// 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {

@@ -52,8 +52,8 @@ type Row = [f32; 5];
 /// Equations of one relay after its elimination, from which its Newton step follows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal
-    /// elements are stored as inverses, because they are divisors.
+    /// Cholesky factor of the relay's 3 x 3 matrix: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is stored as
+    /// inverses, because it is a divisor.
     lower: [f32; 6],
     /// Linear equations for the relay's steps in x, y and h, one row each.
     rows: [Row; 3],
@@ -82,8 +82,8 @@ impl Weights {
         [a / s, b / t]
     }
 
-    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is mu, the barrier
-    /// weight, divided by the slack.
+    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop: the barrier weight mu
+    /// divided by the slack.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }

@@ -50,8 +50,8 @@ enum Along {
     /// First and last x of evenly spaced relays, counted from the end with more power, as fractions of the distance
     /// from Tx to Rx.
     Even([f32; 2]),
-    /// x from Algorithm 1, without the x that the function `close_beyond` excludes. Lateral offsets and altitudes
-    /// follow part of an ellipse down to the end with less power.
+    /// x from Algorithm 1, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow part of an
+    /// ellipse down to the end with less power.
     Arc,
 }
 

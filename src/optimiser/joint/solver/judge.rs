@@ -22,7 +22,7 @@ pub(super) const CEILING: f32 = 5e-5;
 
 /// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
 ///
-/// At this target the search checks if the chain already reaches the bound; if so, the search ends.
+/// The search then checks if the chain reaches the bound; if so, the search ends.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {

@@ -67,8 +67,8 @@ enum Work {
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for the segment with this number.
     Back(u8),
-    /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target as
-    /// ln(SIR), and true to store the chain, false for a trial.
+    /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target in
+    /// ln(SIR), and a flag: true to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
