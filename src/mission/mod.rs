@@ -313,8 +313,9 @@ pub struct Mission {
     /// ground and drone to drone, and `p_MSI` is the interferer's power. In an interference field the gain is
     /// `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's
-    /// power, divided by the squared distance.
+    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's power,
+    /// divided by the squared distance.
+    ///
     /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
     /// field it is Upsilon(D) / eta. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,

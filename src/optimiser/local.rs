@@ -1,9 +1,9 @@
 //! Algorithm 2's local search: the position of one relay that maximises the worse of its two hops.
 //!
-//! It searches the rectangle between the neighbours along x and within `explore` of the current altitude, by one of two methods.
-//! The paper's is a grid. The other goes from coarse to fine: five altitudes, of which the best one and its neighbours bound the
-//! next five; for each altitude the x where the SIRs of both hops are equal is found by bisection. Where all hops are equal, as
-//! after Algorithm 1, a grid has no better point, but this method finds one.
+//! It searches between the neighbours along x, and within `explore` of the current altitude, by one of two methods. The
+//! paper's method is a grid. The other method goes from coarse to fine: of five altitudes, the best one and its
+//! neighbours bound the next five. At each altitude, the x where the SIRs of both hops are equal is found by bisection.
+//! Where all hops are equal, as after Algorithm 1, a grid has no better point, but this method finds one.
 //!
 //! With data in both directions each hop counts by its worse direction, and a relay close to the interferer receives
 //! both neighbours worse. So there may be several maxima along x on each side of the interferer: smooth ones, and
@@ -254,7 +254,7 @@ impl LocalSearch {
             round: if nowhere { ROUNDS } else { 0 },
             row: 0,
             column: if nowhere { u8::MAX } else { 0 },
-            // If no row of a round is allowed, this altitude bounds the next round; one outside of the band would lead out of it.
+            // If no altitude of a round is allowed, this one bounds the next round, so it must be inside the band.
             best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
             found: None,
             best_sir: hops.worse(at),

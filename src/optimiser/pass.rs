@@ -5,6 +5,7 @@
 //! closest to Tx from which the previous relay of the pass receives this relay; again the best x of the previous relay
 //! counts. So no chain that meets the target is excluded, and a missed target is out of reach of every chain. See
 //! [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may have to hold back.
+//!
 //! When the verdict travels back along the chain, each relay takes its position, and
 //! [`required_position`](Link::required_position) returns the position that the previous relay of the pass must take.
 //! In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.

@@ -540,7 +540,7 @@ pub(super) fn least(
             continue;
         }
         let slope = (end - start) / (right.x_m - left.x_m);
-        // The points at which the root is c slope / 2, and at which it is just long enough to count.
+        // The points at which the root is c slope / 2, and at which the root is just long enough to count.
         let steepest = (square(0.5 * c * slope) + apart) / c;
         let shortest = least_apart / c * (1.0 + 1e-6);
         for quiet in [steepest, shortest] {

@@ -1,16 +1,18 @@
-//! Search for the highest target that the chain meets. Selection of the next targets from the results of the last ones.
+//! Search for the highest target that the chain meets. The results of a pass select the targets of the next one.
 //!
-//! It implements both schedules of Algorithm 1. The paper's tries gamma_0, gamma_0 - epsilon, ..., one per sweep. The bracketed
-//! one tries a ladder of targets per sweep. Feasibility is monotone in the target, so the optimum is between the highest target
-//! that was met and the lowest that was missed. The slacks are smooth in log gamma, so inverse interpolation places the dense
-//! middle of the next ladder, while its ends still span the *bracket*: the range of targets that may be the highest feasible one.
+//! It implements both schedules of Algorithm 1. The paper's schedule tries gamma_0, gamma_0 - epsilon, ..., one in each
+//! pass. The bracketed schedule tries a ladder of targets in each pass. A chain that meets a target also meets lower
+//! ones, so the optimum is between the highest target that was met and the lowest that was missed. The slacks are
+//! smooth in log gamma, so inverse interpolation places the dense middle of the next ladder. Its ends still span the
+//! *bracket*: the range of targets that may be the highest feasible one.
 //!
 //! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as met. All
 //! other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
 //!
-//! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be one, and the
-//! relay whose required position is in it refuses. Then a plain pass finds a target that is certain, and the interval between
-//! that and the refused one is bisected. Every accepted target is flown; the last pass is for the best one.
+//! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be a
+//! hole, and a relay whose required position is in it refuses. Then a plain pass finds a target that no relay can
+//! refuse, and the interval between this target and the refused one is bisected. Every accepted target is flown; the
+//! last pass is for the best one.
 
 use core::ops::Range;
 
@@ -172,7 +174,7 @@ impl Search {
     /// do not try all chains. `None` for data in both directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if REVERSE && self.both_ways {
-            // Reaches and held positions of both directions are not proven to exclude no chain.
+            // For data in both directions it is not proven that reaches and held positions exclude no chain.
             return None;
         }
         if self.plain || self.trials.is_some() {

@@ -252,7 +252,8 @@ impl Hop {
             return None;
         }
         if d >= room {
-            // With C < 0 the feasible interval is entirely beyond the end; otherwise rounding put the root on it.
+            // With C < 0 the feasible interval is entirely beyond the end; otherwise rounding has put the root on the
+            // end.
             return if c < 0.0 { None } else { Some(self.end_m) };
         }
         rounded(from_m, d)
@@ -421,7 +422,8 @@ impl Hop {
             return Some(place);
         }
         let heard = hop.through_noise()?;
-        // Below A the target may be met on two intervals, the one before the sender being no hop; above A on one.
+        // Below A the target may be met on two intervals, but the one before the sender is no hop. Above A it is met on
+        // one.
         let least = if hop.excess > 0.0 { -heard } else { 0.0 };
         Some(from_m + hop.last(least, heard.min(most))?)
     }

@@ -11,19 +11,19 @@
 //! | pass | excluded | result | next |
 //! | --- | --- | --- | --- |
 //! | usual | none | fits, or the last trial failed less than [`REST`] passes ago | usual |
-//! | usual | none | does not fit, with four relays or fewer | usual, and the result counts: the faulty relay is unknown |
+//! | usual | none | does not fit, with four relays or fewer | usual; the measurements are used |
 //! | usual | none | does not fit | trial of relay 1 |
 //! | trial of n | n | variance of the others | trial of n + 1 |
 //! | trial of the last | last | without one relay the others fit far better than without any other | first notice |
-//! | trial of the last | last | no such relay: the faulty one is unknown | usual, and the result counts |
+//! | trial of the last | last | no such relay: the faulty one is unknown | usual; the measurements are used |
 //! | first notice | faulty relay | | second notice |
-//! | second notice | faulty relay | measurements of the others | usual, and the result counts |
+//! | second notice | faulty relay | measurements of the others | usual; the measurements are used |
 //!
-//! A relay with an absurd measurement, a factor of 300 off the estimate and inconsistent with the others, excludes
-//! itself at once, and reports that in the reply of the pass.
+//! A relay excludes itself at once if its measurement is absurd: a factor of 300 off the estimate, and inconsistent
+//! with the others. It reports that in the reply of the pass.
 //!
-//! A relay that is excluded from two successive passes excludes itself from then on, until it fits the others again. No new
-//! estimate is adopted from the first pass of a trial to its last.
+//! A relay that is excluded from two successive passes excludes itself from then on, until it fits the others again. No
+//! new estimate is adopted from the first pass of a trial to its last.
 //!
 //! # Transmitter and ground receiver
 //!

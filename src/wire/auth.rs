@@ -47,7 +47,7 @@ impl defmt::Format for Key {
     }
 }
 
-/// Credentials with which a relay signs its frames.
+/// Credentials of a relay for signing its frames.
 ///
 /// ```
 /// use uav_relay::{Auth, Key, Settings};
@@ -108,7 +108,7 @@ impl Nonces {
     }
 }
 
-/// Key and nonces with which one node authenticates its frames to another.
+/// Key and nonces of one node for authenticating its frames to another.
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,

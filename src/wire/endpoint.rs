@@ -164,7 +164,7 @@ impl Endpoint {
         }
     }
 
-    /// Schedules an authentication handshake to node `to`, by which both learn each other's nonce.
+    /// Schedules an authentication handshake to node `to`. Both nodes then learn each other's nonce.
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = self.session_mut() {
             session.greet(to);

@@ -1,10 +1,11 @@
 //! Sessions: authentication of received frames and signing of sent ones, with one session per node.
 //!
-//! Toward each other node a relay has a *nonce*: its epoch, and in the lower half a number that counts up from the relay's claim
-//! number (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender. So a
-//! frame that was recorded before either of them started, or had forgotten the other, is rejected. The other's nonce comes in a
-//! *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the sender knows it, and whether the sender
-//! still lacks the proof that the receiver is present.
+//! Toward each other node a relay has a *nonce*: its epoch in the upper half, and in the lower half a number that
+//! counts up from the relay's claim number (`node::duplicate`). A frame's tag covers two nonces: the sender's toward
+//! the receiver, and the receiver's toward the sender. So a recorded frame is rejected once one of the two has
+//! restarted or has forgotten the other. A node learns the other's nonce from a *handshake*. The body of a handshake is
+//! the sender's nonce, the receiver's nonce as far as the sender knows it, and a flag: true if the sender still lacks
+//! the proof that the receiver is present.
 //!
 //! | handshake with the right tag and | action |
 //! | --- | --- |
@@ -20,10 +21,10 @@
 //! with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by
 //! another pending message, if there is one.
 //!
-//! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It is no proof,
-//! because it does not contain this relay's new nonce: it is no sign of life, it causes nothing but a handshake, and an old nonce
-//! is replaced by the current one, which is larger. So it does no lasting harm: before the current handshake, nothing can be sent
-//! to that node.
+//! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It does
+//! not contain this relay's new nonce, so it is no proof that its sender is present: it causes only a handshake in
+//! reply. If its nonce is old, the current nonce is larger and replaces it. So it does no lasting harm: before the
+//! current handshake, nothing can be sent to that node.
 
 use super::auth::{Auth, Key, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;

@@ -1,8 +1,9 @@
 //! Step control of an ascent: the target's increase, the fraction of the step, and the trust region.
 //!
-//! A backward pass gives the slack's derivative by ln gamma and the expected gain of the steps. A forward pass tries the steps
-//! with the target that they should just allow. The trial is accepted if its zero-slack target is higher than before. Otherwise a
-//! smaller fraction of the step is tried, and after the last one a smaller trust region.
+//! A backward pass gives the slack's derivative by ln gamma and the expected gain of the steps. A forward pass tries
+//! the steps, together with the target that they should just allow. The trial is accepted if the chain's zero-slack
+//! target becomes higher. Otherwise a smaller fraction of the steps is tried, and after the last fraction a smaller
+//! trust region.
 
 use super::outlook::Outlook;
 
@@ -211,7 +212,7 @@ impl Ascent {
         if self.is_within(SETTLED) {
             return AscentStep::Over;
         }
-        // Slack that can only be used by a higher target.
+        // The relays' moves gain little here: only a higher target can use the slack.
         if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
             return AscentStep::Raise;
         }

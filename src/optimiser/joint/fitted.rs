@@ -6,13 +6,14 @@
 //! time = sum over hops of  1 / b(F) + r / b(B)
 //! ```
 //!
-//! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is concave there. So the
-//! best chain mostly has a few long hops, and the other relays gather at their minimum separation: a sum with many local optima
-//! across which no derivative leads. But each term depends on two neighbours only. So if every relay may stay or move by one or two
-//! widths along one coordinate, the best of all 5^N combinations follows from one pass over the relays (dynamic programming; Viterbi
-//! 1967). The method repeats such passes over x, y and altitude, halves the width when a round gains little, and begins with a
-//! width at which relays jump from one group to another. No step raises the time. It needs no derivatives, and the minimum separation
-//! is simply a condition of each hop.
+//! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is
+//! concave there. So the best chain mostly has a few long hops, and the other relays gather at their minimum
+//! separation. The sum has many local optima, and derivatives do not lead from one to another. But each term depends on
+//! two neighbours only. So if every relay may stay or move by one or two widths along one coordinate, one pass over the
+//! relays finds the best of all 5^N combinations (dynamic programming; Viterbi 1967). The method repeats such passes
+//! over x, y and altitude, and halves the width when a round gains little. With the first width, relays jump from one
+//! group to another. No step raises the time. The method needs no derivatives, and the minimum separation is simply a
+//! condition of each hop.
 //!
 //! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
 //! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.

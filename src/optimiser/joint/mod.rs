@@ -8,8 +8,7 @@
 //! | --- | --- |
 //! | `hop` | the reach of a hop with its derivatives, with and without noise, and the choice of the dependent coordinate |
 //! | `outlook` | the value function: the slack as a quadratic in a relay's position; a relay's step, and its feedback |
-//! | `site` | one relay and the hop to it: its part of the forward pass and of the backward pass; its permitted lateral
-//! offsets and altitudes |
+//! | `site` | one relay and the hop to it, in the forward and the backward pass; its permitted offsets and altitudes |
 //! | `ascent` | step control: the increase of the target, and the accepted fraction of the step |
 //! | `chain` | data shared by both solvers: the chain, a segment of it, the profile of one relay |
 //! | `interior` | data in both directions: the interior-point method |

@@ -1,7 +1,7 @@
 //! Initial chains of the ascents. They pass the interferer low, in an arch over it, on either side, or beyond it.
 //!
-//! A chain is a shortest path in a metric that weights a metre by its proximity to the interferer, so there is a local optimum on
-//! each side of the interferer. The best one depends on the room, the power and the number of relays; all are tried.
+//! A chain is a shortest path in a metric in which a metre weighs more near the interferer. So there is a local optimum
+//! on each side of the interferer. The best one depends on the room, the power and the number of relays; all are tried.
 //!
 //! An ascent starts at the highest target that its unchanged chain meets.
 

@@ -248,7 +248,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         } else if let Along::Even(_) = start.along {
             Work::Put(0)
         } else {
-            // The common altitude is compared, so its target is as exact as those of results.
+            // Results are compared with the chain at the common altitude, so its target is as exact as theirs.
             let width = if self.number > 0 { 0.02 } else { JUDGED };
             Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, width), Purpose::Start)
         }

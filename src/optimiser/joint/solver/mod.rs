@@ -1,17 +1,17 @@
 //! Solver of a whole chain by the joint method, from the mission alone and without messages.
 //!
-//! Differential dynamic programming stores a policy for every relay between the backward and the forward pass. To need only six
-//! bytes per relay, the chain is cut into segments: only the value function at the end of each is stored, and the policies of a
-//! segment are computed again in the forward pass.
+//! Differential dynamic programming stores a policy for every relay between the backward and the forward pass. To need
+//! only six bytes per relay, the chain is cut into segments. Only the value function at the end of each segment is
+//! stored, and the policies of a segment are computed again in the forward pass.
 //!
-//! A start is dropped as soon as it will end no higher than the best one, or has diverged. The remaining starts are skipped once
-//! a chain meets the ceiling of its first or last hop.
+//! An initial chain is dropped as soon as it will end no higher than the best one, or has diverged. The remaining
+//! initial chains are skipped once a chain meets the maximum SIR of its first or last hop.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, and a pass without changes |
 //! | `line` | the sweep's rules: Algorithm 1 for the stored lateral offsets and altitudes |
-//! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `judge` | the steps after a target is found: the next initial chain, or the polish |
 //! | `both` | the solver for both directions |
 //!
 //! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
