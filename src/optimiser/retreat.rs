@@ -471,8 +471,8 @@ struct Piece {
     start_m: f32,
     /// Largest x of this part of the interference field, m.
     end_m: f32,
-    /// Upsilon at the smallest x of this part, divided by the field's largest Upsilon. Upsilon is the mean inverse
-    /// interference power.
+    /// Upsilon, the mean inverse interference power, at the smallest x of this part, divided by the field's largest
+    /// Upsilon.
     level: f32,
     /// Change of `level` per metre of x.
     slope: f32,

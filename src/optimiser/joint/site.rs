@@ -411,7 +411,8 @@ impl Room {
         }
     }
 
-    /// Returns the largest lateral offset, m, on the side away from the interferer.
+    /// Returns the largest permitted lateral offset away from the interferer, m: the limit on the other side of the
+    /// line.
     pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
         if interferer.y_m > 0.0 {
             self.lateral.least_m

@@ -92,7 +92,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
                 (Some((sigma, _)), Purpose::Last) => {
                     if self.best.is_none_or(|(best, _)| sigma > best) {
                         self.best = Some((sigma, self.number));
-                        // Searches by the sweep's rules do not change the cells.
+                        // Searches with the hops exactly as in flight do not change the cells.
                         self.best_cells = self.cells;
                         self.best_judged = self.judged_at;
                         // A diverged ascent has not reached its target.

@@ -10,7 +10,7 @@
 //! | file | content |
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, and a pass without changes |
-//! | `line` | the sweep's rules: Algorithm 1 for the stored lateral offsets and altitudes |
+//! | `line` | Algorithm 1 for the stored lateral offsets and altitudes, exactly as the relays compute it in flight |
 //! | `judge` | the steps after a target is found: the next initial chain, or the polish |
 //! | `both` | the solver for both directions |
 //!
@@ -82,16 +82,16 @@ enum Purpose {
     Tighten,
     /// Search for the highest target of an improved chain, with the margins of the improvement.
     Judge,
-    /// Search for the highest target of an improved chain by the sweep's rules.
+    /// Search for the highest target of an improved chain, with the hops exactly as in flight.
     Last,
-    /// Check if the chain meets the upper bound of all chains by the sweep's rules.
+    /// Check if the chain meets the upper bound of all chains, with the hops exactly as in flight.
     Probe,
-    /// Check of a trial move of one relay by the sweep's rules.
+    /// Check of a trial move of one relay, with the hops exactly as in flight.
     Move,
 }
 
 impl Purpose {
-    /// Returns true if hops are computed as the relays compute them from messages (the sweep's rules).
+    /// Returns true if hops are computed exactly as the relays compute them in flight, from messages.
     ///
     /// A relay is then allowed to stay short of its farthest position.
     const fn is_sweep(self) -> bool {
@@ -128,7 +128,7 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     work: Work,
     pass: ForwardPass,
     line: Line,
-    /// x of each relay and its upper limit, m, during a search by the sweep's rules.
+    /// x of each relay and its upper limit, m, during a search with the hops exactly as in flight.
     notes: [[f32; 2]; RELAYS],
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
