@@ -67,7 +67,7 @@ pub enum Event {
         /// Index of the node that signs with another key.
         node: u16,
     },
-    /// Five handshakes in a row from a node have an old epoch (start counter), so the node's frames are rejected.
+    /// Five handshakes in a row from a node have an old epoch (start counter). The node's frames are rejected.
     ///
     /// The key is right, but the node did not increase its epoch at its last start. The epoch is smaller than the last
     /// known one, or equal with the same seed. A handshake with a newer epoch starts the count again. An operator

@@ -14,7 +14,7 @@ use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::root::{PowerRatio, bisected, sqrt};
 
-/// Returns the inverse interference at `at`: the factor in a hop's SIR that depends on the interference.
+/// Returns the inverse interference at `at`, the factor in a hop's SIR that depends on interference.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of
 /// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise

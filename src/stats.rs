@@ -41,8 +41,8 @@ pub struct Stats {
     /// Received intact frames from a node that is no neighbour. On a point-to-point link also frames for another
     /// node.
     pub misaddressed: u32,
-    /// Received messages from the wrong neighbour: messages along the chain that came from the next relay, or replies
-    /// that came from the previous relay.
+    /// Received messages along the chain from the next relay, or replies from the previous relay. Both come from the
+    /// wrong neighbour.
     pub misdirected: u32,
     /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and

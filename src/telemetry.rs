@@ -40,7 +40,7 @@ pub struct Report {
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node whose messages the relay ignores because of another mission; `None` for none.
+    /// Number of the nearest node that the relay ignores because of another mission; `None` for none.
     pub other_mission: Option<u16>,
     /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
     pub other_key: Option<u16>,

@@ -47,7 +47,8 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: one transmitter at a known or unknown position, or a distribution along x (a field).
+    /// Interference on the hops: one transmitter, at a known or unknown position, or a field. A field is a distribution
+    /// along x.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
@@ -178,8 +179,7 @@ pub struct Interferer {
     pub power_w: f32,
     /// Position of the interferer along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
     pub x_m: f32,
-    /// Lateral offset of the interferer from the line Tx to Rx, m: positive to the right of the line, negative to the
-    /// left.
+    /// Lateral offset of the interferer, m: positive to the right of the line Tx to Rx, else negative.
     pub y_m: f32,
 }
 
@@ -601,8 +601,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions: toward Rx (relay 1 to N), or in an interference
-    /// field toward Tx (relay N to 1).
+    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to N), or in an
+    /// interference field toward Tx (relay N to 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
@@ -611,7 +611,7 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, the first relay to compute its position: 1, or N in an interference field.
+    /// Returns the index of the leader, which computes its position first. It is 1, or N in an interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -716,8 +716,8 @@ impl Mission {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, that leaves the relays computed after it room for their
-    /// separation.
+    /// Returns the farthest allowed x of relay `index`, m, with room for the separation of later relays. Later relays
+    /// are those whose positions are computed after this one.
     ///
     /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the largest squared
     /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
@@ -725,8 +725,8 @@ impl Mission {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, without room for the separation of the relays computed after
-    /// it.
+    /// Returns the farthest allowed x of relay `index`, m, without room for the separation of later relays. Later
+    /// relays are those whose positions are computed after this one.
     ///
     /// Farthest means toward Rx, or toward Tx in an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
@@ -741,7 +741,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves the relays between it and Rx room for their separation.
+    /// Returns the largest x of relay `index`, m, with room for the separation of the relays nearer to Rx.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }

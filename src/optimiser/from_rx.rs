@@ -99,8 +99,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay stays farther from Rx than the start at 650 m, where its SIR from Rx is too low. A
-    /// strong interferer is at x = 700 m, and Rx at x = 1000 m.
+    /// Checks that the last relay stays farther from Rx if its SIR from Rx is too low. The search starts at x = 650 m,
+    /// a strong interferer is at x = 700 m, and Rx at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

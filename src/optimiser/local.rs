@@ -64,7 +64,7 @@ pub struct HopEnd {
     pub power_w: f32,
 }
 
-/// Hops of a relay at any position: from the node toward Tx to the relay, and from the relay to the node toward Rx.
+/// Two hops of a relay at any position: from the node toward Tx, and to the node toward Rx.
 ///
 /// l is the squared length of a hop, and q the inverse interference at the relay. For the hop from the node toward Tx
 /// the SIRs are A q / l, with the gain A, and backward `returned` / l. For the hop to the node toward Rx they are
@@ -299,8 +299,8 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude in the range of the current round, m: 0 for `part` is the lowest altitude, 1 the highest.
-    /// The result never exceeds the highest altitude, in spite of rounding.
+    /// Returns an altitude in the range of the current round, m. `part` 0 is the lowest altitude, 1 the highest. The
+    /// result never exceeds the highest altitude, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }

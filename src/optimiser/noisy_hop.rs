@@ -74,8 +74,8 @@ pub(super) struct NoisyHop {
     pub(super) aside_squared: f32,
     /// Squared distance b^2 of the receiver from the sender perpendicular to x, m^2.
     pub(super) across_squared: f32,
-    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2, computed without cancellation. a is from
-    /// the receiver to the interferer, b from the receiver to the sender.
+    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the interferer,
+    /// b from the receiver to the sender. The difference is computed without cancellation.
     pub(super) base: f32,
     /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,
@@ -119,8 +119,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes its sign. `None` if
-    /// g is concave everywhere. g is 0 or above where the target is met.
+    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes sign. `None` if g is
+    /// concave everywhere. g is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -134,7 +134,7 @@ impl NoisyHop {
         Some(sqrt(((w - v) / self.noise).clamp(0.0, 1e18)))
     }
 
-    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m; `None` if there is none.
+    /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
     /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
@@ -165,7 +165,7 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if there is none. The
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. `None` if there is none. The
     /// margin g is 0 there; at lengths that meet the target it is 0 or above.
     ///
     /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.

@@ -1,4 +1,4 @@
-//! Pass of target SIRs along the chain: the relays' reaches, the last relay's verdict, and the positions.
+//! Pass of target SIRs along the chain: the relays' reaches, the last relay's verdict, the positions.
 //!
 //! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it receives the previous relay. The previous
 //! relay may be at any x up to its own reach; the best of these x counts. Toward Tx (Algorithm 4) the reach is the x
@@ -161,8 +161,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target` in both
-    /// directions. Two relays must also be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. Both
+    /// directions must meet it, and two relays must be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -307,8 +307,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x, m, up to `most_m`, at which this relay receives the previous relay of the pass. The
-    /// previous relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the pass's previous relay. The previous
+    /// relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),

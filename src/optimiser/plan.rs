@@ -162,8 +162,7 @@ pub fn solve(
 }
 
 impl Mission {
-    /// Returns the position that relay `index` computes without messages, for relays that all have the mission's
-    /// profile.
+    /// Returns the position that relay `index` computes without messages. All relays must have the mission's profile.
     ///
     /// This position is, to the bit, the position on which relays agree by messages:
     /// `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`. `None` if no target can be met.

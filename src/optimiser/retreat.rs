@@ -145,7 +145,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest permitted x of the receiver, m: the sender's smallest permitted x plus the minimum step.
+    /// Returns the smallest permitted x of the receiver, m. It is the sender's smallest permitted x plus the minimum
+    /// step.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -363,7 +364,8 @@ impl<'a> Retreat<'a> {
         least(interference, self.gain / target, squares, low, high, value)
     }
 
-    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions: at most two.
+    /// Returns the x of the receiver, m, for each hop that just meets the target in both directions. There are at most
+    /// two.
     ///
     /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
     /// backward gain, each divided by the target.
@@ -464,15 +466,16 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Part of the interference field in which Upsilon = E[1/I], the mean inverse interference power, is linear in x.
+/// Part of the interference field in which Upsilon is linear in x. Upsilon = E[1/I] is the mean inverse interference
+/// power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
     /// Smallest x of this part of the interference field, m.
     start_m: f32,
     /// Largest x of this part of the interference field, m.
     end_m: f32,
-    /// Upsilon, the mean inverse interference power, at the smallest x of this part, divided by the field's largest
-    /// Upsilon.
+    /// Upsilon at the smallest x of this part, divided by the field's largest Upsilon. Upsilon is the mean inverse
+    /// interference power.
     level: f32,
     /// Change of `level` per metre of x.
     slope: f32,

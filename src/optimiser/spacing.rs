@@ -68,7 +68,7 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared so that its maximum length for a target takes three divisions and a square root.
+/// Hop toward Rx, prepared for many targets. Its maximum length for a target takes three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -274,9 +274,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, at which both directions meet `target`, for a sender in [0, `from_m`].
-    /// `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The result is larger
-    /// than `place` if a sender at a smaller x receives the backward hop better.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
+    /// `from_m`]. `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The result
+    /// is larger than `place` if a sender at a smaller x receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -296,7 +296,7 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`; `None` if there is
+    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. `None` if there is
     /// none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);

@@ -46,27 +46,27 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Ratio of the measurements' variance to the variance that the operator expects, above which the search for a faulty
-/// relay starts.
+/// Variance of the measurements, divided by the expected one, above which a faulty relay is searched. The operator sets
+/// the expected variance.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum drop of the fit's residual without the faulty relay, as a multiple of the variance of the other
-/// measurements.
+/// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the other measurements.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit at which the search for a faulty relay starts, and its minimum drop without this relay.
-/// The residual is the sum of squared relative errors. One measurement that is wrong by some 15 % causes this residual.
+/// Minimum residual of the fit, and minimum drop without one relay, that can show a faulty relay. The residual is the
+/// sum of squared relative errors. One measurement that is wrong by some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
 /// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
 /// to a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative differences between consistent measurements and their fit: a standard deviation of
-/// 0.32, or some 1.5 dB.
+/// Maximum variance of the relative differences between consistent measurements and their fit. The standard deviation
+/// is 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
-/// Number of sensing passes (collections of measurements) between a failed search for a faulty relay and the next one.
+/// Number of sensing passes between a failed search for a faulty relay and the next one. A sensing pass collects
+/// measurements.
 const REST: u8 = 4;
 
 /// Limits within which an excluded relay's measurement fits the others again. The first is a multiple of the variance,
@@ -115,7 +115,7 @@ pub(crate) struct Trial {
     second: f32,
 }
 
-/// Action after a sensing pass (a collection of measurements), as decided by the search for a faulty relay.
+/// Action after a sensing pass, as decided by the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the measurements of this sensing pass for the interference estimate.
@@ -234,7 +234,8 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Factor between a relay's measurement and the estimate, up or down, above which the relay doubts its measurement.
+/// Factor between measurement and estimate above which a relay doubts its measurement. A factor below the inverse has
+/// the same effect.
 const ABSURD: f32 = 300.0;
 
 /// Returns true if the measurement at `place` is absurd, so that the relay excludes it. It is then far off the estimate
@@ -334,8 +335,8 @@ impl EndLevel {
     }
 }
 
-/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it by the mission's
-/// path loss.
+/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it. The conversion uses
+/// the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)

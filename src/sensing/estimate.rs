@@ -107,15 +107,15 @@ const WORTH: f64 = 1e-5;
 /// can mean that the interference itself has changed.
 const CHANGE: f64 = 1e-4;
 
-/// Minimum ratio of an estimate's mean square change to the change expected by chance, for a stationary source. Below
-/// it the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a stationary source.
+/// Below it the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to the change expected by chance, for a moving source. Below it
-/// the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a moving source. Below
+/// it the new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum ratio of the estimate's mean square change to the change expected by chance that shows another interferer.
-/// It applies after [`REFINED`] refinements, for a stationary source.
+/// Minimum ratio of the change of the estimate to the change by chance that shows another interferer. Both are mean
+/// square changes. It applies after [`REFINED`] refinements, for a stationary source.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
@@ -128,8 +128,8 @@ const ASTRAY: f64 = 4.0;
 /// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
 /// measured positions divided by the error variance of one position.
 const LEARNED: f64 = 1.1;
-/// Number of refined estimates after which a chain with a stationary interferer gets no new estimate until the
-/// interference changes.
+/// Number of refined estimates after which an estimate stays until the interference changes. It is for a stationary
+/// interferer.
 const REFINED: u8 = 4;
 
 /// Time that drones are assumed to need for a few metres. A moving interferer is predicted this far ahead, plus half
@@ -147,7 +147,7 @@ const GUESSED: f64 = 16.0;
 /// Quality of the current estimate when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information in the measurements: the number of positions divided by the error variance of one position.
+    /// Information in the measurements: number of positions divided by the error variance of one position.
     information: f64,
     /// Expected mean square relative error of the current estimate.
     chance: f64,
@@ -438,8 +438,8 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Squared deviation of a new position from the track, divided by the track's variance, above which the track starts
-/// again for another interferer.
+/// Squared deviation of a new position from the track that shows another interferer. It is divided by the track's
+/// variance. The track then starts again.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.

@@ -223,8 +223,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and a variance below four times the variance that the
-    /// operator expects.
+    /// Returns true if the fit has more positions than unknowns, and a small variance. It must be below four times the
+    /// variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -236,16 +236,16 @@ impl Fit {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference in interference between two sources at the measured positions. Each
-    /// source is given by its four coefficients ([`coefficients`]).
+    /// Returns the mean square relative difference of two sources' interference at the measured positions. Each source
+    /// is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_difference(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference in interference between the fit and another source at the measured
-    /// positions. That source is given by its four coefficients ([`coefficients`]).
+    /// Returns the mean square relative difference in interference between the fit and another source. It is the mean
+    /// over the measured positions. The source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
@@ -322,8 +322,8 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error that the measurements would have with a source of these `coefficients`.
-/// `sums` are the sums of the measurements.
+/// Returns the mean square relative error of the measurements if a source had these `coefficients`. `sums` are the sums
+/// of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
     let [a, b, c, d] = *coefficients;
@@ -339,8 +339,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function that converts the terms of a position to v = 1e-12 W / I there, by the mission's interferer. I is
-/// the interference power. The function gives `None` without a known source, or outside of the measurable range.
+/// Returns a function that converts the terms of a position to v = 1e-12 W / I there. I is the interference power of
+/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()

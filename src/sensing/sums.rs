@@ -42,7 +42,8 @@ impl EndsOff {
     };
 }
 
-/// Interference levels measured at Tx and Rx, and the result of their last comparison with the relays' measurements.
+/// Interference levels measured at Tx and Rx, and the result of their last check. The check compares them with the
+/// relays' measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
     pub(crate) transmitter: Level,
@@ -132,8 +133,8 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums that a sensing pass collects: products of terms, terms times v, v squared, number of positions,
-/// number of measurements, and age.
+/// Number of sums that a sensing pass collects. They are products of terms, terms times v, v squared, number of
+/// positions, number of measurements, and age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.

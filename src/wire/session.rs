@@ -54,8 +54,8 @@ pub(crate) struct Rival {
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number, so that it wins against a node that starts later. Of two
-/// nodes with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number, to win against a node that starts later. Of two nodes
+/// with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.

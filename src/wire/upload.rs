@@ -19,8 +19,8 @@ pub struct Upload {
     /// Valid parameters of the uploaded mission. It has a single interferer: a mission with an interference field
     /// cannot be uploaded.
     config: MissionConfig,
-    /// Positions of Tx and Rx of this mission; `None` to use the positions that the relays are configured with. The
-    /// positions are valid, but each relay still checks that they fit the mission.
+    /// Positions of Tx and Rx of this mission; `None` for the positions in the relays' configuration. The positions are
+    /// valid, but each relay still checks that they fit the mission.
     sites: Option<Sites>,
 }
 

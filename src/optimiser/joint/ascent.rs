@@ -7,7 +7,7 @@
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed moves that an iteration tries, in this order, until the chain improves.
+/// Fractions of the relays' computed moves. An iteration tries them in this order until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
 /// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. It also limits
@@ -21,8 +21,8 @@ const RESTRAINED: f32 = 0.05;
 /// Trust (limit of the relays' moves) below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum assumed rate at which a rising ln(target SIR) shortens the chain, in distances from Tx to Rx. The rate is a
-/// divisor; it is usually 0.5.
+/// Minimum assumed rate at which a rising ln(target SIR) shortens the chain. The unit of length is the distance from Tx
+/// to Rx. The rate is a divisor; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
 /// First increase of the target's limit, in ln(SIR). The limit is raised if the chain meets it but misses the upper
@@ -52,7 +52,7 @@ const FORESEEN: f32 = 1e-4;
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest shortfall from Rx at which a chain is improved again, as a fraction of the distance from Tx to Rx.
+/// Largest shortfall from Rx of a chain that is improved again. The unit is the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -63,7 +63,7 @@ pub(crate) enum AscentStep {
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute new moves of the relays for the current chain, by a backward pass from the last relay to the first.
+    /// Compute new moves of the relays by a backward pass, from the last relay to the first.
     Again,
     /// End the improvement of this chain, or repeat the improvement with a lower limit on the slack.
     Over,
@@ -190,8 +190,8 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain: the gain of slack
-    /// expected from the relays' moves, and the change of slack with the target.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the gain
+    /// of slack expected from the relays' moves, and the change of slack with the target.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
@@ -219,7 +219,8 @@ impl Ascent {
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) is expected to change by less than `by`, from the slack and the relays' moves.
+    /// Returns true if ln(target SIR) is expected to change by less than `by`. The change follows from the slack and
+    /// the relays' moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -284,8 +285,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next action after a trial that did not improve the chain: a trial with a smaller fraction of the
-    /// computed moves. After the smallest fraction, new moves are computed with a lower maximum length.
+    /// Returns the next action after a trial that did not improve the chain. It is a trial with a smaller fraction of
+    /// the computed moves. After the smallest fraction, new moves are computed with a lower maximum length.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -298,8 +299,8 @@ impl Ascent {
         turn
     }
 
-    /// Accepts the trial chain, in which the relays made the fraction `share` of their computed moves; returns the next
-    /// action. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
+    /// Accepts the trial chain, and returns the next action. The relays made the fraction `share` of their computed
+    /// moves. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);

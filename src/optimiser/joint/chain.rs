@@ -1,4 +1,4 @@
-//! Chain that the joint method solves: senders, fixed altitudes, and the maximum SIRs of the first and the last hop.
+//! Chain that the joint method solves: senders, fixed altitudes, maximum SIRs of its end hops.
 //!
 //! A [`Seat`] has the power of a relay and its allowed lateral offsets and altitudes. A chain is stored in segments:
 //! the value function at the end of each segment, and the policies of one.
@@ -128,7 +128,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain for `target`, m, and its derivatives by the position `at` of the last relay.
+    /// Returns the slack of the chain for `target`, m, and its derivatives. They are by the position `at` of the last
+    /// relay.
     ///
     /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
@@ -142,8 +143,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (slack, outlook)
     }
 
-    /// Returns an upper bound on the chain's SIR, in ln(SIR): the smaller of the maximum SIRs of the first and the last
-    /// hop.
+    /// Returns an upper bound on the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
+    /// the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = self.seat(self.relays());
         let first = self.room(1);
@@ -246,7 +247,8 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays whose computed moves are in memory at one time: one segment, or 0 without the feature `altitude`.
+/// Number of relays whose computed moves are in memory at one time. It is one segment, or 0 without the feature
+/// `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 

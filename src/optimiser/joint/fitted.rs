@@ -263,8 +263,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Moves up to [`OTHERS_AT_ONCE`] relays, after the first `done`, to their positions in the current initial chain.
-    /// The first pass over the chain follows after the last relay.
+    /// Moves relays to their positions in the current initial chain. They are up to [`OTHERS_AT_ONCE`] relays after the
+    /// first `done`. The first pass over the chain follows after the last relay.
     fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.relays();
@@ -466,8 +466,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back, as fractions of the frame.
-    /// `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
+    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are fractions of the
+    /// frame. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {

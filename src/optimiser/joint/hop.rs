@@ -59,10 +59,10 @@ pub(super) struct Reach {
     /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
     /// of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end by the other two coordinates of the end, w_1 and
-    /// w_2. The order is w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end. They are by the other two coordinates w_1 and
+    /// w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m, with the other two coordinates
+    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The other two coordinates are
     /// constant.
     pub(super) by_target: f32,
 }
@@ -178,8 +178,8 @@ impl Coordinate {
         self.restored(at)
     }
 
-    /// Returns a symmetric 3 x 3 matrix with reordered rows and columns: the coordinate `self` first, then the other
-    /// two in the order x, y, h.
+    /// Returns a symmetric 3 x 3 matrix with reordered rows and columns. The coordinate `self` is first; the other two
+    /// follow in the order x, y, h.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.ordered(bend).map(|row| self.first(row))
     }

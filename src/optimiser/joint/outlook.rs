@@ -12,8 +12,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's slack as a quadratic function of one relay's position. It assumes
-/// that the relays toward Rx react optimally.
+/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. It assumes that the
+/// relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack with respect to the relay's x, y and h, m per m.
@@ -73,9 +73,9 @@ impl Outlook {
         }
     }
 
-    /// Replaces the value function of a hop's receiver by that of the hop's sender, and returns the receiver's policy.
-    /// The policy is a move in two coordinates, within [`low`, `high`], m, relative to the present position. The third
-    /// coordinate, `axis`, follows from the hop's maximum length.
+    /// Replaces the value function of a hop's receiver by its sender's; returns the receiver's policy. The policy is a
+    /// move in two coordinates, within [`low`, `high`], m, relative to the present position. The third coordinate,
+    /// `axis`, follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,

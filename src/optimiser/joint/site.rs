@@ -83,7 +83,7 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the position of largest x that meets `target` at the lateral offset and altitude `at`; `None` if there
+    /// Returns the position of largest x that meets `target` at the lateral offset and altitude `at`. `None` if there
     /// is none. The sender is at x = `from_m`.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
@@ -114,8 +114,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`: its centre and squared
-    /// radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is its centre
+    /// and squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -291,7 +291,7 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point at which the line from `best` to `wanted` leaves a circle; `None` if `best` is outside of the
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. `None` if `best` is outside of the
 /// circle. The points are lateral offsets and altitudes. `middle` is the circle's centre, and `rim` its squared radius,
 /// m^2.
 fn toward(
@@ -411,8 +411,7 @@ impl Room {
         }
     }
 
-    /// Returns the largest permitted lateral offset away from the interferer, m: the limit on the other side of the
-    /// line.
+    /// Returns the limit of the lateral offset, m, on the side of the line Tx to Rx without the interferer.
     pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
         if interferer.y_m > 0.0 {
             self.lateral.least_m
@@ -483,12 +482,12 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
 /// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Distance from a limit of its range within which a relay counts as at the limit, as a fraction of the distance from
-/// Tx to Rx.
+/// Distance from a limit of its range within which a relay counts as at the limit. The unit is the distance from Tx to
+/// Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative difference up to which the squared length of a hop counts as its maximum, for hops that end at the x of Rx.
-/// With a larger difference the hop does not restrict the move of its receiver.
+/// Relative difference up to which the squared length of a hop counts as its maximum. It is for hops that end at the x
+/// of Rx. With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {

@@ -83,7 +83,7 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral about the interferer: the logarithm of the distance from the interferer changes linearly with the angle.
+/// Spiral about the interferer: the logarithm of the distance from it changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,

@@ -187,8 +187,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass: passes, proposals and lease renewals,
-    /// but not the replies.
+    /// Returns true for messages that relays forward in the direction of a pass. They are passes, proposals and lease
+    /// renewals, but not the replies.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

@@ -1,4 +1,4 @@
-//! Messages of passes along the chain: sweeps and verdicts, profiles, tokens of Algorithm 2, measurements.
+//! Messages of passes along the chain: sweeps, verdicts, profiles, tokens of Algorithm 2, measurements.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -144,8 +144,8 @@ pub struct SweepVerdict {
     /// x that the destination must take if a target is committed, m. `None` for the farthest x that the destination has
     /// reported for this target.
     pub required_x_m: Option<f32>,
-    /// True if the power or fixed altitude of the sender, or of a later relay of the pass, differs from the mission's
-    /// common profile.
+    /// True if the power or fixed altitude of some relay differs from the mission's common profile. This relay is the
+    /// sender or a later relay of the pass.
     pub own: bool,
 }
 
@@ -198,8 +198,8 @@ pub struct OwnSeat {
 /// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles (altitude and power): in a pass those of the relays up to the sender, in the
-/// reply those of the whole chain.
+/// Message that collects relay profiles (altitude and power). In a pass it has those of the relays up to the sender, in
+/// the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -415,8 +415,8 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes: the tag, the pass, the estimate, the sums, the interference level at Rx,
-/// and the excluded node.
+/// Length of a sensing message's body, bytes. It has the tag, the pass, the estimate, the sums, the interference level
+/// at Rx, and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
 /// Sensing message: interference estimate, and sums of measurements. In a pass the sums cover the relays up to the

@@ -31,12 +31,12 @@ pub struct Poll {
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled; for the initial view, if the leader was polled. Exactly
-    /// half of the members' votes are then enough for a quorum.
+    /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer.
+    /// With the proposer, exactly half of the members' votes are enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second; 65535 if unknown. Until
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Until
     /// then relays must not use positions of the new view.
     pub earlier_lease_left: u16,
     /// Latest view after `agreed` that a polled member has accepted; `None` without such a view. It may be agreed on
@@ -296,7 +296,7 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by relays that need to leave or would join, from the last relay to the sender.
+/// Requests to the leader by relays that need to leave or would join. They are those from the last relay to the sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {

@@ -250,7 +250,7 @@ impl AirCapture {
         })
     }
 
-    /// Writes frames to the capture file: those whose transmission has ended, or all frames if `to_the_end` is true.
+    /// Writes the frames whose transmission has ended to the capture file. With `to_the_end` it writes all frames.
     fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
         let until = if to_the_end {
             uav_relay::Instant::from_micros(u64::MAX)

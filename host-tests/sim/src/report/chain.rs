@@ -114,7 +114,7 @@ pub struct ChainReport {
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Availability of the chain (the fraction of the time in which it had the best positions), and further statistics.
+    /// Availability of the chain, and further statistics. It is the fraction of the time with the best positions.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
     /// Replacement of drones with tired batteries; absent without `--fleet`.

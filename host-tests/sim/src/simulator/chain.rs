@@ -275,7 +275,7 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Handles all outputs of relay `index` (from 0): sends frames, logs events, and schedules the relay's next timer.
+    /// Handles all outputs of relay `index` (from 0): frames, events, and the time of the next timer.
     fn drain(&mut self, index: usize) {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];

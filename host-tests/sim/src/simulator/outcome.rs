@@ -220,7 +220,7 @@ pub struct Outcome {
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
     /// never two such drones at the same time.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest margin during the run, m: the distance of two drones minus the distance that they have to keep.
+    /// Smallest margin during the run, m: the distance of two drones minus the required distance.
     ///
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
@@ -232,7 +232,7 @@ pub struct Outcome {
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
     /// Two drones, their distance, and the time of the smallest margin, `margin_m`.
     pub margin_at: Option<Nearest>,
-    /// Number of position targets that relays sent while the autopilot accepted none, for example on the ground.
+    /// Number of position targets that relays sent while the autopilot accepted none, as on the ground.
     ///
     /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
     pub stray_targets: u64,

@@ -254,8 +254,8 @@ struct Queue {
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
     number: u32,
-    /// Integral of the queue's length over time until `counted`, in packets times ps, for the mean length in the
-    /// report.
+    /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean
+    /// length from it.
     sum: u128,
     counted: Ps,
     most: usize,

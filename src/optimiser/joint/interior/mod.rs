@@ -149,7 +149,8 @@ impl Spot {
         minus(self.high, self.at)
     }
 
-    /// Moves each coordinate at least `margin` inside its limits, as a fraction of the distance between the limits.
+    /// Moves each coordinate at least `margin` inside its limits. `margin` is a fraction of the distance between the
+    /// limits.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -250,8 +251,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.look(true);
     }
 
-    /// Sets relay `index` to `place`, but at least `margin` inside the limits of its coordinates, as a fraction of the
-    /// distance between the limits.
+    /// Sets relay `index` to `place`, but at least `margin` inside the limits of its coordinates. `margin` is a
+    /// fraction of the distance between the limits.
     pub(super) fn put(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -337,8 +338,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and Lagrange multipliers of hop `k`, which leads to relay `k`, or to Rx if `k` is N +
-    /// 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. It leads to relay `k`, or to Rx if `k` is N + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {

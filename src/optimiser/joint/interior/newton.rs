@@ -82,8 +82,8 @@ impl Weights {
         [a / s, b / t]
     }
 
-    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop: the barrier weight mu
-    /// divided by the slack.
+    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is the barrier weight
+    /// mu divided by the slack.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
@@ -191,8 +191,7 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations, and adds it to
-    /// `sums`.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds it to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {

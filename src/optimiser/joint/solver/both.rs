@@ -27,8 +27,8 @@ use core::task::Poll;
 /// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
-/// Fraction by which relays move toward even spacing before the interior-point method starts, to separate relays at the
-/// same x. The first value is for the first run of this method, the second for repetitions.
+/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays at
+/// the same x. The first value is for the first run of this method, the second for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Description of an initial chain, from the end with more power (Tx or Rx) to the other end.
@@ -47,8 +47,8 @@ struct Start {
 enum Along {
     /// x from Algorithm 1, for the relays' lateral offsets and altitudes.
     Line,
-    /// First and last x of evenly spaced relays, counted from the end with more power, as fractions of the distance
-    /// from Tx to Rx.
+    /// First and last x of evenly spaced relays, counted from the end with more power. They are fractions of the
+    /// distance from Tx to Rx.
     Even([f32; 2]),
     /// x from Algorithm 1, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow part of an
     /// ellipse down to the end with less power.
@@ -218,8 +218,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         Work::Begin(0)
     }
 
-    /// Chooses lateral offsets and altitudes of the current initial chain after its first `done` relays; returns the
-    /// next work. After the last initial chain, the next work is the final search for the best chain's target.
+    /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
+    /// relays have theirs already. After the last initial chain, the next work is the final search for the best chain's
+    /// target.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -307,8 +308,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Chooses the positions at which the interior-point method starts, after the first `done` relays, and starts it.
-    /// Lateral offsets and altitudes are the stored values. The x come from Algorithm 1, or are evenly spaced.
+    /// Chooses the positions at which the interior-point method starts, and starts it. The first `done` relays have
+    /// theirs already. Lateral offsets and altitudes are the stored values. The x come from Algorithm 1, or are evenly
+    /// spaced.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.relays();
@@ -387,6 +389,6 @@ const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Difference in ln(SIR) by which the first target to try exceeds the result of the interior-point method. It is the
-/// possible error of this method.
+/// Difference in ln(SIR) of the first target to try and the result of the interior-point method. It is the possible
+/// error of this method.
 const ABOVE: f32 = 1e-4;

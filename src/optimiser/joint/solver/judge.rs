@@ -155,8 +155,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target that the current chain meets, after an ascent (improvement
-    /// in steps).
+    /// Returns the work that searches for the highest target of the current chain, after an ascent. An ascent is an
+    /// improvement in steps.
     ///
     /// Hops are computed exactly as the relays compute them from their messages. Relays are allowed to stay short of
     /// their farthest position. The ascent ended at the target `sigma`, and `ceiling` is the upper bound of all chains,

@@ -209,7 +209,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the stored state of the segment whose first relay is `index`; `None` if no segment begins there.
+    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins there.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -221,7 +221,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 /// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
-/// Number of solvers for fitted slots (as long as each hop needs): 1 with the feature `altitude`, else 0.
+/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is as long as its hop
+/// needs.
 const FITTED: usize = ALTITUDE as usize;
 
 /// Joint solver of a chain: the solver for one direction, for both directions, or for fitted slots.
