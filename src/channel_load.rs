@@ -177,7 +177,7 @@ impl ChannelLoad {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Number of relays in range of each other, for which the channel is too slow.
+    /// Number of relays in range of each other that overload the channel.
     pub in_range: u16,
     /// Minimum data rate of a channel that carries these relays, bit/s.
     pub least_baud: u32,

@@ -30,11 +30,11 @@ pub struct Report {
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds its position, because of the neighbours toward Tx and toward Rx.
+    /// Reasons why the drone holds its position: because of the neighbour toward Tx, and toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// True for each neighbour, toward Tx and toward Rx, that the relay does not receive now.
+    /// True for a neighbour that the relay does not receive now: toward Tx, and toward Rx.
     pub silent: [bool; 2],
     /// True if the relay has received another node with its own number within three times `dead_after`.
     pub is_duplicated: bool,

@@ -2,8 +2,10 @@
 
 use crate::mission::MAX_RELAYS;
 
-/// Identifier of a view, an agreement on the members of the chain. It consists of a number and of the node that
-/// proposed the view, so that no two nodes propose the same view. Views are ordered by number, then by proposer.
+/// Identifier of a view, which is an agreement on the members of the chain.
+///
+/// It consists of a number and of the node that proposed the view, so that no two nodes propose the same view. Views
+/// are ordered by number, then by proposer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);

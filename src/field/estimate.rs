@@ -41,7 +41,7 @@ const FRACTION: u32 = 31;
 /// falsify the estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
-/// Estimator of the mean interference power at one position; samples are summed, not stored.
+/// Estimator of Upsilon, the mean inverse interference power, at one position. It stores sums, not samples.
 ///
 /// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, the true error is larger
 /// than the stated standard error.

@@ -53,9 +53,10 @@ pub struct MissionConfig {
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 means
-    /// one direction only, as in the paper. Above 0, the worse of two SIRs counts, once the interference is known:
-    /// the forward SIR, and the backward SIR divided by r.
+    /// SIR that a hop needs from Rx to Tx, divided by the SIR that it needs from Tx to Rx: r, 0 to 1.
+    ///
+    /// 0 means one direction only, as in the paper. Above 0, the lower of two SIRs counts once the interference is
+    /// known: the forward SIR, and the backward SIR divided by r.
     pub reverse: f32,
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
     /// 0.
@@ -206,7 +207,7 @@ pub enum Interference {
     Source(Interferer),
     /// Interference field: only the distribution of the interference along x is known.
     Field(Field),
-    /// Single interfering transmitter at an unknown position. Relays spread evenly until they find it
+    /// Single interfering transmitter at an unknown position. Relays spread evenly until they know it
     /// ([`crate::Settings::listen`]).
     Unknown,
 }
@@ -537,7 +538,7 @@ impl Mission {
         self.config.relays
     }
 
-    /// Returns the kind of interference that the relays suffer in this mission.
+    /// Returns the kind of interference in this mission.
     pub const fn interference(&self) -> &Interference {
         &self.config.interference
     }
@@ -578,7 +579,7 @@ impl Mission {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. 0 for one
+    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. It is 0 for one
     /// direction.
     ///
     /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
@@ -619,8 +620,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay whose position is computed after the position of relay `index`. `None` if relay `index` is
-    /// the last.
+    /// Returns the relay whose position is computed next after relay `index`. `None` if relay `index` is the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -733,7 +733,7 @@ impl Mission {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Returns the number of relays whose positions are computed after the position of relay `index`.
+    /// Returns the number of relays whose positions are computed after relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),

@@ -74,10 +74,10 @@ pub struct HopEnd {
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the hop from the previous node. The hop's SIR is A times the inverse interference, divided by the
+    /// Gain A of the hop from the node toward Tx. The hop's SIR is A times the inverse interference, divided by the
     /// squared length.
     gain: f32,
-    /// SIR of the relay's signal at the next node toward Rx, times the squared length of the hop, m^2.
+    /// SIR at the node toward Rx that receives this relay, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
@@ -88,9 +88,9 @@ pub struct Hops {
 /// Gains of both hops for data from Rx to Tx, divided by r; infinite for a mission without such data.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, m^2.
+    /// SIR at the node toward Tx that receives this relay, times the squared length of the hop, m^2.
     returned: f32,
-    /// Gain A' of the backward hop from the next node toward Rx to the relay.
+    /// Gain A' of the backward hop from the node toward Rx to the relay.
     gain: f32,
 }
 
@@ -210,7 +210,7 @@ impl Hops {
     }
 }
 
-/// Search for a relay's best position between its two neighbours, which is continued in steps.
+/// Search for a relay's best position between its two neighbours, in steps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,

@@ -28,8 +28,8 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Used only with data in
-/// both directions.
+/// Maximum number of positions that the last relay tries to receive Rx well enough. Used only with data in both
+/// directions.
 const HOLDS: u8 = 4;
 
 /// Maximum number of field points that one call evaluates. The evaluation of one target is completed even if it needs
@@ -57,7 +57,7 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data from which its reach for a target SIR is computed.
+/// Relay in a pass along the chain, with all data for its reach at a target SIR.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.

@@ -61,7 +61,7 @@ use crate::sir::{Sender, square};
 /// Relative tolerance, for rounding errors, on the maximum squared length of a hop toward Tx.
 const ROUNDING: f32 = 4e-6;
 
-/// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.
+/// Maximum number of f32 steps that shorten a computed hop until it meets its target.
 const ULPS: u8 = 8;
 
 /// Hop toward Rx in an interference field, with a receiver at a known position. It gives the sender's x for each

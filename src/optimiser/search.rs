@@ -330,8 +330,8 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Returns the value at 0 of the polynomial through `points`, pairs of x and value. `None` unless the x of
-/// consecutive points strictly fall.
+/// Returns the value at 0 of the polynomial through `points`, pairs of x and value. `None` unless the x strictly fall
+/// from point to point.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -351,8 +351,8 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest target that all relays accepted, with the list of targets (ladder) that proposes it again. `None`
-    /// until a target is accepted.
+    /// Highest target that all relays accepted, and the ladder that proposes it again. `None` until a target is
+    /// accepted.
     best: Option<(f32, Ladder)>,
     /// True once the bisection has ended. The best target found is then the result.
     over: bool,

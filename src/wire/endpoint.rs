@@ -20,8 +20,7 @@ pub(crate) struct Sent {
     pub(crate) len: usize,
 }
 
-/// Endpoint of one node: checks received frames, and addresses, numbers and signs sent frames. The endpoint has the
-/// node number, the frame counter, and the authentication sessions.
+/// Endpoint of one node: checks received frames; addresses, numbers and signs sent frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,

@@ -45,7 +45,7 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
+/// Expected increase of ln(target SIR) below which the final target of an improvement can be predicted.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which a chain that falls far short of Rx counts as diverged.
@@ -177,8 +177,8 @@ impl Ascent {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the limit of the target SIR, because the chain meets it but misses the upper bound. Returns the next
-    /// action.
+    /// Raises the limit of the target SIR; returns the next action. The chain has met the limit, but not the upper
+    /// bound.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;

@@ -71,7 +71,7 @@ const BEST_WIDTH: f32 = 1.0 / 16.0;
 /// largest lateral offset away from the interferer, the second from the common altitude to the highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
+/// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
 ///
 /// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
@@ -164,7 +164,7 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Sets the positions of an initial chain, some relays at a time. The field is the number of relays already set.
+    /// Choice of the positions of an initial chain, some relays at a time. The field is the number of relays done.
     Begin(u16),
     /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
     /// the next node to process: 1 for the first relay, N + 1 for Rx.

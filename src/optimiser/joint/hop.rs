@@ -131,9 +131,10 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s). q is the inverse of interference plus noise, and has the
-/// unit of s. s is the squared distance from the interferer, m^2. nu is the noise divided by the interferer's power
-/// received at 1 m, 1/m^2.
+/// Derivatives q'(s) and 2 q''(s) of the inverse of interference plus noise, q(s) = s / (1 + nu s).
+///
+/// s is the squared distance from the interferer, m^2, and q has the same unit. nu is the noise divided by the
+/// interferer's power received at 1 m, 1/m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -223,9 +224,7 @@ pub(super) struct Tangent {
     /// Difference `c` - 1, computed without cancellation. `c` is the target SIR divided by the gain, increased by
     /// noise.
     pub(super) e: f32,
-    /// Constant in the condition s + `spare` >= `c` l for a hop to meet its target, m^2; 0 without noise. s is the
-    /// squared distance from the hop's receiver to the interferer, and l the squared length of the hop. `c` is the
-    /// target SIR divided by the gain.
+    /// Constant in the condition s + `spare` >= `c` l of [`Tangent`], m^2; 0 without noise.
     pub(super) spare: f32,
 }
 

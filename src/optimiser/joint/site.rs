@@ -26,7 +26,7 @@ const TANGENTS: u8 = 3;
 /// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
 const HALVINGS: u8 = 12;
 
-/// Relay whose position the joint method computes, with the sender of the hop to it.
+/// Relay to be placed by the joint method, with the sender of the hop to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,

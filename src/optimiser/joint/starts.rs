@@ -57,10 +57,10 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of first entries of [`ARCHES`] that are also tried without the minimum separation of relays.
+/// Number of entries of [`ARCHES`], from the first, that are also tried without a separation.
 const THROUGH: usize = 3;
 
-/// Initial chains for relays of which some have a fixed altitude, as in [`Start::FixedAltitudes`].
+/// Initial chains for relays with fixed altitudes among them; see [`Start::FixedAltitudes`].
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),

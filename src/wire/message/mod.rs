@@ -62,9 +62,9 @@ impl Upload {
 pub enum Message {
     /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
     Sweep(Sweep),
-    /// Reply to a sweep of target SIRs: its verdict, the result for each target.
+    /// Reply to a sweep of target SIRs: the result for each target.
     Verdict(SweepVerdict),
-    /// Reply to a duplicate of a pass message or view proposal that has no result yet.
+    /// Reply to a duplicate pass message or view proposal: there is no result yet.
     Busy {
         /// Number of the pass in progress; for a view proposal, a 16-bit hash of the proposed view.
         number: u16,

@@ -276,7 +276,7 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Part of each lease renewal.
+/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Each lease renewal has them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {

@@ -1,8 +1,9 @@
 //! Interior-point method for the positions that maximise the worst SIR of both directions.
 //!
 //! With data in both directions a hop has two reaches, and in a sixth of the chains some hop is limited by both at
-//! once, where neither has a derivative. So differential dynamic programming, which follows one reach per hop, does not
-//! work, and all positions move together here. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see
+//! once, where neither has a derivative. So differential dynamic programming, which follows one reach per hop, is not
+//! used: all positions move together. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the
+//! method maximises
 //! `hop`), the method maximises
 //!
 //! ```text
@@ -82,8 +83,8 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers `lambda`. Each multiplier is stored as the upper
-/// half of an f32.
+/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers. Each multiplier is stored as the upper half of an
+/// f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -177,8 +178,7 @@ enum Work {
     Substitute(u16, bool),
 }
 
-/// State of the interior-point method: all positions and the Newton step. It maximises the worst SIR of both
-/// directions.
+/// Interior-point method for the worst SIR of both directions: all positions and the Newton step.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,

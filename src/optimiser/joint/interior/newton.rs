@@ -49,7 +49,7 @@ pub(super) struct Front {
 /// target's change.
 type Row = [f32; 5];
 
-/// Equations of one relay after its elimination, from which its Newton step follows.
+/// Equations of an eliminated relay, for the computation of its Newton step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
     /// Cholesky factor of the relay's 3 x 3 matrix: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is stored as
@@ -59,7 +59,7 @@ pub(super) struct Factor {
     rows: [Row; 3],
 }
 
-/// Sums over all hops and relays from which the Newton step of the target follows.
+/// Sums over all hops and relays, for the Newton step of the target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,

@@ -57,13 +57,13 @@ impl ForwardPass {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Begin the next initial chain, from which the search for the best chain continues.
+    /// Begin the next initial chain.
     Begin,
     /// Search for the highest target SIR that the chain meets without moves of its relays.
     Seek(Seek, Purpose),
     /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Try the next move of one relay. The field is the target that the chain meets, as ln(SIR).
+    /// Try the next move of one relay. The field is the target that the chain meets now, in ln(SIR).
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for the segment with this number.
     Back(u8),

@@ -91,7 +91,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the position in the current chain of the relay before `segment`.
+    /// Returns the position of the relay before `segment` in the current chain.
     pub(super) fn nominal_before(&self, chain: &Chain<'_, impl SeatOf>, segment: u8) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
@@ -229,8 +229,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index` with its hop from a relay at `from`. In initial chains of the kind [`Start::Through`] no
-    /// minimum separation is required.
+    /// Returns relay `index` with its hop from a relay at `from`. Initial chains of the kind [`Start::Through`] have no
+    /// minimum separation.
     pub(super) fn link<'a>(
         &self,
         chain: &Chain<'a, impl SeatOf>,
