@@ -95,9 +95,9 @@ pub enum WithoutQuorum {
     /// Leave the line from Tx to Rx: fly sideways (along y) and upward from the last agreed position. A guard keeps the
     /// drone in its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// Lateral offset that is added to the agreed position, m: -1e4 to 1e4.
+        /// Lateral offset that is added to the last position that the chain has agreed on, m: -1e4 to 1e4.
         y_m: f32,
-        /// Height that is added to the agreed position, m: 0 to 1e4.
+        /// Height that is added to the last position that the chain has agreed on, m: 0 to 1e4.
         up_m: f32,
     },
 }

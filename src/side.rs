@@ -7,7 +7,7 @@ pub enum Heading {
     /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position is computed
     /// from the position of its neighbour toward Tx, which sends to this relay.
     TowardRx,
-    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each relay's position is
+    /// Order from Rx to Tx, relay N first: used with an interference field (Algorithm 4). Each relay's position is
     /// computed from the position of its neighbour toward Rx, which receives from this relay.
     TowardTx,
 }

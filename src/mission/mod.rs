@@ -134,7 +134,7 @@ pub enum MissionError {
     Noise,
     /// `noise_w` is above 0, and the crate was built without its feature `noise`.
     NoiseFeature,
-    /// The interference is a field, and the crate was built without its feature `field`.
+    /// The interference is a field (a distribution along x), but the crate was built without `field`.
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
@@ -321,7 +321,7 @@ pub struct Mission {
     /// field it is Upsilon(D) / eta. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
     /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
-    /// noise and in an interference field.
+    /// noise and for a mission with an interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -543,8 +543,8 @@ impl Mission {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in an interference field. For an unknown interferer the result is a substitute
-    /// far away, with equal interference everywhere.
+    /// Returns the interferer; `None` for a mission with an interference field. For an unknown interferer the result is
+    /// a substitute far away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -561,7 +561,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field combined with the receiver noise, or `None` without a field.
+    /// Returns the interference field combined with the receiver noise. `None` for a mission without a field.
     #[doc(hidden)]
     pub const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
@@ -612,7 +612,8 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, which computes its position first. It is 1, or N in an interference field.
+    /// Returns the index of the leader, which computes its position first. It is 1, or N for a mission with an
+    /// interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -719,7 +720,7 @@ impl Mission {
     /// Returns the farthest allowed x of relay `index`, m, with room for the separation of later relays. Later relays
     /// are those whose positions are computed after this one.
     ///
-    /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the largest squared
+    /// Farthest means toward Rx, or toward Tx with an interference field. `across_squared` is the largest squared
     /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
@@ -728,7 +729,7 @@ impl Mission {
     /// Returns the farthest allowed x of relay `index`, m, without room for the separation of later relays. Later
     /// relays are those whose positions are computed after this one.
     ///
-    /// Farthest means toward Rx, or toward Tx in an interference field.
+    /// Farthest means toward Rx, or toward Tx with an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
@@ -780,7 +781,7 @@ impl Mission {
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if its position is known; `None` for an unknown interferer or a field.
+    /// Returns the interferer if its position is known. `None` for an unknown interferer or an interference field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),

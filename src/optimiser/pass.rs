@@ -88,7 +88,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx in an interference field.
+/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx with an interference field.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,

@@ -28,7 +28,7 @@ pub(super) struct Chain<'a, F> {
 }
 
 impl<'a, F: SeatOf> Chain<'a, F> {
-    /// Creates the chain of `mission`; `None` in an interference field.
+    /// Creates the chain of `mission`; `None` for a mission with an interference field.
     pub(super) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
         Some(Self {
             mission,

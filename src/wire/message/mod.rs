@@ -105,7 +105,7 @@ pub enum Message {
         /// Digest that shows two neighbours if they have the same x axis. It covers the mission loaded before flight,
         /// and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
-        /// Content of the message: the sender's limit of x, its agreed position, and flags.
+        /// Content of the message: the sender's limit of x, the x of its agreed position, and flags.
         fence: Fence,
     },
     /// Either direction, also from the ground: a mission that is newer than the destination's.

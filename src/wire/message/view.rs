@@ -284,7 +284,7 @@ pub struct Orders {
     pub leaver: u16,
     /// Node outside of the chain that is called to join it, 0 for none.
     pub joiner: u16,
-    /// True if all relays of the view were in place when the previous renewal completed.
+    /// True if all relays of the view were at their positions when the previous renewal completed.
     pub in_place: bool,
 }
 
@@ -306,7 +306,7 @@ pub struct Requests {
     pub endurance_s: u16,
     /// Node outside of the chain that would join it, 0 for none.
     pub spare: u16,
-    /// True if all relays from the last relay to the sender are in place.
+    /// True if all relays from the last relay to the sender are at their positions.
     pub in_place: bool,
 }
 

@@ -253,14 +253,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Initial state of the solver, before [`Solver::begin`] prepares it for a mission.
     pub(crate) const NEW: Self = Self(Way::OneWay(OneWay::NEW));
 
-    /// Creates a joint solver. `None` in an interference field, for more than `RELAYS` relays, or without the feature
+    /// Creates a joint solver. `None` for an interference field, for more than `RELAYS` relays, or without the feature
     /// `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let mut solver = Self::NEW;
         solver.begin(mission).then_some(solver)
     }
 
-    /// Prepares the solver for the directions of `mission`. Returns false in an interference field, or for too many
+    /// Prepares the solver for the directions of `mission`. Returns false for an interference field, or for too many
     /// relays.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
