@@ -69,7 +69,7 @@ pub struct Adjust {
     pub rounds: u16,
     /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
-    /// Search for a better position when a relay moves.
+    /// Search method for a relay's better position.
     pub local: Local,
 }
 

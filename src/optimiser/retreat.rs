@@ -470,9 +470,7 @@ impl<'a> HopInterference<'a> {
 /// power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
-    /// Smallest x of this part of the interference field, m.
     start_m: f32,
-    /// Largest x of this part of the interference field, m.
     end_m: f32,
     /// Upsilon at the smallest x of this part, divided by the field's largest Upsilon. Upsilon is the mean inverse
     /// interference power.

@@ -95,7 +95,6 @@ pub struct Search {
     most: Option<f32>,
     /// Bisection for a target that all relays accept. `None` until a relay has refused a target.
     trials: Option<StandTrials>,
-    /// True for a mission with traffic in both directions.
     both_ways: bool,
 }
 

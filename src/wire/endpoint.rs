@@ -14,7 +14,6 @@ use crate::time::{Duration, Instant};
 /// Frame that is ready to send: its destination and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
-    /// Node number of the frame's destination.
     pub(crate) to: u16,
     /// Length of the encoded frame, bytes.
     pub(crate) len: usize,

@@ -308,7 +308,7 @@ pub enum AdjustStep {
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Search for a better position.
+        /// Search method for a better position.
         local: Local,
     },
     /// The relay no longer moves, because Algorithm 2 has ended.

@@ -113,7 +113,6 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     /// Highest target that the improvement of any chain has reached, ln(SIR). A chain that is predicted to end below it
     /// is dropped.
     highest: f32,
-    /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
     /// Target at which the improvement of the best chain ended, in ln(SIR). The last search starts there.
     best_judged: Option<f32>,
