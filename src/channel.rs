@@ -8,15 +8,14 @@ use core::f64::consts::PI;
 /// Speed of light in vacuum, m/s.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Kind of path loss between drones and the ground. It selects the path-loss factor eta of these links.
+/// Kind of path loss between drones and the ground.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AirGround {
-    /// Line of sight between drones and the ground. The path-loss factor eta of these links is `mu_los`, as between
-    /// two drones.
+    /// Line of sight between drones and the ground. Their path-loss factor eta is `mu_los`, as between two drones.
     Los,
-    /// Obstructed links between drones and the ground. The path-loss factor eta of these links is `mu_nlos`, as
-    /// between two ground stations.
+    /// Obstructed links between drones and the ground. Their path-loss factor eta is `mu_nlos`, as between two ground
+    /// stations.
     Nlos,
     /// Partial line of sight with the weight w, 0 to 1. The path-loss factor of links to the ground is
     /// eta = w `mu_los` + (1 - w) `mu_nlos`.
@@ -142,8 +141,7 @@ impl Channel {
 
     /// Returns the channel with eta clamped to [`mu_los`, `mu_nlos`].
     ///
-    /// [`Channel::from_factors`] requires this. If the two factors are equal, rounding can put their weighted mean
-    /// slightly outside.
+    /// [`Channel::from_factors`] requires this. Rounding can put eta slightly outside if the two factors are equal.
     pub(crate) fn ordered(self) -> Self {
         Self {
             eta: self.eta.max(self.mu_los).min(self.mu_nlos),

@@ -10,7 +10,7 @@
 //! | input | unit |
 //! | --- | --- |
 //! | `baud` | bit/s on the channel; a byte takes ten |
-//! | `in_range` | relays in range of one place, including the relay there: nine where a radio reaches four relays far |
+//! | `in_range` | relays in range of each other; nine if a radio reaches four relays in each direction |
 //! | `overhead` | cost of a frame beyond its bytes (preamble, turnaround), in bytes |
 //! | `probe_after` | s, as [`Settings::probe_after`](crate::Settings::probe_after) |
 //!
@@ -20,26 +20,26 @@
 use crate::time::Duration;
 use crate::wire::MAX_SWEEP;
 
-/// Maximum number of frames that two neighbours of an idle chain exchange in the time `probe_after`. In an idle chain
-/// all relays hold their positions, and only renew the lease.
+/// Maximum number of frames between two neighbours of an idle chain in the time `probe_after`. A chain is idle while
+/// all relays hold their positions.
 const FRAMES: u64 = 8;
 
 /// Length in bytes of a frame that an idle chain sends: a lease renewal with its authentication tag.
 const BYTES: u64 = 32;
 
-/// Maximum fraction of the channel's capacity for the frames of an idle chain. The two numbers 3 and 20 stand for
-/// 3/20. The rest is for other messages, retransmissions, and waits for a free channel.
+/// Maximum fraction of the channel's capacity for the frames of an idle chain: 3/20. The rest is for other messages,
+/// retransmissions, and waits for a free channel.
 const SHARE: [u64; 2] = [3, 20];
 
 const BITS: u64 = 10;
 
-/// Maximum number of relays in range at which transmissions are assumed to find the channel free.
+/// Maximum number of relays in range for which a transmission is assumed to find the channel free.
 ///
-/// For every further nine relays, a transmission is assumed to take one frame time longer. The nine relays in range
-/// are this relay and four on either side.
+/// Every further nine relays add one frame time to each transmission. Nine relays are this relay and four on either
+/// side.
 const NEAR: u16 = 9;
 
-/// Maximum time assumed for one transmission with its wait for the channel. The unit is the duration of a frame.
+/// Maximum time assumed for one transmission, including the wait for the channel, in frame times.
 const MOST_TURNS: u32 = 4;
 
 /// Load of a radio channel: the number of relays that share it, and the overhead of a frame.
@@ -48,7 +48,7 @@ const MOST_TURNS: u32 = 4;
 pub struct ChannelLoad {
     /// Number of relays in range of each other, 1 to 1000.
     pub in_range: u16,
-    /// Overhead of a frame (preamble, turnaround of the radio), as the number of bytes of equal duration.
+    /// Overhead of a frame (preamble, turnaround of the radio), converted to bytes.
     pub overhead: u16,
 }
 
@@ -64,8 +64,7 @@ impl ChannelLoad {
 
     /// Returns the bits that the channel must be able to carry in one `probe_after`, times 1e6.
     ///
-    /// This is the number of bits that an idle chain sends in this time, divided by the fraction of the channel that
-    /// these bits may take. The result divided by a time in microseconds is a data rate in bit/s.
+    /// The result divided by `probe_after` in microseconds is the minimum data rate in bit/s.
     const fn needed(self) -> u64 {
         let pairs = self.in_range.saturating_sub(1) as u64;
         let bits = FRAMES * pairs * (BYTES + self.overhead as u64) * BITS;
@@ -155,9 +154,8 @@ impl ChannelLoad {
 
     /// Returns the minimum [`Settings::hop_time`](crate::Settings::hop_time) on a channel of `baud` bit/s.
     ///
-    /// It is the time to transmit a sweep (the message of 100 bytes that carries target SIRs from relay to relay),
-    /// with the wait for a channel that many relays share, plus `latency`, the time from the end of a transmission to
-    /// the end of the receiver's computation.
+    /// It is the time to transmit a message of 100 bytes, including the wait for the shared channel, plus `latency`.
+    /// The latency is the time from the end of a transmission to the end of the receiver's computation.
     pub const fn hop_time(self, baud: u32, latency: Duration) -> Duration {
         let baud = if baud == 0 { 1 } else { baud as u64 };
         let sweep = (MAX_SWEEP as u64 * BITS * 1_000_000).div_ceil(baud);
@@ -165,8 +163,7 @@ impl ChannelLoad {
         Duration::from_micros(latency.as_micros().saturating_add(sweep * turns))
     }
 
-    /// Returns the time assumed for one transmission with its wait for the channel. The unit is the duration of a
-    /// frame.
+    /// Returns the time assumed for one transmission, including the wait for the channel, in frame times.
     const fn turns(self) -> u32 {
         match self.in_range.div_ceil(NEAR) as u32 {
             0 => 1,
@@ -176,11 +173,11 @@ impl ChannelLoad {
     }
 }
 
-/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields give three ways to avoid this.
+/// Error of [`ChannelLoad::carried`]: the channel is overloaded. The fields say how to avoid this.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ChannelFull {
-    /// Number of relays in range of each other, for which the channel is too slow.
+    /// Number of relays in range of each other that overload the channel.
     pub in_range: u16,
     /// Minimum data rate of a channel that carries these relays, bit/s.
     pub least_baud: u32,

@@ -1,26 +1,27 @@
 //! Events for the firmware.
 //!
-//! Each kind of event is a flag; some kinds also store the node that they concern. A firmware that polls late loses only repetitions of
-//! an event, and of two nodes on one side the earlier one.
+//! Each kind of event is a flag; some kinds also store a node. If the firmware polls late, it gets repeated events of
+//! one kind only once. Of two such events about different nodes on the same side, it gets only the later one.
 
 use crate::geodetic::LineError;
 use crate::side::Side;
 
-/// Event of the relay, to which a firmware can react. The firmware reads the changed state from the relay.
+/// Event of a relay. The firmware reads the changed state from the relay.
 ///
 /// A field `node` is a relay's index in the chain as configured before flight, as in
 /// [`Relay::neighbours`](crate::Relay::neighbours).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum Event {
-    /// `Relay::setpoint` has changed: fly to the new setpoint; if there is none, hold the position.
+    /// `Relay::setpoint` has changed. Fly to the new setpoint; if there is none, hold the position.
     SetpointChanged,
     /// The chain has agreed on positions. If the interference is known, the chain has also agreed on a target SIR
     /// (`Relay::target`).
     Converged,
-    /// Every allowed target SIR is infeasible, and all relays keep their positions. Raised at the leader, which is
-    /// relay 1, or relay N if the mission gives the interference as a distribution along x. `Relay::restart`, a new
-    /// view or a new mission makes the leader try again.
+    /// Every allowed target SIR is infeasible, and all relays keep their positions.
+    ///
+    /// Raised at the leader, which is relay 1, or relay N if the mission gives the interference as a distribution along
+    /// x. The leader tries again after `Relay::restart`, in a new view, or with a new mission.
     Infeasible,
     /// The neighbour at `side` is lost.
     ///
@@ -56,21 +57,23 @@ pub enum Event {
         /// Index of the node with the other mission.
         node: u16,
     },
-    /// A node signs its handshakes with another key than this relay. Raised after three such handshakes in a row; a
-    /// handshake with the right key starts the count again. An operator should give both nodes the same key. A single
-    /// forged frame does not raise this event. But an attacker without the key can raise it with three forged
-    /// handshakes in a row: if the node is received at the same time, this is an attack and the node is fine.
+    /// A node signs its handshakes with another key than this relay.
+    ///
+    /// Raised after three such handshakes in a row; a handshake with the right key starts the count again. An operator
+    /// should give both nodes the same key. An attacker without the key can raise this event with three forged
+    /// handshakes in a row, but not with one forged frame. If the node is received at the same time, this is an attack
+    /// and the node is fine.
     KeyMismatch {
         /// Index of the node that signs with another key.
         node: u16,
     },
-    /// Five handshakes in a row from a node have an epoch that is not newer than the node's last known one. The key is
-    /// right, but the node did not increase its epoch (start counter) at its last start, so its frames are rejected.
-    /// The epoch is older, or the same with the same seed. A handshake with a newer epoch starts the count again. An
-    /// operator increases the node's epoch and restarts it, or restarts this relay and its other neighbours. A replay
-    /// of one recorded frame does not raise the event, but a replay in order of five handshakes of one start does. If
-    /// `node` is this relay, its neighbours know a newer epoch, and this relay becomes passive
-    /// ([`Event::DuplicateIndex`]).
+    /// Five handshakes in a row from a node have an old epoch (start counter). The node's frames are rejected.
+    ///
+    /// The key is right, but the node did not increase its epoch at its last start. The epoch is smaller than the last
+    /// known one, or equal with the same seed. A handshake with a newer epoch starts the count again. An operator
+    /// increases the node's epoch and restarts it, or restarts this relay and its other neighbours. A replay of one
+    /// recorded frame does not raise the event, but a replay in order of five handshakes of one start does. If `node`
+    /// is this relay, its neighbours know a newer epoch, and this relay becomes passive ([`Event::DuplicateIndex`]).
     EpochWentBack {
         /// Index of the node whose epoch went back.
         node: u16,
@@ -83,11 +86,11 @@ pub enum Event {
         /// Index that two nodes use.
         node: u16,
     },
-    /// The chain has agreed on a new view, that is on its members. `Relay::view`, `Relay::index` and the relays of
+    /// The chain has agreed on its members (a new view). `Relay::view`, `Relay::index` and the relays of
     /// `Relay::mission` have changed, and new positions follow.
     ViewAccepted,
-    /// The lease has expired: the relay keeps its setpoint and requests a new view. It is no longer certain that all
-    /// relays of the view use the last agreement. Not raised again before a view is agreed on.
+    /// The lease has expired. The relay keeps its setpoint and requests a new view, because other relays may no longer
+    /// use the last agreement. Not raised again before a view is agreed on.
     LeaseLapsed,
     /// A new view was refused because too few relays are reachable for a quorum. This part of the chain holds its
     /// positions. Not raised again before a view is agreed on. Bring the missing relays back into range, or land the
@@ -95,13 +98,13 @@ pub enum Event {
     NoQuorum,
     /// A newer mission has been received (`Relay::upload`). Store it, and pass it to `Relay::resume` after the next start.
     Uploaded,
-    /// A newer mission was rejected, and this relay keeps its present mission. The new mission's distance does not fit
-    /// its Tx and Rx positions on earth, or the mission exceeds this relay's own geofence, or it has fitted slots (as
-    /// long as each hop needs) that the settings do not allow. The ground station is informed. Raised once for each
-    /// such mission. Upload a mission whose Tx and Rx positions are as far apart as its distance, within the geofence,
-    /// and with slots for the relays' method.
+    /// A newer mission was rejected, and this relay keeps its present mission. The ground station is informed.
+    ///
+    /// The reason is one of three. The mission's distance does not fit its Tx and Rx positions on earth. The mission
+    /// exceeds this relay's own geofence. Or it has fitted slots (as long as each hop needs) that the settings do not
+    /// allow. Upload a mission without this error. Raised once for each such mission.
     UploadRefused {
-        /// Reason for which the mission was rejected.
+        /// Reason for the rejection.
         why: LineError,
     },
     /// The relay's estimate of the interference has changed (`Relay::interference_estimate`). New positions follow.
@@ -109,10 +112,12 @@ pub enum Event {
     /// The measurements do not fit a single source on the ground, are too few or contradict each other. Raised at the
     /// leader. `Relay::unfit` gives the reason.
     InterfererUnclear,
-    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit. An operator should
-    /// check the receiver of this node. For the transmitter and the receiver only the leader raises this event. For a
-    /// relay that measures nothing at all only this relay itself raises it. With four relays or fewer the faulty relay
-    /// cannot be identified ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
+    /// A node's measurements do not fit those of all other nodes; they are ignored until they fit.
+    ///
+    /// An operator should check the receiver of this node. Only the leader raises this event for the transmitter and
+    /// the receiver. A relay that measures nothing at all raises it itself, and no other node does. With four relays or
+    /// fewer the faulty relay cannot be identified
+    /// ([`Unfit::Contradiction`](crate::sensing::fit::Unfit::Contradiction)).
     SensorOff {
         /// Index of the node: 0 for the transmitter, number of configured relays + 1 for the receiver.
         node: u16,
@@ -120,19 +125,19 @@ pub enum Event {
     /// The chain flies the uploaded mission. `Relay::mission`, `Relay::version` and `Relay::sites` have changed, and new
     /// positions follow.
     Adopted,
-    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap: the
-    /// drone of this relay may fly away.
+    /// The relay is outside of the chain, as requested by `Relay::leave`. The other relays have closed the gap, and
+    /// this relay's drone may fly away.
     MayLeave,
-    /// The drone's remaining time of flight is unknown; raised only with a reserve (`Relay::set_reserve`).
+    /// The drone's remaining time of flight is unknown. Raised only with a reserve (`Relay::set_reserve`).
     ///
     /// Raised if a value of `Relay::handle_endurance` was invalid, if none came for 10 s, or if none is known while the
     /// relay controls the drone. The relay then counts down from the last value that agreed with the value before it,
     /// or else from the last value. Without any valid value the relay does not leave the chain by itself. Raised at
-    /// most once a minute, and again while the time is unknown.
+    /// most once a minute while the time is unknown.
     EnduranceUnknown,
     /// The drone has only the way home and its reserve left (`Relay::set_reserve`). Raised again every minute while that lasts.
     AtReserve,
-    /// A node outside of the chain at `side` was told by this relay that the node's drone may fly away.
+    /// A node outside of the chain was told by this relay that the node's drone may fly away.
     ///
     /// The guard still keeps clear of that drone. Once it has left, an operator calls `Relay::clear_lost`. The event
     /// may be repeated.
@@ -144,8 +149,7 @@ pub enum Event {
     },
 }
 
-/// Events without a node that the firmware polls first. After them it polls the events that concern a node, and at the
-/// end the events in `POLLED_LAST`.
+/// Events without a node that the firmware polls first. Events about a node come next, then `POLLED_LAST`.
 const POLLED_FIRST: [Event; 3] = [Event::SetpointChanged, Event::Converged, Event::Infeasible];
 const POLLED_LAST: &[Event] = &[
     Event::ViewAccepted,
@@ -188,7 +192,7 @@ pub(crate) enum NodeEvent {
     Mission,
     Key,
     Epoch,
-    /// Two nodes use the same index. If it is this relay's index, the side of the event has no meaning.
+    /// Two nodes use the same index. The event's side has no meaning if it is this relay's index.
     Index,
     /// The measurements of the node do not fit those of the other nodes.
     Sensor,
@@ -237,7 +241,7 @@ pub(crate) struct Pending {
 }
 
 impl Pending {
-    #[inline(never)] // a search, in every place where an event is raised
+    #[inline(never)] // otherwise there is a search in every place where an event is raised
     fn bit(event: Event) -> u32 {
         POLLED_FIRST
             .iter()
@@ -251,8 +255,7 @@ impl Pending {
         self.events |= Self::bit(event);
     }
 
-    /// Raises an event about node `node` at `side`. It replaces an event of the same kind and side about another
-    /// node.
+    /// Raises an event about `node` at `side`. It replaces an event of the same kind and side about another node.
     pub(crate) fn raise_node_event(&mut self, kind: NodeEvent, side: Side, node: u16) {
         let at = usize::from(side == Side::Downstream);
         let (Some(bits), Some(nodes)) = (self.kinds.get_mut(at), self.nodes.get_mut(at)) else {
@@ -263,7 +266,7 @@ impl Pending {
             NodeEvent::Back => Some(NodeEvent::Lost),
             _ => None,
         };
-        // A loss and a return of the same node cancel; the later event remains.
+        // Of a loss and a return of the same node only the later event remains.
         if let Some(opposite) = opposite
             && nodes.get(opposite as usize) == Some(&node)
         {

@@ -1,7 +1,7 @@
 //! Geodetic positions as integers, in the units of MAVLink.
 //!
-//! [`Sites`] are those of transmitter and receiver, which define the mission's line on earth; a [`LineError`] is the reason why a
-//! mission does not fit that line.
+//! [`Sites`] are the positions of transmitter and receiver on earth. A [`LineError`] is the reason why a relay rejects
+//! a mission.
 
 /// Geodetic position: WGS84 latitude and longitude, and height above mean sea level.
 ///
@@ -18,8 +18,9 @@ pub struct Geodetic {
 }
 
 impl Geodetic {
-    /// Returns the nearest representable position. `None` for a value that is not finite or out of range. Latitude
-    /// and longitude are in degrees, and the height above mean sea level in m, within 1e6.
+    /// Returns the position nearest to these values; `None` if a value is not finite or out of range.
+    ///
+    /// Latitude and longitude are in degrees, and the height above mean sea level in m, within 1e6.
     ///
     /// ```
     /// use uav_relay::Geodetic;
@@ -53,7 +54,7 @@ pub(crate) fn to_integer(value: f64) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-/// Surveyed positions of transmitter Tx and receiver Rx on the ground, the ends of the mission's line.
+/// Surveyed positions of the transmitter Tx and the receiver Rx on the ground.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sites {
@@ -63,7 +64,7 @@ pub struct Sites {
     pub rx: Geodetic,
 }
 
-/// Length of [`Sites`], the positions of transmitter and receiver, on the wire, bytes.
+/// Length of the encoded [`Sites`], bytes.
 pub(crate) const SITES_LENGTH: usize = 24;
 
 impl Sites {
@@ -106,9 +107,8 @@ impl Sites {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum LineError {
-    /// The mission's distance differs from the distance between its Tx and Rx positions. Or the mission has no Tx and
-    /// Rx positions, and its distance differs from the distance between the positions that the relay was configured
-    /// with (`Settings::sited`).
+    /// The mission's distance differs from the distance between its Tx and Rx positions. A mission without such
+    /// positions is compared with the positions that the relay was configured with (`Settings::sited`).
     Distance,
     /// The mission's Tx and Rx positions are less than 10 m or more than 100 km apart.
     Sites,

@@ -1,8 +1,8 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![doc = include_str!("tour.md")]
-// The tests of this workspace use more of the crate (`internals`), and a missing feature leaves out what uses an item: only a build with
-// all features can tell that an item is unused.
+// Only a build with all features can tell that an item is unused: a missing feature leaves out code that uses the item.
+// The tests of this workspace use more of the crate (`internals`).
 #![cfg_attr(
     not(all(feature = "internals", feature = "upload", feature = "mavlink-signing")),
     allow(
@@ -15,9 +15,8 @@
 
 /// Implements `Display`, `Error` and `defmt::Format` for an error enum, from one text for each variant.
 ///
-/// The texts are string literals, because `defmt` takes nothing else: an image stores only their numbers, so that
-/// they take no flash. The function `text` returns these texts. It is a `const fn`, so a `const fn` that panics can
-/// use it.
+/// The texts are string literals, because `defmt` accepts nothing else. They take no flash: an image stores only their
+/// numbers. The function `text` returns them; it is a `const fn`, so a `const fn` that panics can use it.
 macro_rules! error_texts {
     ($type:ty { $($variant:ident => $text:literal),* $(,)? }) => {
         impl $type {

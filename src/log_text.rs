@@ -52,7 +52,8 @@ const fn node(event: Event) -> Option<u16> {
     }
 }
 
-/// Returns the text of an event in a log line. If the event concerns a node, the text follows the node's number.
+/// Returns the text of an event in a log line. For an event about a node, the log line has the node's number before the
+/// text.
 fn text(event: Event) -> defmt::Str {
     match event {
         Event::SetpointChanged => defmt::intern!("the setpoint has changed"),
@@ -232,7 +233,7 @@ mod autopilot {
         }
     }
 
-    /// Returns the part of `relays` before the first 0, because unused entries are 0.
+    /// Returns the entries of `relays` before the first 0. Unused entries are 0.
     fn named(relays: &[u16]) -> &[u16] {
         relays.split(|node| *node == 0).next().unwrap_or_default()
     }

@@ -23,7 +23,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Returns the position right above the line from transmitter to receiver: the lateral offset is 0.
+    /// Creates the position right above the line from transmitter to receiver: the lateral offset is 0.
     pub const fn on_line(x_m: f32, altitude_m: f32) -> Self {
         CrossSection::on_line(altitude_m).at(x_m)
     }
@@ -38,7 +38,7 @@ impl Placement {
     }
 }
 
-/// Position of a relay across the line Tx to Rx: its lateral offset and altitude, without its x.
+/// Lateral offset and altitude of a relay: its position without x.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrossSection {
@@ -49,7 +49,7 @@ pub struct CrossSection {
 }
 
 impl CrossSection {
-    /// Returns the lateral offset 0 with `altitude_m`: right above the line Tx to Rx.
+    /// Creates the cross-section right above the line from Tx to Rx: the lateral offset is 0.
     pub const fn on_line(altitude_m: f32) -> Self {
         Self {
             y_m: 0.0,
@@ -72,7 +72,7 @@ impl CrossSection {
     }
 }
 
-/// Lateral offset, altitude and transmit power of a relay whose x is searched.
+/// Lateral offset, altitude and transmit power of a relay. Its x is not given but computed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Station {
@@ -84,20 +84,20 @@ pub struct Station {
 
 /// Behaviour of a relay while it can reach too few relays for a quorum of the chain.
 ///
-/// [`Leave`](Self::Leave) clears the line for the relays that have a quorum. Set the same value on all relays: relays
-/// that leave the line then keep their order and distances.
+/// [`Leave`](Self::Leave) moves the drone out of the way of the relays that have a quorum. Set the same value on all
+/// relays. Relays that leave the line then keep their order and distances.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WithoutQuorum {
-    /// The drone holds its last agreed position while there is no quorum.
+    /// Hold the last position that the chain has agreed on.
     #[default]
     Hold,
-    /// Leave the line from Tx to Rx: fly from the last agreed position sideways (along y) and upward. With a guard,
-    /// only within its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
+    /// Leave the line from Tx to Rx: fly sideways (along y) and upward from the last agreed position. A guard keeps the
+    /// drone in its geofence ([`GuardConfig::with_room_for`](crate::guard::config::GuardConfig::with_room_for)).
     Leave {
-        /// Lateral offset that is added to the agreed position, m: -1e4 to 1e4.
+        /// Lateral offset that is added to the last position that the chain has agreed on, m: -1e4 to 1e4.
         y_m: f32,
-        /// Height that is added to the agreed position, m: 0 to 1e4.
+        /// Height that is added to the last position that the chain has agreed on, m: 0 to 1e4.
         up_m: f32,
     },
 }
@@ -110,8 +110,8 @@ impl WithoutQuorum {
         }
     }
 
-    /// Returns the position at which a drone waits while its relay has no quorum. `place` is the last agreed
-    /// position.
+    /// Returns the position at which a drone waits while its relay has no quorum. `place` is the last position that the
+    /// chain has agreed on.
     pub(crate) fn place(self, place: Placement) -> Placement {
         match self {
             Self::Hold => place,

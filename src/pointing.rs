@@ -1,8 +1,8 @@
 //! Antenna pointing: azimuth, elevation and distance from a relay to another position.
 //!
-//! Angles use micromath's `atan2`: a few instructions, with an error of at most 0.162 degrees, where a beam is ten degrees wide.
-//! Distances use libm's square root, because micromath's has an error of 6 %. The errors are asserted by
-//! `bearings_are_within_the_stated_error_all_around` in `host-tests/tests/accuracy/`, and those of the two libraries there, too.
+//! Angles use micromath's fast `atan2`. Its error is at most 0.162 degrees, while an antenna beam is ten degrees wide.
+//! Distances use libm's square root, because micromath's has an error of 6 %. The test
+//! `bearings_are_within_the_stated_error_all_around` in `host-tests/tests/accuracy/` asserts the errors.
 
 use micromath::F32;
 
@@ -11,8 +11,8 @@ use crate::place::Placement;
 
 /// Direction and distance of a position relative to a relay.
 ///
-/// Frame: x toward the receiver, y to the side, h up, left-handed as in the paper: seen from above, y points to the right of x,
-/// so azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
+/// Frame: x toward the receiver, y to the right of x as seen from above, h up. So the frame is left-handed, as in the
+/// paper, and azimuth grows clockwise. The combined pointing error of both angles is at most 0.23 degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bearing {
@@ -28,7 +28,7 @@ pub struct Bearing {
 impl Bearing {
     /// Returns the bearing of a position `ahead_m` farther along x, `aside_m` along y, and `climb_m` up.
     ///
-    /// `None` for a zero distance, and for values that are not finite or whose distance overflows.
+    /// `None` if the distance is zero or overflows, or if a value is not finite.
     ///
     /// Work: two square roots, two approximated arc tangents and a few divisions.
     pub fn new(ahead_m: f32, aside_m: f32, climb_m: f32) -> Option<Self> {
@@ -80,8 +80,7 @@ impl Bearing {
     }
 }
 
-/// Returns sqrt(a^2 + b^2), without overflow or underflow of the squares. For that the larger of |a| and |b| is
-/// factored out.
+/// Returns sqrt(a^2 + b^2), without overflow or underflow of the squares.
 fn length(a: f32, b: f32) -> f32 {
     let large = a.abs().max(b.abs());
     if large > 0.0 {

@@ -1,12 +1,14 @@
 //! Fast square root in safe Rust, bisection, and a power ratio with twice the precision of an f32.
 //!
-//! `libm::sqrtf` works bit by bit on integers, since stable Rust has no safe access to the VSQRT of a Cortex-M4F: 81
-//! instructions, more than the rest of a reach. This one derives a first estimate from the exponent and improves it by Heron's
-//! rule on the FPU. It uses additions, multiplications and divisions only, so every target gives the same bits.
+//! `libm::sqrtf` works bit by bit on integers, since stable Rust has no safe access to the VSQRT of a Cortex-M4F. It
+//! takes 81 instructions. This one derives a first estimate from the exponent and improves it by Heron's rule on the
+//! FPU. It uses additions, multiplications and divisions only, so every target gives the same bits.
 
-/// Returns the square root of `x`, within one unit in the last place of an f32. 0 for `x` below the smallest normal f32. 18
-/// instructions on a Cortex-M4F. `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa: a factor of
-/// 4 changes only the exponent of the result, so two octaves cover all exponents.
+/// Returns the square root of `x`, within one unit in the last place of an f32.
+///
+/// The result is 0 for `x` below the smallest normal f32. The function takes 18 instructions on a Cortex-M4F.
+/// `roots_are_within_one_unit_in_the_last_place` asserts the accuracy for every mantissa. It tests two octaves, because
+/// a factor of 4 changes only the exponent of the result.
 #[inline(never)] // called from many places: 2.4 KB of flash otherwise
 pub fn sqrt(x: f32) -> f32 {
     sqrt_in_place(x)
@@ -32,7 +34,7 @@ pub(crate) fn sqrt_in_place(x: f32) -> f32 {
 
 /// Halves the interval from `low` to `high` `steps` times, and returns its ends.
 ///
-/// The value searched is the one up to which `holds` returns true. It is assumed to be true at `low` and false at `high`.
+/// It searches the value up to which `holds` returns true. `holds` must be true at `low` and false at `high`.
 pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bool) -> (f32, f32) {
     let (mut low, mut high) = (low, high);
     for _ in 0..steps {
@@ -48,8 +50,8 @@ pub fn bisected(low: f32, high: f32, steps: u8, mut holds: impl FnMut(f32) -> bo
 
 /// Power or path-loss ratio as the sum of two f32, so that its difference to a nearby target is exact.
 ///
-/// A target gamma is compared with a gain A through gamma - A. With A rounded to one f32 this difference has an error of up to 6e-8 A, so
-/// the closed forms as printed in the paper lose digits near gamma = A.
+/// The paper's closed forms use gamma - A, with a target gamma and a gain A. If A were a single f32, this difference
+/// would have an error of up to 6e-8 A, and digits would be lost near gamma = A.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PowerRatio {
@@ -79,13 +81,13 @@ impl PowerRatio {
         f64::from(self.hi) + f64::from(self.lo)
     }
 
-    /// Returns `target` / A, rounded to f32, for a target SIR and this ratio as the gain A of a hop.
+    /// Returns `target` / A, rounded to f32. `target` is a target SIR, and A this ratio, the gain of a hop.
     pub const fn ratio(self, target: f32) -> f32 {
         target / self.hi
     }
 
-    /// Returns `target` / A - 1 for a target SIR and this ratio as the gain A of a hop. The relative error is below
-    /// 2e-7, even if the target is nearly A.
+    /// Returns `target` / A - 1. `target` is a target SIR, and A this ratio, the gain of a hop. The relative error is
+    /// below 2e-7, even if `target` is nearly A.
     pub const fn excess(self, target: f32) -> f32 {
         ((target - self.hi) - self.lo) / self.hi
     }

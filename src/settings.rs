@@ -12,7 +12,7 @@ use crate::sensing::Listen;
 use crate::time::Duration;
 use crate::wire::auth::Auth;
 
-/// Time that the preset settings include in `hop_time` for computation and the link's buffers.
+/// Time for computation and the link's buffers in the `hop_time` of the preset settings.
 const LATENCY: Duration = Duration::from_millis(10);
 
 /// Identity of a relay: its network's number, and its index in the chain.
@@ -48,8 +48,8 @@ pub enum Wiring {
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Method {
-    /// Optimise x at given lateral offsets and altitudes. This is the paper's Algorithm 1, or Algorithm 4 if the
-    /// mission gives the interference as a distribution along x (an interference field).
+    /// Optimise x at given lateral offsets and altitudes by the paper's Algorithm 1. If the mission gives the
+    /// interference as a distribution along x (an interference field), use Algorithm 4.
     #[default]
     Align,
     /// Optimise x, y and altitude jointly, within the mission's ranges. This method is for up to 100 relays, and not
@@ -64,17 +64,17 @@ pub enum Method {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Adjust {
-    /// Maximum number of rounds, the paper's `Iter_max`. Algorithm 2 ends earlier after a round in which no relay
-    /// moves.
+    /// Maximum number of rounds, the paper's `Iter_max`. In a round every relay may move once. Algorithm 2 ends after a
+    /// round in which no relay moves.
     pub rounds: u16,
     /// Maximum change of a relay's altitude each time it moves, m: 0 to 1e5; the paper's `epsilon_h`.
     pub explore_m: f32,
-    /// Method by which a relay searches for a better position when it moves.
+    /// Search method for a relay's better position.
     pub local: Local,
 }
 
 impl Default for Adjust {
-    /// Returns the defaults: 500 rounds, 10 m of altitude change per move, [`Local::Fine`].
+    /// Returns the defaults: 500 rounds, altitude changes of up to 10 m, [`Local::Fine`].
     fn default() -> Self {
         Self {
             rounds: 500,
@@ -89,13 +89,13 @@ impl Default for Adjust {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Measure {
-    /// Maximum interference power that can be received, W: 1e-30 to 1e6. Samples with a larger power are rejected.
+    /// Largest valid interference power of a sample, W: 1e-30 to 1e6. Samples with a larger power are rejected.
     pub i_max_w: f32,
-    /// Number of samples to take at one position before an estimate is made from them, 100 to 1 000 000.
+    /// Number of samples at one position from which an estimate is made, 100 to 1 000 000.
     pub samples: u32,
 }
 
-/// Options of a relay, which its firmware chooses.
+/// Settings of a relay, which its firmware chooses.
 ///
 /// ```
 /// # mod paper { include!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/docs/paper.rs")); }
@@ -111,7 +111,7 @@ pub struct Measure {
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// Altitude and power of this relay; `None` for the values that the mission gives for all relays.
+    /// Altitude and power of this relay; `None` for the values that the mission gives.
     pub profile: Option<Profile>,
     /// True to keep this relay's altitude fixed while the method optimises other relays' altitudes.
     pub hold_altitude: bool,
@@ -140,10 +140,10 @@ pub struct Settings {
     /// Silence of a neighbour after which this relay requests heartbeats from it; above 0. It sends 16 requests until
     /// `dead_after`, and more on a channel that loses frames.
     pub probe_after: Duration,
-    /// Minimum silence of a lost neighbour, and minimum duration of a lease; above `probe_after`.
+    /// Minimum silence after which a neighbour counts as lost, and minimum duration of a lease. Above `probe_after`.
     pub dead_after: Duration,
-    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the members of the
-    /// previous view, or half of them including its proposer. Without this rule, the parts of a split chain would
+    /// True if a part of the chain needs a quorum to continue alone. A quorum is more than half of the previous view's
+    /// members, or exactly half including the view's proposer. Without this rule, the parts of a split chain would
     /// interfere with each other.
     pub quorum: bool,
     /// Behaviour of the relay while too few relays are reachable for a quorum.
@@ -151,22 +151,22 @@ pub struct Settings {
     /// Guard that keeps relays apart while they move, inside a geofence; `None` for no guard. With a guard the
     /// firmware has to report the drone's position: `Relay::handle_position`.
     pub guard: Option<GuardConfig>,
-    /// Duration of the motion to a newly agreed position (feature `departures`). The setpoint moves to the new
-    /// position in 32 equal steps. With 0 it moves in one step.
+    /// Duration of the move to a new position on which the chain has agreed (feature `departures`). The setpoint moves
+    /// in 32 equal steps; with 0 it moves in one step.
     ///
     /// If all drones arrive together, no hop is worse on the way than before or after
-    /// ([`docs::batteries`](crate::docs::batteries)). Choose the duration so that the drones fly the longest way, about
-    /// a spacing of the chain, at their usual speed or slower. Use the same value for all relays of a chain. At most
-    /// four times `dead_after`.
+    /// ([`docs::batteries`](crate::docs::batteries)). The longest way is about a spacing of the chain. Choose the
+    /// duration so that drones fly it at their usual speed or slower. Use the same value for all relays of a chain, at
+    /// most four times `dead_after`.
     #[cfg(feature = "departures")]
     pub respacing: Duration,
     /// True if a relay without a guard is allowed to leave the chain (`Relay::leave`). Its neighbours then fly close to
-    /// the drone that still holds its place. At an end of the chain they come as close as a few metres.
+    /// its drone, which still waits at its place. At an end of the chain they come as close as a few metres.
     #[cfg(feature = "departures")]
     pub leave_without_guard: bool,
-    /// True if the firmware has surveyed Tx and Rx positions to convert setpoints to geodetic positions. An uploaded
-    /// mission without such positions is then rejected if its distance differs from the distance of the surveyed
-    /// positions. Set it on all relays of a chain, or on none.
+    /// True if the firmware converts setpoints to geodetic positions with surveyed Tx and Rx positions. An uploaded
+    /// mission without Tx and Rx positions is then rejected if its distance differs from that of the surveyed ones. Set
+    /// it on all relays of a chain, or on none.
     pub sited: bool,
 }
 
@@ -184,8 +184,8 @@ impl Default for Settings {
 impl Settings {
     /// Returns true if a relay with these settings can fly a mission with the time slots of `config`.
     ///
-    /// This is so if the slots are equal. It is also so for fitted slots (as long as each hop needs), with the method
-    /// `Joint` and a known interferer.
+    /// Equal slots are always allowed. Fitted slots (as long as each hop needs) need the method `Joint` and a known
+    /// interferer.
     pub(crate) fn allow_slots_of(&self, config: &MissionConfig) -> bool {
         let is_known = matches!(config.interference, Interference::Source(_));
         let may_fit = self.method == Method::Joint && self.listen.is_none() && is_known;

@@ -1,4 +1,4 @@
-//! The two sides of a relay, and the direction of passes.
+//! The two sides of a relay, and the order in which positions are computed along the chain.
 
 /// Order in which the positions of a chain are computed; it determines the leader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -7,8 +7,8 @@ pub enum Heading {
     /// Order from Tx to Rx, relay 1 first: used with an interferer (Algorithm 1). Each relay's position is computed
     /// from the position of its neighbour toward Tx, which sends to this relay.
     TowardRx,
-    /// Order from Rx to Tx, relay N first: used in an interference field (Algorithm 4). Each position is computed
-    /// from the position of the relay's receiver, where the interference is known.
+    /// Order from Rx to Tx, relay N first: used with an interference field (Algorithm 4). Each relay's position is
+    /// computed from the position of its neighbour toward Rx, which receives from this relay.
     TowardTx,
 }
 
@@ -24,7 +24,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Returns the side to which messages that travel along the chain in the direction `heading` go.
+    /// Returns the side to which a relay forwards messages along the chain in the direction `heading`.
     pub(crate) const fn onward(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Downstream,
@@ -32,8 +32,8 @@ impl Side {
         }
     }
 
-    /// Returns the side from which messages arrive that travel along the chain in the direction `heading`. Replies
-    /// are sent to this side.
+    /// Returns the side from which messages along the chain in the direction `heading` arrive. Replies are sent to this
+    /// side.
     pub(crate) const fn back(heading: Heading) -> Self {
         match heading {
             Heading::TowardRx => Self::Upstream,

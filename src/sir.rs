@@ -1,8 +1,10 @@
 //! Signal-to-interference ratio (SIR) of every kind of hop. These formulas are defined only here.
 //!
-//! With receiver noise N the ratio is the SINR, signal over I + N. A relay at the squared distance s, m^2, from the interferer
-//! receives I = P / (eta s), and I + N = P (1 + nu s) / (eta s) with nu = N eta / P. So [`quiet`] becomes s / (1 + nu s), and
-//! nothing else changes. In a field, Upsilon includes the noise (see [`Field`](crate::field::Field)); at Rx, K does.
+//! With receiver noise N the ratio is the SINR, signal over I + N. A relay at the squared distance s, m^2, from the
+//! interferer receives I = P / (eta s), and I + N = P (1 + nu s) / (eta s) with nu = N eta / P. So [`quiet`] becomes s
+//! / (1 + nu s), and nothing else changes. In an interference field the factor Upsilon includes the noise (see
+//! [`Field`](crate::field::Field)); for the hop to Rx the factor K does.
+//! [`Field`](crate::field::Field)); for the hop to Rx the factor K does.
 //!
 //! The SIR of a chain is that of its worst hop: `SIR_S` = min over hops (paper, section "Position planning for multiple UAVs").
 //! All SIRs are linear power ratios. Accuracy against f64 is asserted by `hop_sirs_agree_with_the_reference` in
@@ -12,7 +14,7 @@ use crate::mission::{Interferer, Mission};
 use crate::place::{CrossSection, Placement, Station};
 use crate::root::{PowerRatio, bisected, sqrt};
 
-/// Returns the inverse interference at `at`, the factor by which interference enters a hop's SIR.
+/// Returns the inverse interference at `at`, the factor in a hop's SIR that depends on interference.
 ///
 /// The SIR of a hop to a receiver at `at` is the sender's gain times this factor, divided by the squared length of
 /// the hop. For an interferer at (X, Y) the factor is s = (X - x)^2 + (Y - y)^2 + h^2, m^2, with noise
@@ -142,8 +144,8 @@ const HALVINGS: u8 = 32;
 /// Returns the x, m, at which the first hop's SIR is largest, for an interferer behind Tx (X < 0).
 ///
 /// With s = (X - x)^2 + Y^2 + h^2 and q = X^2 + Y^2 the slope of that SIR has the sign of X x - q - X h^2 / x - nu s^2,
-/// which falls with x. So there is a single maximum: without noise a root of a quadratic, with noise an x closer to
-/// Tx, found by bisection.
+/// which falls with x. So there is a single maximum. Without noise it is a root of a quadratic; with noise it is closer
+/// to Tx, and found by bisection.
 fn first_hop_peak(mission: &Mission, interferer: &Interferer, altitude_m: f32) -> f32 {
     let Interferer { x_m, y_m, .. } = *interferer;
     let (q, b) = (square(x_m) + square(y_m), square(altitude_m));

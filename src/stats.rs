@@ -41,20 +41,20 @@ pub struct Stats {
     /// Received intact frames from a node that is no neighbour. On a point-to-point link also frames for another
     /// node.
     pub misaddressed: u32,
-    /// Received messages from the wrong neighbour. These are messages along the chain from the next relay, or replies
-    /// from the previous relay.
+    /// Received messages along the chain from the next relay, or replies from the previous relay. Both come from the
+    /// wrong neighbour.
     pub misdirected: u32,
     /// Ignored messages of another mission, and offers of a mission that this relay refuses. The events are
     /// [`Event::MissionMismatch`](crate::Event::MissionMismatch) and
     /// [`Event::UploadRefused`](crate::Event::UploadRefused).
     pub mission: u32,
-    /// Number of ignored messages with the digest of another view or mission than this relay uses. Counted are messages of passes along the
-    /// chain and of view changes.
+    /// Ignored messages with the digest of another view or mission. Counted are view changes and messages along the
+    /// chain.
     pub view: u32,
     /// Views (chain memberships) that this relay has accepted.
     pub views: u32,
-    /// Ignored outdated messages, for example of a pass along the chain or a view change that has ended. Mission
-    /// offers that this relay has not requested by a recent hello also count here.
+    /// Ignored outdated messages, for example of a view change that has ended. Mission offers that this relay has not
+    /// requested by a recent hello also count here.
     pub stale: u32,
     /// Rejected interference samples: not a number, out of range, or while this relay measures nothing.
     pub samples_rejected: u32,

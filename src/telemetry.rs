@@ -30,21 +30,21 @@ pub struct Report {
     pub holds_lease: bool,
     /// Control state of the drone; `None` for a relay without an autopilot link.
     pub control: Option<State>,
-    /// Reasons why the drone holds its position, because of the neighbours toward Tx and toward Rx.
+    /// Reasons why the drone holds its position: because of the neighbour toward Tx, and toward Rx.
     pub hold_reasons: [Option<HoldReason>; 2],
     /// Node numbers of the relay's neighbours toward Tx and toward Rx; `None` for no neighbour.
     pub neighbours: [Option<u16>; 2],
-    /// True for each neighbour, toward Tx and toward Rx, that the relay does not receive now.
+    /// True for a neighbour that the relay does not receive now: toward Tx, and toward Rx.
     pub silent: [bool; 2],
     /// True if the relay has received another node with its own number within three times `dead_after`.
     pub is_duplicated: bool,
     /// True while the drone's autopilot flies to a target other than the setpoint that the relay has sent.
     pub refuses_setpoint: bool,
-    /// Number of the nearest node that the relay refuses for another mission; `None` for none.
+    /// Number of the nearest node that the relay ignores because of another mission; `None` for none.
     pub other_mission: Option<u16>,
     /// Number of the nearest node whose last handshakes were signed with another key; `None` for none.
     pub other_key: Option<u16>,
-    /// Interference last measured at this relay, W, to 0.8 %; `None` if not measured.
+    /// Interference last measured at this relay, W, rounded to 0.8 %; `None` if not measured.
     pub interference_w: Option<f32>,
     /// Version of the mission that the relay flies.
     pub version: u16,
@@ -86,9 +86,9 @@ const HOLDS: [HoldReason; 7] = [
     HoldReason::Halted,
 ];
 
-/// Returns the number of the node that the relay of this entry refuses; `None` for none.
+/// Returns the number of the node whose messages the relay of this entry ignores; `None` for none.
 ///
-/// `first` is 1 for refusals because of another mission, and 9 for refusals because of another key.
+/// `first` is 1 if another mission is the reason, and 9 if another key is the reason.
 fn refused(entry: &Entry, first: u16) -> Option<u16> {
     match entry.refusal().checked_sub(first)? {
         toward_tx @ 0..CANDIDATES => entry.relay().checked_sub(toward_tx + 1),
@@ -105,7 +105,7 @@ fn numbered<T: Copy>(all: &[T], number: u16) -> Option<T> {
 impl Report {
     /// Creates the report of one relay from its `entry` of time `at` and its last details.
     ///
-    /// Not part of the public interface: for captures, which tests and tools of this workspace decode.
+    /// Not part of the public interface: tests and tools of this workspace decode captures with it.
     #[doc(hidden)]
     pub fn of(entry: &Entry, detail: Option<Detail>, at: Instant) -> Self {
         let state = entry.state();

@@ -76,7 +76,7 @@ impl Duration {
     }
 
     /// Returns the duration times `times`, saturating.
-    #[inline(never)] // 70 bytes of flash where it stands
+    #[inline(never)] // otherwise 70 bytes of flash at each call
     pub const fn times(self, times: u32) -> Self {
         Self {
             micros: self.micros.saturating_mul(times as u64),
@@ -87,7 +87,7 @@ impl Duration {
 impl Add<Duration> for Instant {
     type Output = Self;
 
-    #[inline(never)] // it stands in a hundred places
+    #[inline(never)] // called from about a hundred places
     fn add(self, span: Duration) -> Self {
         Self {
             micros: self.micros.saturating_add(span.micros),
@@ -95,12 +95,12 @@ impl Add<Duration> for Instant {
     }
 }
 
-/// Maximum backward step of the caller's time that counts as calls in the wrong order. After a larger step the
-/// caller's clock counts as changed.
+/// Maximum backward step of the caller's time that counts as calls in the wrong order. A larger step counts as a change
+/// of the caller's clock.
 const DISORDER: Duration = Duration::from_millis(100);
 
-/// Maximum advance of internal time in one call, some 140 years. The limit keeps one wrong reading of the clock from
-/// taking internal time to its maximum, at which no timer would expire.
+/// Maximum advance of internal time in one call, about 140 years. Without this limit, one wrong reading of the clock
+/// could take internal time to its maximum, and no timer would expire any more.
 const LONGEST: Duration = Duration::from_micros(1 << 52);
 
 /// Clock that converts the caller's time to internal time, which never runs backward. The caller's time can step in
@@ -158,8 +158,8 @@ impl MonotonicClock {
     }
 }
 
-/// Converts `at` between two clocks: returns `to` + (`at` - `from`). The first clock shows `from` when the second
-/// shows `to`.
+/// Converts `at` from one clock to another: returns `to` + (`at` - `from`). The first clock shows `from` when the
+/// second shows `to`.
 fn shifted(at: Instant, from: Instant, to: Instant) -> Instant {
     let back = from.since(at).as_micros();
     Instant::from_micros((to + at.since(from)).as_micros().saturating_sub(back))

@@ -2,8 +2,10 @@
 
 use crate::mission::MAX_RELAYS;
 
-/// Identifier of a view, an agreement on the members of the chain. It consists of a number and of the node that
-/// proposed the view, so that no two nodes propose the same view. Views are ordered by number, then by proposer.
+/// Identifier of a view, which is an agreement on the members of the chain.
+///
+/// It consists of a number and of the node that proposed the view, so that no two nodes propose the same view. Views
+/// are ordered by number, then by proposer.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ViewId(u32);
@@ -50,8 +52,8 @@ impl ViewId {
         }
     }
 
-    /// Returns `view` with its number limited to this view's number plus `most`. So a received view raises the known
-    /// number only by bounded steps.
+    /// Returns `view` with its number limited to this view's number plus `most`. This bounds the step by which a
+    /// received view can raise the known number.
     pub(crate) const fn toward(self, view: Self, most: u32) -> Self {
         let number = self.number() + most;
         if view.number() > number {
@@ -61,9 +63,8 @@ impl ViewId {
         }
     }
 
-    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. Views with the same
-    /// number and different proposers have different values. Thousands of consecutive views also have different
-    /// values.
+    /// Returns a 16-bit value for this view, to be added to the mission's digest in messages. It differs for views with
+    /// the same number and different proposers, and for thousands of consecutive views.
     pub(crate) const fn mark(self) -> u16 {
         let [a, b, c, d] = self.0.to_le_bytes();
         u16::from_le_bytes([a, b]).wrapping_add(u16::from_le_bytes([d, c]))

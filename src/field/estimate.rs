@@ -30,8 +30,8 @@
 use super::is_upsilon;
 use crate::root::sqrt;
 
-/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. In this format no sum of samples or squares
-/// overflows.
+/// Value 1 in the fixed-point format of the samples I / `I_max`: 2^31. Sums of samples and of squares do not overflow
+/// in this format.
 const ONE: f32 = 2_147_483_648.0;
 
 /// Number of fractional bits of the fixed-point numbers in which interference samples are summed.
@@ -41,7 +41,7 @@ const FRACTION: u32 = 31;
 /// falsify the estimate.
 const LEAST_MEAN: f32 = 1e-6;
 
-/// Estimator of the mean interference power at one position; samples are summed, not stored.
+/// Estimator of Upsilon, the mean inverse interference power, at one position. It stores sums, not samples.
 ///
 /// 40 bytes on a Cortex-M4F. Samples must be independent: if they are taken faster than the interference changes, the true error is larger
 /// than the stated standard error.
@@ -81,8 +81,8 @@ pub struct Estimate {
 impl Estimator {
     /// Minimum number of accepted samples for an estimate.
     ///
-    /// An estimate from so few samples can still be bad. Example: 100 samples, and a true alpha below 1.5. Then most
-    /// estimates exist only because alpha is overestimated by chance, and the estimated Upsilon is too low.
+    /// An estimate from so few samples can still be bad. With 100 samples and a true alpha below 1.5, most estimates
+    /// exist only because alpha is overestimated by chance. The estimated Upsilon is then too low.
     pub const MIN_SAMPLES: u32 = 100;
 
     /// Creates an estimator without samples. `i_max_w` is the maximum interference power, W: 1e-30 to 1e6.
@@ -182,13 +182,13 @@ impl Estimator {
     }
 }
 
-/// Beta distribution that has the mean and the variance of the samples.
+/// Beta distribution with the mean and the variance of the samples.
 struct Fit {
-    /// Mean m of the accepted samples, each the interference power I divided by `I_max`.
+    /// Mean m of the accepted samples I / `I_max`.
     m: f32,
-    /// Difference 1 - m, where m is the mean of the samples I / `I_max`; computed without loss of digits.
+    /// Difference 1 - m, where m is the mean of the samples; computed without loss of digits.
     rest: f32,
-    /// Standard deviation s of the accepted samples, each the interference power I divided by `I_max`.
+    /// Standard deviation of the accepted samples I / `I_max`.
     s: f32,
     /// Sum alpha + beta of the two shape parameters of the fitted Beta distribution.
     w: f32,

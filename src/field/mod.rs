@@ -1,4 +1,4 @@
-//! Interference field: interference that is known by its distribution along x only.
+//! Interference field: interference that is known as a distribution along x, not by its source.
 //!
 //! With the interference power I(x) a random variable, the expected SIR at x is the received signal power times Upsilon(x) = E[1
 //! / I(x)], in 1/W; placement needs nothing else of the distribution. A [`Field`] is a table of Upsilon along x. If I / `I_max`
@@ -9,8 +9,8 @@ mod in_noise;
 
 pub(crate) use in_noise::InNoise;
 
-/// Allowed range of Upsilon = E[1/I], 1/W. The range corresponds to an interference I of 1e9 W down to 1e-32 W, more
-/// than any receiver measures.
+/// Allowed range of Upsilon = E[1/I], 1/W. It corresponds to an interference I of 1e9 W down to 1e-32 W, more than any
+/// receiver measures.
 const UPSILON: (f32, f32) = (1e-9, 1e32);
 
 /// Point of a [`Field`]: an x, and Upsilon = E[1/I] at this x. Upsilon is the mean of the inverse interference power.
@@ -157,8 +157,8 @@ impl Field {
         self.in_noise(0.0).upsilon(x_m)
     }
 
-    /// Returns the two points around `x_m`. If `x_m` is at a point or beyond the table, returns this point or the end
-    /// point, and `None`.
+    /// Returns the two points around `x_m`. If `x_m` is at a point or beyond the table, the first result is this point
+    /// or the end point, and the second is `None`.
     const fn around(&self, x_m: f32) -> (FieldPoint, Option<FieldPoint>) {
         let mut around = self.points;
         while around.len() > 2 {
@@ -224,8 +224,8 @@ impl FieldPoint {
         }
     }
 
-    /// Returns a point at `x_m`, m, of a field. At this x the ratio of the interference power I to `i_max_w` has a
-    /// Beta distribution.
+    /// Returns the point of a field at `x_m`, m, if I / `i_max_w` has a Beta distribution there. I is the interference
+    /// power.
     ///
     /// `None` if [`beta_upsilon`](Self::beta_upsilon) is `None` for the same shapes and `i_max_w`. Constant work.
     #[expect(

@@ -1,4 +1,4 @@
-//! The mission: everything the relays agree on before flight, validated once.
+//! Mission: everything that the relays must know alike before flight, validated once.
 //!
 //! [`MissionConfig`] has the parameters as plain numbers, and [`MissionError`] names a rejected one; a [`Mission`] has checked parameters, and
 //! quantities derived from them.
@@ -18,7 +18,7 @@ pub(crate) mod tests;
 pub(crate) const MAX_RELAYS: u16 = 1000;
 
 /// Smallest step in x between two relays, as a fraction of the distance from Tx to Rx. It is at least two steps of an
-/// f32 even near Rx, so that positions stay distinct.
+/// f32 even near Rx, so that no two positions are equal.
 pub(super) const FINEST_STEP: f32 = 1.0 / 4_194_304.0;
 
 /// Maximum rounding error of a step in x, as a fraction of the distance from Tx to Rx.
@@ -47,15 +47,16 @@ pub struct MissionConfig {
     pub lateral: Band,
     /// Path loss of the three kinds of link: drone to drone, drone to ground, and interferer to Rx.
     pub channel: Channel,
-    /// Interference on the hops: one transmitter at a known or unknown position, or a field. A field is a
-    /// distribution along x.
+    /// Interference on the hops: one transmitter, at a known or unknown position, or a field. A field is a distribution
+    /// along x.
     pub interference: Interference,
     /// Noise power at the input of every receiver, W. 0 to 1, and at most 1e12 times the interferer's power received at 1 m. 0 is
     /// the paper's receiver; otherwise every SIR is the SINR, signal over interference plus noise.
     pub noise_w: f32,
-    /// SIR that a hop needs in the direction from Rx to Tx, relative to the SIR from Tx to Rx (r): 0 to 1. 0 means
-    /// one direction only, as in the paper. Above 0, the worse of two SIRs counts, once the interference is known:
-    /// the forward SIR, and the backward SIR divided by r.
+    /// SIR that a hop needs from Rx to Tx, divided by the SIR that it needs from Tx to Rx: r, 0 to 1.
+    ///
+    /// 0 means one direction only, as in the paper. Above 0, the lower of two SIRs counts once the interference is
+    /// known: the forward SIR, and the backward SIR divided by r.
     pub reverse: f32,
     /// Transmit power of the ground receiver when it sends toward Tx, W: 1e-6 to 1e6. Without effect if `reverse` is
     /// 0.
@@ -133,7 +134,7 @@ pub enum MissionError {
     Noise,
     /// `noise_w` is above 0, and the crate was built without its feature `noise`.
     NoiseFeature,
-    /// The interference is a field, and the crate was built without its feature `field`.
+    /// The interference is a field (a distribution along x), but the crate was built without `field`.
     Field,
     /// `reverse` is not within 0 to 1.
     Reverse,
@@ -179,7 +180,7 @@ pub struct Interferer {
     pub power_w: f32,
     /// Position of the interferer along the line from Tx (0) to Rx (D), m; may be before Tx or beyond Rx.
     pub x_m: f32,
-    /// Lateral offset of the interferer from the line Tx to Rx, m: to its right above 0, to its left below.
+    /// Lateral offset of the interferer, m: positive to the right of the line Tx to Rx, else negative.
     pub y_m: f32,
 }
 
@@ -206,7 +207,7 @@ pub enum Interference {
     Source(Interferer),
     /// Interference field: only the distribution of the interference along x is known.
     Field(Field),
-    /// Single interfering transmitter at an unknown position. Relays spread evenly until they find it
+    /// Single interfering transmitter at an unknown position. Relays spread evenly until they know it
     /// ([`crate::Settings::listen`]).
     Unknown,
 }
@@ -313,14 +314,14 @@ pub struct Mission {
     /// ground and drone to drone, and `p_MSI` is the interferer's power. In an interference field the gain is
     /// `Upsilon_max` / `mu_los`, m^2/W.
     pub(super) relay_gain_per_w: f64,
-    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's
-    /// power, divided by the squared distance.
+    /// Gain of the last hop per watt of its sender's power, m^2/W. The SIR at Rx is this gain times the sender's power,
+    /// divided by the squared distance.
     ///
     /// With an interferer of power `p_MSI` at (X, Y), the gain is (`mu_nlos` / eta) ((X - D)^2 + Y^2) / `p_MSI`. In a
-    /// field it is Upsilon(D) / eta. With noise, it refers to the interference plus noise at Rx.
+    /// field it is Upsilon(D) / eta. With noise, the interference at Rx includes the noise.
     pub(super) receiver_gain_per_w: f64,
     /// Receiver noise divided by the interferer's power received at 1 m: nu = N eta / `p_MSI`, 1/m^2. It is 0 without
-    /// noise and in an interference field.
+    /// noise and for a mission with an interference field.
     pub(super) noise_at_a_metre: f32,
 }
 
@@ -537,13 +538,13 @@ impl Mission {
         self.config.relays
     }
 
-    /// Returns the kind of interference that the relays suffer in this mission.
+    /// Returns the kind of interference in this mission.
     pub const fn interference(&self) -> &Interference {
         &self.config.interference
     }
 
-    /// Returns the interferer; `None` in an interference field. For an unknown interferer the result is a substitute
-    /// far away, with equal interference everywhere.
+    /// Returns the interferer; `None` for a mission with an interference field. For an unknown interferer the result is
+    /// a substitute far away, with equal interference everywhere.
     pub const fn interferer(&self) -> Option<&Interferer> {
         match &self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -560,7 +561,7 @@ impl Mission {
         }
     }
 
-    /// Returns the interference field combined with the receiver noise, or `None` without a field.
+    /// Returns the interference field combined with the receiver noise. `None` for a mission without a field.
     #[doc(hidden)]
     pub const fn heard(&self) -> Option<InNoise<'_>> {
         match self.field() {
@@ -578,7 +579,7 @@ impl Mission {
         if NOISE { self.noise_at_a_metre } else { 0.0 }
     }
 
-    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. 0 for one
+    /// Returns the ratio r: the SIR that a hop needs from Rx to Tx, divided by the SIR from Tx to Rx. It is 0 for one
     /// direction.
     ///
     /// While the interferer is unknown r is 0, because relays then spread evenly. Without the feature `reverse` the
@@ -601,8 +602,8 @@ impl Mission {
         }
     }
 
-    /// Returns the order in which the relays compute their positions. The order is toward Rx (relay 1 to relay N). In
-    /// an interference field it is toward Tx (relay N to relay 1).
+    /// Returns the order in which the relays compute their positions. It is toward Rx (relay 1 to N), or in an
+    /// interference field toward Tx (relay N to 1).
     #[doc(hidden)]
     pub const fn heading(&self) -> Heading {
         match self.field() {
@@ -611,8 +612,8 @@ impl Mission {
         }
     }
 
-    /// Returns the index of the leader, the first relay to compute its position. It is 1, or N in an interference
-    /// field.
+    /// Returns the index of the leader, which computes its position first. It is 1, or N for a mission with an
+    /// interference field.
     pub const fn leader(&self) -> u16 {
         match self.heading() {
             Heading::TowardRx => 1,
@@ -620,8 +621,7 @@ impl Mission {
         }
     }
 
-    /// Returns the relay whose position is computed after the position of relay `index`. `None` if relay `index` is
-    /// the last.
+    /// Returns the relay whose position is computed next after relay `index`. `None` if relay `index` is the last.
     pub const fn after(&self, index: u16) -> Option<u16> {
         match self.heading() {
             Heading::TowardRx if index < self.config.relays => Some(index + 1),
@@ -647,26 +647,27 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the gain A of the first hop. The SIR of this hop is A times [`crate::sir::quiet`], the inverse
-    /// interference, divided by the squared length. With one interferer A is the power of Tx divided by the power of
-    /// the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
+    /// Returns the gain A of the first hop. The SIR of this hop is A times the inverse interference
+    /// ([`crate::sir::quiet`]), divided by the squared length. With one interferer A is the power of Tx divided by the
+    /// power of the interferer, `p_t` / `p_MSI`. In an interference field A is `p_t` `Upsilon_max` / eta.
     #[doc(hidden)]
     pub const fn tx_gain(&self) -> PowerRatio {
         self.tx_gain
     }
 
-    /// Returns the gain of a hop from a relay of `power_w` watts to another drone. The hop's SIR is this gain times
-    /// [`crate::sir::quiet`], the inverse interference, divided by the squared length. With one interferer the gain
-    /// is (`p_u` / `p_MSI`) (eta / `mu_los`): the powers of relay and interferer, and the path-loss factors drone to
-    /// ground and drone to drone. In an interference field it is `p_u` `Upsilon_max` / `mu_los`, with the field's
-    /// largest E[1/I].
+    /// Returns the gain of a hop from a relay of `power_w` watts to another drone.
+    ///
+    /// The hop's SIR is this gain times the inverse interference ([`crate::sir::quiet`]), divided by the squared
+    /// length. With one interferer the gain is (`p_u` / `p_MSI`) (eta / `mu_los`). `p_u` and `p_MSI` are the powers of
+    /// relay and interferer, eta and `mu_los` the path-loss factors drone to ground and drone to drone. In an
+    /// interference field the gain is `p_u` `Upsilon_max` / `mu_los`, with the field's largest E[1/I].
     #[doc(hidden)]
     pub const fn relay_gain(&self, power_w: f32) -> PowerRatio {
         PowerRatio::new(power_w as f64 * self.relay_gain_per_w)
     }
 
-    /// Returns the factor K of the last hop, m^2. The SIR at Rx is K divided by the squared distance to the last
-    /// relay. The last relay sends with `power_w` watts.
+    /// Returns the factor K of the last hop, m^2, for a last relay of `power_w` watts. The SIR at Rx is K divided by
+    /// the squared length of this hop.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a float that fits by the ranges of the mission"
@@ -676,10 +677,11 @@ impl Mission {
         (power_w as f64 * self.receiver_gain_per_w) as f32
     }
 
-    /// Returns G, m^2, which determines the optimal position of a single relay. The relay sends with `power_w` watts.
+    /// Returns G, m^2, which determines the optimal position of a single relay of `power_w` watts.
+    ///
     /// G is K / A: the last hop's factor K divided by the first hop's gain A. With one interferer at (X, Y) it is
-    /// (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and
-    /// of Tx. `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
+    /// (`p_u` / `p_t`) (`mu_nlos` / eta) ((X - D)^2 + Y^2). `p_u` and `p_t` are the transmit powers of the relay and of
+    /// Tx. `mu_nlos` is the path-loss factor from the interferer to Rx, eta the path-loss factor between drone and
     /// ground.
     #[doc(hidden)]
     pub fn last_to_first(&self, power_w: f32) -> f64 {
@@ -699,8 +701,8 @@ impl Mission {
 }
 
 impl Mission {
-    /// Returns the minimum step in x, m, that keeps two neighbours at their minimum separation. `across_squared`,
-    /// m^2, is their squared distance across the line, in y and altitude.
+    /// Returns the minimum step in x, m, that keeps two neighbours at their minimum separation. `across_squared`, m^2,
+    /// is their squared distance in y and altitude.
     pub(crate) fn least_step(&self, across_squared: f32) -> f32 {
         let apart = self.config.min_separation_m;
         if !(across_squared > 0.0) {
@@ -710,30 +712,29 @@ impl Mission {
     }
 
     /// Returns the minimum step in x for the separation of two neighbours, m, plus a margin for rounding.
-    /// `across_squared`, m^2, is their squared distance across the line, in y and altitude.
+    /// `across_squared`, m^2, is their squared distance in y and altitude.
     pub(crate) fn step_with_room(&self, across_squared: f32) -> f32 {
         self.step_of(self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m. At this x the relays that are computed after relay `index`
-    /// can still keep their minimum separation.
+    /// Returns the farthest allowed x of relay `index`, m, with room for the separation of later relays. Later relays
+    /// are those whose positions are computed after this one.
     ///
-    /// Farthest means toward Rx, or toward Tx in an interference field. `across_squared` is the maximum squared
-    /// distance across the line (in y and altitude) between two neighbours among those relays, m^2; it reduces the
-    /// steps in x.
+    /// Farthest means toward Rx, or toward Tx with an interference field. `across_squared` is the largest squared
+    /// distance, in y and altitude, between two neighbours among those later relays, m^2. It reduces their steps in x.
     pub(crate) fn end_for(&self, index: u16, across_squared: f32) -> f32 {
         self.end_after(self.behind(index), self.least_step(across_squared))
     }
 
-    /// Returns the farthest allowed x of relay `index`, m, without the separation of the relays after it.
+    /// Returns the farthest allowed x of relay `index`, m, without room for the separation of later relays. Later
+    /// relays are those whose positions are computed after this one.
     ///
-    /// The relays after it are those whose positions are computed later. Farthest means toward Rx, or toward Tx in an
-    /// interference field.
+    /// Farthest means toward Rx, or toward Tx with an interference field.
     pub(crate) fn end_freely(&self, index: u16) -> f32 {
         self.end_after(self.behind(index), 0.0)
     }
 
-    /// Returns the number of relays whose positions are computed after the position of relay `index`.
+    /// Returns the number of relays whose positions are computed after relay `index`.
     fn behind(&self, index: u16) -> f32 {
         f32::from(match self.heading() {
             Heading::TowardRx => self.config.relays.saturating_sub(index),
@@ -741,8 +742,7 @@ impl Mission {
         })
     }
 
-    /// Returns the largest x of relay `index`, m, that leaves enough room toward Rx. The relays between it and Rx
-    /// then have room for their minimum separation.
+    /// Returns the largest x of relay `index`, m, with room for the separation of the relays nearer to Rx.
     pub(crate) fn latest(&self, index: u16) -> f32 {
         self.latest_at(index, self.config.min_separation_m)
     }
@@ -776,12 +776,12 @@ impl Mission {
     }
 }
 
-/// Factor on the gain of the first or last hop with which this hop is half as long as the other hops. In the best chain
-/// all hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
+/// Factor on the gain of the first or last hop that makes this hop half as long as the others. In the best chain all
+/// hops have the same SIR, and the SIR of a hop is its gain divided by the squared length.
 const HALF_AS_LONG: f64 = 0.25;
 
 impl Mission {
-    /// Returns the interferer if its position is known; `None` for an unknown interferer or a field.
+    /// Returns the interferer if its position is known. `None` for an unknown interferer or an interference field.
     pub const fn known_source(&self) -> Option<Interferer> {
         match self.config.interference {
             Interference::Source(interferer) => Some(interferer),
@@ -792,8 +792,8 @@ impl Mission {
     /// Returns the mission with another `interference`.
     ///
     /// `receiver_w` is the interference power at the ground receiver, W; with 0 it is computed from `interference`.
-    /// `halved` has a flag for the first hop and a flag for the last hop. If a flag is true, the relays are placed so
-    /// that this hop is half as long as the others.
+    /// `halved` has a flag for the first hop and a flag for the last hop. A hop with a true flag becomes half as long
+    /// as the others.
     ///
     /// # Errors
     /// [`MissionError`] if the interference is out of range.
@@ -834,9 +834,10 @@ pub(super) const FAR: Interferer = Interferer {
 
 const FAR_AWAY: f64 = 1e-14;
 
-/// Returns three gains for an unknown interferer. With these gains the best chain has hops of equal length. They are
-/// the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the transmit
-/// power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
+/// Returns the gains for an unknown interferer, with which the best chain has hops of equal length.
+///
+/// They are the gain of the first hop, and the gains per watt of the other hops and of the last hop. `power_w` is the
+/// transmit power of the relays, W. Every hop of length d has the SIR (`distance_m` / d)^2.
 pub(super) const fn even_gains(distance_m: f32, power_w: f32) -> (f64, f64, f64) {
     let squared = distance_m as f64 * distance_m as f64;
     let power_w = power_w as f64;

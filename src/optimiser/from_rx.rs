@@ -1,4 +1,4 @@
-//! Last hop of the way back: the largest x at which the last relay receives Rx well enough.
+//! Hop from Rx to the last relay: the largest x at which this relay receives Rx well enough.
 //!
 //! Rx sends, and relay N receives at x. With d = D - x this is a first hop seen from Rx, with the interferer at D - X, the gain
 //! A_rx of Rx's power and the target r gamma, in the notation of [`reverse`](super::reverse). With e, C and H of [`spacing`](super::spacing)
@@ -7,8 +7,9 @@
 //! f(d) = -e d^2 - 2 u d + C >= 0,    u = D - X
 //! ```
 //!
-//! Relay N may be anywhere up to its reach M, and the way there is best at M. If f(D - M) >= 0, it takes M. Otherwise it *holds*
-//! at the largest x below M that the way back allows, hence at the smallest root d above D - M where f rises:
+//! Relay N may be anywhere up to its reach M. Data toward Rx are received best if it is at M. If f(D - M) >= 0, it
+//! takes M. Otherwise it *holds* at the largest x below M at which it receives Rx well enough. That is the smallest
+//! root d above D - M where f rises:
 //!
 //! | e | u | root |
 //! | --- | --- | --- |
@@ -19,9 +20,10 @@
 //!
 //! with r = sqrt(rho u^2 + e H) as there, none if the discriminant is negative. In each row both terms of the denominator have
 //! the same sign. With noise the root is the last one of the mirrored function g(-d), which the search of
-//! [`noisy_hop`](super::noisy_hop) finds. The other relays stop at that x too if their reaches are beyond it.
+//! [`noisy_hop`](super::noisy_hop) finds. The other relays stay at that x too if their reaches are beyond it.
 //!
-//! If relay N - 1 does not reach that x on the way there, relay N goes to the largest x below that it does reach, and so on.
+//! If relay N - 1 does not reach that x with data toward Rx, relay N goes to the largest x below that it does reach,
+//! and so on.
 //!
 //! Accuracy: `host-tests/tests/both_ways` compares chains with a grid search in f64.
 
@@ -40,7 +42,7 @@ pub(super) struct FromRx {
 }
 
 impl FromRx {
-    /// Returns the hop from Rx to the last relay, `own`. `None` for a mission of one direction.
+    /// Returns the hop from Rx to the last relay, `own`. `None` for a mission without data from Rx to Tx.
     pub(super) fn new(mission: &Mission, own: Station) -> Option<Self> {
         let (reverse, distance_m) = (mission.reverse(), mission.config().distance_m);
         if !(reverse > 0.0) {
@@ -71,9 +73,8 @@ impl FromRx {
 
     /// Returns the SIR margin of the hop from Rx to the last relay at `x_m`: (SIR / required SIR - 1) D, m.
     ///
-    /// `target` determines the required SIR. The factor D, the distance from Tx to Rx, makes the margin a length,
-    /// like the slack of a chain. The margin is below 0 if the hop misses `target`. It is a continuous function of
-    /// `target`.
+    /// D is the distance from Tx to Rx. The margin is below 0 if the hop misses `target`. It is a continuous function
+    /// of `target`.
     pub(super) fn margin(&self, target: f32, x_m: f32) -> f32 {
         let hop = self.at(target);
         let d = self.distance_m - x_m;
@@ -82,9 +83,8 @@ impl FromRx {
         (self.distance_m * ((s - needed) / needed)).min(1e9)
     }
 
-    /// Returns the largest x in [`least_m`, `x_m`] at which the last relay receives Rx well enough, m. The backward
-    /// SIR has to meet `target`. `None` if there is no such x. Call it only if the last relay misses the target at
-    /// `x_m`.
+    /// Returns the largest x in [`least_m`, `x_m`], m, at which the last relay receives Rx well enough. `None` if there
+    /// is no such x. Call it only if the SIR from Rx misses `target` at `x_m`.
     pub(super) fn hold(&self, target: f32, least_m: f32, x_m: f32) -> Option<f32> {
         let least = self.distance_m - x_m;
         let d = closest(&self.at(target), least, self.distance_m - least_m)?;
@@ -99,8 +99,8 @@ mod tests {
     use crate::mission::tests::paper;
     use crate::mission::{Interference, Interferer, Mission, MissionConfig, Profile};
 
-    /// Checks that the last relay is placed farther from Rx if its SIR from Rx is otherwise too low. The search
-    /// begins at x = 650 m. There, a strong interferer at x = 700 m makes this SIR too low. Rx is at x = 1000 m.
+    /// Checks that the last relay stays farther from Rx if its SIR from Rx is too low. The search starts at x = 650 m,
+    /// a strong interferer is at x = 700 m, and Rx at x = 1000 m.
     #[test]
     fn the_last_relay_holds_where_it_hears_rx_again() {
         let common = Profile {

@@ -1,4 +1,4 @@
-//! Ladder: the targets of one sweep, encoded in six bytes.
+//! Ladder: the target SIRs of one pass along the chain (a sweep), encoded in six bytes.
 //!
 //! Sixteen targets rise by gaps that are smallest in the middle: target j + 1 is target j times 1 + gap x growth^|j - 7|. So a
 //! ladder is dense near the expected optimum and still spans the whole bracket. It is computed from target 7 in both directions,
@@ -8,10 +8,10 @@
 use super::PerTarget;
 use crate::root::sqrt;
 
-/// Number of target SIRs in a full ladder, the set of targets that one sweep along the chain tries.
+/// Number of target SIRs in a full ladder, the list of targets of one sweep along the chain.
 pub const TARGETS: usize = 16;
 
-/// Number of gaps between targets in half of a full ladder (list of targets), including the middle gap.
+/// Number of gaps between targets in half of a full ladder, including the middle gap.
 const HALF: usize = TARGETS / 2;
 
 /// Ladder: rising list of target SIRs, linear, for one pass along the chain (a sweep). Encoded as one target and two
@@ -19,15 +19,14 @@ const HALF: usize = TARGETS / 2;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ladder {
-    /// Lower one of the two middle targets, linear SIR: the eighth of 16 targets. In a ladder with a single target it
-    /// is this target.
+    /// Eighth of the 16 targets, linear SIR: the lower of the two in the middle. If there is only one target, it is
+    /// this one.
     anchor: f32,
-    /// Code of the relative width of the gap between the two middle targets. The width is the difference of the two
-    /// targets divided by the lower target. The code is a float of 5 exponent and 3 mantissa bits. Code 0: `anchor`
-    /// is the only target.
+    /// Code of the relative gap between the two middle targets: their difference divided by the lower one. The code is
+    /// a float of 5 exponent and 3 mantissa bits. With code 0, `anchor` is the only target.
     gap: u8,
-    /// Code of the growth of the gaps between targets from the middle of the list to its ends. Each gap is 1 +
-    /// `growth` / 16 times the next one toward the middle.
+    /// Code of the growth of the gaps from the middle of the list to its ends. Each gap is 1 + `growth` / 16 times its
+    /// neighbour toward the middle.
     growth: u8,
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
     /// stay short of that x to help the next relay on the pass.
@@ -129,8 +128,7 @@ impl Ladder {
         (self.anchor, self.gap, self.growth)
     }
 
-    /// Returns true if the ladder has a single target. If this target is feasible, the last relay commits the chain
-    /// to it.
+    /// Returns true if the ladder has a single target. If the chain meets it, the last relay commits the chain to it.
     pub const fn is_single(&self) -> bool {
         self.gap == 0
     }
@@ -174,8 +172,8 @@ fn gaps(gap: u8, growth: u8) -> [f32; HALF] {
     })
 }
 
-/// Returns a ladder's highest target divided by the lower of its two middle targets. The higher middle target divided
-/// by the lowest target gives the same ratio. `gap` and `growth` are the codes in a [`Ladder`].
+/// Returns the ratio of a ladder's highest target to the lower of its two middle targets. `gap` and `growth` are the
+/// codes in a [`Ladder`].
 fn half_span(gap: u8, growth: u8) -> f32 {
     gaps(gap, growth)
         .iter()
@@ -190,13 +188,13 @@ fn equal_gap(low: f32, high: f32, gaps: f32) -> f32 {
     libm::expm1f(libm::log1pf((high - low) / low) / gaps)
 }
 
-/// Returns the relative width of the gap between two targets, encoded by the byte `code`. The width is
-/// (1 + m / 8) 2^(e - 25). m is the number in the low three bits of `code`, e the number in the other five bits.
+/// Returns the relative gap between two targets for the byte `code`: (1 + m / 8) 2^(e - 25). m is the number in the low
+/// three bits of `code`, e the number in the other five bits.
 const fn gap_value(code: u8) -> f32 {
     f32::from_bits(((code as u32) << 20) + (102 << 23))
 }
 
-/// Returns the one-byte code, 1 to 254, of the gap width that is nearest to `gap`.
+/// Returns the one-byte code, 1 to 254, of the relative gap nearest to `gap`.
 fn gap_code(gap: f32) -> u8 {
     let bits = gap.to_bits().saturating_sub(102 << 23);
     let rounded = bits.saturating_add(1 << 19) >> 20;

@@ -1,13 +1,14 @@
 //! Algorithm 2's local search: the position of one relay that maximises the worse of its two hops.
 //!
-//! It searches the rectangle between the neighbours along x and within `explore` of the current altitude, by one of two methods.
-//! The paper's is a grid. The other goes from coarse to fine: five altitudes, of which the best one and its neighbours bound the
-//! next five; for each altitude the x where the SIRs of both hops are equal is found by bisection. Where all hops are equal, as
-//! after Algorithm 1, a grid has no better point, but this method finds one.
+//! It searches between the neighbours along x, and within `explore` of the current altitude, by one of two methods. The
+//! paper's method is a grid. The other method goes from coarse to fine: of five altitudes, the best one and its
+//! neighbours bound the next five. At each altitude, the x where the SIRs of both hops are equal is found by bisection.
+//! Where all hops are equal, as after Algorithm 1, a grid has no better point, but this method finds one.
 //!
-//! With a way back each hop counts by its worse direction, and close to the interferer the relay also hears the next one worse. So
-//! a row may have several maxima on each side of the interferer: smooth ones, and narrow ones where the SIRs of both hops are equal.
-//! Each side is sampled evenly. The best sample is improved by steps that halve, and equal SIRs are found by bisection.
+//! With data in both directions each hop counts by its worse direction, and a relay close to the interferer receives
+//! both neighbours worse. So there may be several maxima along x on each side of the interferer: smooth ones, and
+//! narrow ones where the SIRs of both hops are equal. Each side is sampled evenly. The best sample is improved by steps
+//! that halve, and equal SIRs are found by bisection.
 //!
 //! Accuracy and effect: `host-tests/tests/adjust.rs`.
 
@@ -29,8 +30,8 @@ const ROUNDS: u8 = 9;
 /// Number of bisection steps along x for each altitude of the coarse-to-fine search.
 const HALVINGS: u8 = 20;
 
-/// Number of equal intervals of x on each side of the interferer. The search evaluates both hops at the ends of the
-/// intervals. It is used only for traffic in both directions.
+/// Number of equal intervals of x on each side of the interferer, for data in both directions. The search evaluates
+/// both hops at the ends of the intervals.
 const SAMPLES: u8 = 12;
 
 const ROUNDING: f32 = 3e-7;
@@ -52,32 +53,31 @@ pub enum Local {
     },
 }
 
-/// Neighbour of the relay that searches for its best position: an end of one of the relay's two hops.
+/// Neighbour of a relay whose position is searched. It is the other end of one of the relay's two hops.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct HopEnd {
     /// Position of the neighbour.
     pub place: Placement,
-    /// Minimum distance between the neighbour and the relay that searches, m.
+    /// Minimum distance between the neighbour and the relay, m.
     pub apart_m: f32,
     /// Transmit power of the neighbouring node, W.
     pub power_w: f32,
 }
 
-/// Hops of a relay: from the node toward Tx to the relay, and from the relay to the node toward Rx. The relay can be at
-/// any position.
+/// Two hops of a relay at any position: from the node toward Tx, and to the node toward Rx.
 ///
-/// The squared lengths of the hops are l, and the inverse interference at the relay is q. The SIRs of the hop from
-/// the node toward Tx are A q / l, with the gain A, and backward `returned` / l. The SIRs of the hop to the node
-/// toward Rx are `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the
-/// required ratio of backward to forward SIR.
+/// l is the squared length of a hop, and q the inverse interference at the relay. For the hop from the node toward Tx
+/// the SIRs are A q / l, with the gain A, and backward `returned` / l. For the hop to the node toward Rx they are
+/// `received` / l, and backward A' q / l, with the gain A'. Backward SIRs are divided by r, the required ratio of
+/// backward to forward SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hops {
     before: HopEnd,
     after: HopEnd,
-    /// Gain A of the hop from the previous node. The hop's SIR is A times the inverse interference, divided by the
+    /// Gain A of the hop from the node toward Tx. The hop's SIR is A times the inverse interference, divided by the
     /// squared length.
     gain: f32,
-    /// SIR of the relay's signal at the next node toward Rx, times the squared length of the hop, m^2.
+    /// SIR at the node toward Rx that receives this relay, times the squared length of the hop, m^2.
     received: f32,
     back: WayBack,
     interferer: Interferer,
@@ -85,12 +85,12 @@ pub struct Hops {
     noise: f32,
 }
 
-/// Gains of both hops for traffic from Rx to Tx, divided by r; infinite for a mission of one direction.
+/// Gains of both hops for data from Rx to Tx, divided by r; infinite for a mission without such data.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct WayBack {
-    /// SIR of the relay's signal at the node toward Tx, times the squared length of the hop, m^2.
+    /// SIR at the node toward Tx that receives this relay, times the squared length of the hop, m^2.
     returned: f32,
-    /// Gain A' of the backward hop from the next node toward Rx to the relay.
+    /// Gain A' of the backward hop from the node toward Rx to the relay.
     gain: f32,
 }
 
@@ -100,7 +100,7 @@ impl WayBack {
         gain: f32::INFINITY,
     };
 
-    #[inline(never)] // keeps turns of one direction small
+    #[inline(never)] // keeps the code for one direction small
     fn new(
         mission: &Mission,
         before: Option<HopEnd>,
@@ -127,8 +127,8 @@ impl WayBack {
 }
 
 impl Hops {
-    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx (`None` for Tx itself),
-    /// `after` the node toward Rx (`None` for Rx).
+    /// Returns the two hops of a relay of `power_w` watts. `before` is the node toward Tx (`None` for Tx), `after` the
+    /// node toward Rx (`None` for Rx).
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -188,7 +188,7 @@ impl Hops {
         REVERSE && self.back.gain < f32::INFINITY
     }
 
-    /// Returns the SIR of the worse one of the two hops with the relay at `at`: the paper's local SIR.
+    /// Returns the SIR of the worse of the two hops with the relay at `at`: the paper's local SIR.
     pub fn worse(&self, at: Placement) -> f32 {
         let (incoming, outgoing) = self.both(at);
         incoming.min(outgoing)
@@ -210,7 +210,7 @@ impl Hops {
     }
 }
 
-/// Search for a relay's best position between its two neighbours, which is continued in steps.
+/// Search for a relay's best position between its two neighbours, in steps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LocalSearch {
     how: Local,
@@ -226,12 +226,11 @@ pub struct LocalSearch {
     column: u8,
     /// Best altitude of the current round, m, and the SIR of the worse hop there.
     best_row: (f32, f32),
-    /// Best position found so far if it is better than the relay's current position; else `None`.
+    /// Best position found so far; `None` if no position is better than the relay's current one.
     found: Option<Placement>,
-    /// Linear SIR of the worse hop at the best position found. Without a better position it is the SIR at the current
-    /// position.
+    /// Linear SIR of the worse hop at the best position found. Before that it is the SIR at the current position.
     best_sir: f32,
-    /// Number of evaluations at the current altitude, counted for traffic in both directions only.
+    /// Number of evaluations at the current altitude. Counted only for data in both directions.
     evaluations: u16,
 }
 
@@ -243,7 +242,7 @@ impl LocalSearch {
     pub fn new(how: Local, hops: Hops, at: Placement, explore_m: f32, band: (f32, f32)) -> Self {
         let low_m = (at.altitude_m - explore_m).max(band.0);
         let high_m = (at.altitude_m + explore_m).min(band.1);
-        // A relay farther than that outside of the band has no allowed altitude.
+        // A relay that is more than `explore_m` outside of the band has no allowed altitude.
         let nowhere = !(low_m <= high_m);
         Self {
             how,
@@ -255,7 +254,7 @@ impl LocalSearch {
             round: if nowhere { ROUNDS } else { 0 },
             row: 0,
             column: if nowhere { u8::MAX } else { 0 },
-            // If no row of a round is allowed, this altitude bounds the next round; one outside of the band would lead out of it.
+            // If no altitude of a round is allowed, this one bounds the next round, so it must be inside the band.
             best_row: (at.altitude_m.max(low_m).min(high_m), -1.0),
             found: None,
             best_sir: hops.worse(at),
@@ -300,8 +299,8 @@ impl LocalSearch {
         sir
     }
 
-    /// Returns an altitude in the range that the current round tries, m. `part` 0 is the lowest altitude of the range,
-    /// 1 the highest. The result never exceeds the highest altitude, in spite of rounding.
+    /// Returns an altitude in the range of the current round, m. `part` 0 is the lowest altitude, 1 the highest. The
+    /// result never exceeds the highest altitude, in spite of rounding.
     fn altitude(&self, part: f32) -> f32 {
         (self.low_m + (self.high_m - self.low_m) * part).min(self.high_m)
     }
@@ -336,8 +335,8 @@ impl LocalSearch {
         })
     }
 
-    /// Searches the best x at `altitude_m`. For traffic in one direction both hops usually have equal SIRs at this x.
-    /// Returns the SIR of the worse hop at the best x found, or -1 if no x is allowed.
+    /// Searches the best x at `altitude_m`. For data in one direction both hops usually have equal SIRs there. Returns
+    /// the SIR of the worse hop at the best x found, or -1 if no x is allowed.
     fn crossing(&mut self, altitude_m: f32) -> f32 {
         let gap = |of: HopEnd| {
             let climb = altitude_m - of.place.altitude_m;
@@ -362,7 +361,7 @@ impl LocalSearch {
         ends.max(self.weigh(at(low))).max(self.weigh(at(high)))
     }
 
-    /// Returns the best SIR of the worse hop for x in `low` to `high`, for traffic in both directions.
+    /// Returns the best SIR of the worse hop for x in `low` to `high`, for data in both directions.
     ///
     /// The search evaluates evenly spaced x, and improves the best of these x in steps that halve. A maximum where the
     /// SIRs of both hops are equal can be narrower than the spacing, so the first two x with equal SIRs are searched by
@@ -414,8 +413,8 @@ impl LocalSearch {
         best
     }
 
-    /// Evaluates the next position of the grid, which is traversed altitude by altitude at each x. Returns the number
-    /// of evaluations, 1, or `None` after the last position.
+    /// Evaluates the next position of the grid. Returns the number of evaluations, 1, or `None` after the last
+    /// position.
     fn point(&mut self, columns: u8, rows: u8) -> Option<u16> {
         if self.row >= rows {
             self.row = 0;
@@ -443,9 +442,9 @@ mod tests {
     use crate::mission::Interferer;
     use crate::place::Placement;
 
-    /// Returns a search by a relay between two neighbours 100 m apart, for the tests. `altitude_m` is the relay's
-    /// altitude, and `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band` the
-    /// allowed altitudes, m.
+    /// Returns the search of a relay between two neighbours 100 m apart. `altitude_m` is the relay's altitude, and
+    /// `beside_m` the altitude of the neighbours. `apart_m` is the minimum separation, and `band` the allowed
+    /// altitudes, m.
     fn search(altitude_m: f32, beside_m: f32, apart_m: f32, band: (f32, f32)) -> LocalSearch {
         let at = Placement::on_line;
         let beside = |x_m| HopEnd {
@@ -471,7 +470,8 @@ mod tests {
 
     #[test]
     fn from_outside_the_band_it_ends_in_it_or_stays() {
-        // First with room in the band, then with room only on the way to it, where the search may not stop.
+        // With a small separation there is a free position in the band. With a large one there is none, and the relay
+        // must stay.
         for (from_m, beside_m, apart_m, band, ends_m) in [
             (80_000.0, 20.0, 0.0, (20.0, 20.0), Some(20.0)),
             (80_000.0, 20.0, 150.0, (20.0, 20.0), None),

@@ -39,8 +39,8 @@ use crate::features::NOISE;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Maximum ratio of a hop's target SIR to its gain; with a larger ratio no hop is short enough. The limit keeps all
-/// numbers finite.
+/// Maximum ratio of a hop's target SIR to its gain; with a larger ratio no hop is short enough. All numbers stay
+/// finite.
 pub(super) const MOST_RATIO: f32 = 1e18;
 
 /// Maximum number of Newton steps in the search for the maximum hop length with noise. Four to eight are usual.
@@ -49,26 +49,24 @@ const STEPS: u8 = 32;
 /// Maximum number of steps of a search by bisection, each of which at least halves the interval.
 pub(super) const HALVINGS: u8 = 32;
 
-/// Number of Newton steps for the hop length at which the margin g changes its curvature. g is 0 or above where a hop
-/// with noise meets its target.
+/// Number of Newton steps for the hop length at which the curvature of the margin g changes its sign. g is 0 or above
+/// where a hop with noise meets its target.
 const TURNS: u8 = 5;
 
-/// Rounding error of the margin of a hop with noise, relative to the value that the target requires. A target that is
-/// missed by at most this error counts as met.
+/// Rounding error of the margin of a hop with noise, relative to the required value. A target that is missed by at most
+/// this error counts as met.
 const NOISE_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Relative change of the hop length below which the search for the maximum length ends.
 const CLOSE: f32 = 5e-7;
 
-/// Parameters of a hop with receiver noise that has to meet one target SIR. Its methods compute the lengths of the
-/// hop along x at which it meets the target.
+/// Hop with receiver noise that has to meet one target SIR. Its methods compute the lengths along x at which it does.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisyHop {
     /// Ratio rho of the hop's target SIR to its gain. The SIR is the gain times the inverse interference, divided by
     /// the squared length.
     pub(super) ratio: f32,
-    /// Difference rho - 1, where rho is the hop's target SIR divided by its gain. The difference is computed without
-    /// cancellation.
+    /// Difference rho - 1, computed without cancellation. rho is the hop's target SIR divided by its gain.
     pub(super) excess: f32,
     /// Distance u from the sender to the interferer along x, m.
     pub(super) ahead: f32,
@@ -76,16 +74,16 @@ pub(super) struct NoisyHop {
     pub(super) aside_squared: f32,
     /// Squared distance b^2 of the receiver from the sender perpendicular to x, m^2.
     pub(super) across_squared: f32,
-    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the
-    /// interferer, b from the receiver to the sender. The difference is computed without cancellation.
+    /// Difference a^2 - b^2 of two squared distances perpendicular to x, m^2. a is from the receiver to the interferer,
+    /// b from the receiver to the sender. The difference is computed without cancellation.
     pub(super) base: f32,
     /// Receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2, above 0.
     pub(super) noise: f32,
 }
 
 impl NoisyHop {
-    /// Returns the maximum hop length along x, m, at which the SNR alone meets the target, at most 1e9. `None` if the
-    /// SNR is too low at every length.
+    /// Returns the hop length along x, m, up to which the SNR alone meets the target, at most 1e9. `None` if no length
+    /// does.
     pub(super) fn through_noise(&self) -> Option<f32> {
         let squared = (1.0 / (self.ratio * self.noise)).min(1e18) - self.across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
@@ -97,9 +95,10 @@ impl NoisyHop {
         s >= self.ratio * (square(d) + self.across_squared) * (1.0 + self.noise * s)
     }
 
-    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error. g, m^2, is at
-    /// least 0 if the hop meets its target SIR. `d` is along x, m. It must be short enough that the noise alone does
-    /// not make the hop miss the target.
+    /// Returns the margin g of a hop of the length `d`, half its derivative by d, and its rounding error.
+    ///
+    /// g, m^2, is at least 0 if the hop meets its target SIR. `d` is along x, m. It must be so short that the noise
+    /// alone does not make the hop miss the target.
     fn value(&self, d: f32) -> (f32, f32, f32) {
         let Self { ratio, ahead, .. } = *self;
         let t = d - ahead;
@@ -120,8 +119,8 @@ impl NoisyHop {
         (g, t * square(inverse) - ratio * d, NOISE_ROUNDING * needed)
     }
 
-    /// Returns the distance from the interferer, m, at which the margin g changes its curvature's sign. `None` if g
-    /// is concave everywhere. g, the hop's margin, is 0 or above where the target is met.
+    /// Returns the distance from the interferer, m, at which the curvature of the margin g changes sign. `None` if g is
+    /// concave everywhere. g is 0 or above where the target is met.
     fn inflection(&self) -> Option<f32> {
         let v = 1.0 + self.noise * self.aside_squared;
         if self.ratio * square(v) >= 1.0 {
@@ -136,8 +135,7 @@ impl NoisyHop {
     }
 
     /// Returns the largest hop length along x in [`low`, `high`] that meets the target, m. `None` if there is none.
-    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually
-    /// five.
+    /// `high` is at most [`through_noise`](Self::through_noise). Work: at most 96 evaluations of the hop, usually five.
     pub(super) fn last(&self, low: f32, high: f32) -> Option<f32> {
         let mut high = high;
         if !(low <= high) {
@@ -167,8 +165,8 @@ impl NoisyHop {
         self.concave(low, high)
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target; `None` if none does. This
-    /// length is a root of the margin g, which is 0 or above at lengths that meet the target.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. `None` if there is none. The
+    /// margin g is 0 there; at lengths that meet the target it is 0 or above.
     ///
     /// Requirements, but for rounding: g is concave from `low` to `high`, and below 0 at `high`.
     fn concave(&self, low: f32, high: f32) -> Option<f32> {
@@ -193,8 +191,8 @@ impl NoisyHop {
         None
     }
 
-    /// Returns the largest hop length from `low` to `high`, m, that meets the target. This length is the root of the
-    /// margin g, which is 0 or above at lengths that meet the target.
+    /// Returns the largest hop length from `low` to `high`, m, that meets the target. The margin g is 0 there; at
+    /// lengths that meet the target it is 0 or above.
     ///
     /// Requirements: g is convex from `low` to `high`, 0 or above at `low`, and below 0 at `high`.
     fn convex(&self, low: f32, high: f32) -> f32 {
@@ -250,8 +248,8 @@ pub(super) fn closest(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
     (d >= least && d <= most).then_some(d)
 }
 
-/// Returns the length, m, from which on longer hops without noise meet the target. The hop's margin to its target is 0
-/// at this length, and rises with the length. `None` if there is no such length; the length can be negative.
+/// Returns the length, m, above which a hop without noise meets the target. The margin to the target is 0 at this
+/// length, and rises with it. `None` if there is no such length; the length can be negative.
 fn rising_root(hop: &NoisyHop) -> Option<f32> {
     let (u, e) = (hop.ahead, hop.excess);
     let h = hop.base - e * hop.across_squared;
@@ -274,8 +272,8 @@ mod tests {
     use super::{NoisyHop, closest};
     use crate::features::NOISE;
 
-    /// Returns the smallest hop length at which `hop` meets its target, m, by trial in fine steps. The test compares
-    /// the result of [`closest`] with this length.
+    /// Returns the smallest length at which `hop` meets its target, m, by trial in fine steps. Reference for
+    /// [`closest`].
     fn scanned(hop: &NoisyHop, least: f32, most: f32) -> Option<f32> {
         let step = (most - least) / 20_000.0;
         (0..=20_000_u16)

@@ -1,13 +1,14 @@
-//! Pass of targets along the chain. Each relay's reaches, the last relay's verdict, and the positions on the way back.
+//! Pass of target SIRs along the chain: the relays' reaches, the last relay's verdict, the positions.
 //!
-//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it receives the relay before it, if that relay is at the
-//! best of its positions up to its own reach. Toward Tx (Algorithm 4) it is the x closest to Tx from which the relay before it on
-//! the pass receives it at the best of its positions. So no chain that meets the target is excluded, and a missed target is
-//! out of reach of every chain. See [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may
-//! have to hold back.
+//! Toward Rx (Algorithm 1) a relay's *reach* is the farthest x at which it receives the previous relay. The previous
+//! relay may be at any x up to its own reach; the best of these x counts. Toward Tx (Algorithm 4) the reach is the x
+//! closest to Tx from which the previous relay of the pass receives this relay; again the best x of the previous relay
+//! counts. So no chain that meets the target is excluded, and a missed target is out of reach of every chain. See
+//! [`spacing`](super::spacing) and [`retreat`](super::retreat) for the reasons why a relay may have to hold back.
 //!
-//! On the way back each relay has a position, and [`required_position`](Link::required_position) returns the required position of the relay before it on
-//! the pass. In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
+//! When the verdict travels back along the chain, each relay takes its position, and
+//! [`required_position`](Link::required_position) returns the position that the previous relay of the pass must take.
+//! In a *plain* pass no relay holds back: every hop leads from reach to reach, as in the paper.
 //!
 //! The *slack* of a target is the maximum length of a chain that meets it, less the distance D from Tx to Rx: below 0 if the target is
 //! missed. The [`Verdict`] of the last relay has the slacks of the targets, and the target to commit, if any. A `Walk` is a whole
@@ -27,12 +28,12 @@ use crate::root::sqrt_in_place;
 use crate::side::Heading;
 use crate::sir::{self, Sender, square, transmitter_gain};
 
-/// Maximum number of positions that the last relay tries in order to receive Rx well enough. Used only with data in
-/// both directions.
+/// Maximum number of positions that the last relay tries to receive Rx well enough. Used only with data in both
+/// directions.
 const HOLDS: u8 = 4;
 
-/// Maximum number of points of an interference field that one call evaluates. The evaluation of one target is completed
-/// even if it needs more points.
+/// Maximum number of field points that one call evaluates. The evaluation of one target is completed even if it needs
+/// more.
 const POINTS_AT_ONCE: usize = 128;
 
 /// Previous relay of a pass along the chain, as its message describes it.
@@ -56,7 +57,7 @@ impl Behind {
     }
 }
 
-/// Relay in a pass along the chain, with all data from which its reach for a target SIR is computed.
+/// Relay in a pass along the chain, with all data for its reach at a target SIR.
 #[derive(Clone, Copy, Debug)]
 pub struct Link<'a> {
     /// Mission in which the chain of relays flies.
@@ -73,11 +74,11 @@ pub struct Link<'a> {
     /// True for a plain pass: every relay takes the farthest x that meets the target. False if a relay is allowed to
     /// stay short of that x to help the next relay on the pass.
     pub plain: bool,
-    /// Maximum x of the relay, m. It leaves the relays toward Rx enough space for their separation. Only the joint
-    /// method computes it; `None` with other methods. Not used in an interference field.
+    /// Maximum x of the relay, m, which leaves the relays toward Rx room for their separation. Only the joint method
+    /// computes it; `None` with other methods. Not used in an interference field.
     pub end_m: Option<f32>,
-    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets at this x. `None` unless
-    /// the mission has fitted slots (time slots as long as each hop needs).
+    /// Fixed x of this relay, m. The relay takes this x for every target that its hop meets there. `None` unless the
+    /// mission has fitted slots (time slots as long as each hop needs).
     pub fixed_m: Option<f32>,
 }
 
@@ -87,7 +88,7 @@ pub(crate) fn origins(mission: &Mission) -> PerTarget {
     PerTarget::from([origin(mission); TARGETS])
 }
 
-/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx in an interference field.
+/// Returns the x at which a pass starts, m: the x of Tx, or the x of Rx with an interference field.
 pub fn origin(mission: &Mission) -> f32 {
     match mission.heading() {
         Heading::TowardRx => 0.0,
@@ -160,8 +161,8 @@ impl<'a> Link<'a> {
         reaches.first().copied()
     }
 
-    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. The hop must
-    /// meet `target` in both directions, and two relays must be in order and separated.
+    /// Returns true if the hop from the previous node at `from_m` to this relay at `x_m` meets `target`. Both
+    /// directions must meet it, and two relays must be in order and separated.
     fn is_met_at(&self, x_m: f32, target: f32, from_m: f32) -> bool {
         let mission = self.mission;
         let at = self.own.cross_section.at(x_m);
@@ -225,14 +226,13 @@ impl<'a> Link<'a> {
 
     /// Returns the maximum x of the previous relay in a pass toward Tx, m.
     ///
-    /// No separation in x is reserved for the relays toward Rx, because relays at different altitudes can be above each
-    /// other.
+    /// Relays nearer to Rx need no separation in x: at different altitudes they can be above each other.
     fn latest(&self) -> f32 {
         self.mission.latest_freely(self.index.saturating_add(1))
     }
 
-    /// Returns the hop with which the x of this relay, its sender, is smallest. The hop's receiver is at x from `low`
-    /// to `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
+    /// Returns the hop that allows this relay, its sender, the smallest x. The hop's receiver is at x from `low` to
+    /// `high`, m; in a plain pass at `low`. `None` if no such hop meets `target`.
     fn longest(&self, hop: &Retreat<'_>, target: f32, low: f32, high: f32) -> Option<Step> {
         let (mission, distance_m) = (self.mission, self.mission.config().distance_m);
         // Hops toward Tx exist in fields only; without the feature the compiler removes them here.
@@ -307,9 +307,8 @@ impl<'a> Link<'a> {
         Some(((-step.from_m).max(-1e9), step.to_m))
     }
 
-    /// Returns the largest x at which this relay receives the previous relay of the pass, m. The result is at most
-    /// `most_m`. The previous relay is allowed to take any x up to `from_m`, its farthest x. `None` if there is no such
-    /// x.
+    /// Returns the largest x up to `most_m`, m, at which this relay receives the pass's previous relay. The previous
+    /// relay may take any x up to `from_m`, its farthest x. `None` if there is no such x.
     fn reached(&self, target: f32, from_m: f32, most_m: f32) -> Option<f32> {
         match self.onward()? {
             Onward::Rx(hop) if most_m > from_m => hop.ending(most_m).outermost(target, from_m),
@@ -317,9 +316,9 @@ impl<'a> Link<'a> {
         }
     }
 
-    /// Returns the chain's slack and this last relay's x, m, for traffic in both directions. `hop` leads from Rx to
-    /// this relay, and `slack` returns the slack toward Rx for an x of this relay. If the SIR from Rx would be too low
-    /// at `reach`, the relay stays short of `reach`.
+    /// Returns the chain's slack and this last relay's x, m, for data in both directions. `hop` leads from Rx to this
+    /// relay, and `slack` returns the slack toward Rx for an x of this relay. The relay stays short of `reach` if its
+    /// SIR from Rx would be too low there.
     fn held(
         &self,
         hop: &FromRx,
@@ -354,7 +353,7 @@ impl<'a> Link<'a> {
     ///
     /// `from_m` is the farthest x of the relay before the previous relay. `None` if the previous relay has no such
     /// position. The search assumes that the possible positions of the previous relay are one interval, although this
-    /// interval can have gaps. Bounded by two reaches, in an interference field by three for each of its points.
+    /// interval can have gaps. Work: at most two reaches; in an interference field three for each of its points.
     pub fn required_position(
         &self,
         target: f32,
@@ -381,11 +380,11 @@ impl<'a> Link<'a> {
                 );
                 let low = from_m.max(place + apart).max(place.next_up());
                 let interference = HopInterference::new(self.mission, behind.measured_per_w);
-                // A position that leaves all relays toward Rx room along the line, at any altitude, is preferred.
+                // A position with room along the line for all relays toward Rx, at any altitude, is preferred.
                 let clear = self.mission.latest(self.index.saturating_add(1));
                 let to = |high| {
                     let high = heard_m.min(high);
-                    // With a way back the nearest one is preferred, because the way back is best from there.
+                    // With data in both directions the closest one is preferred: it is best for data from Rx to Tx.
                     let near = if heard_m < f32::INFINITY { low } else { high };
                     let step = |high| {
                         let step = hop.longest_there(interference, target, low, high)?;
@@ -417,8 +416,8 @@ fn fill(reaches: &mut PerTarget, places: impl Iterator<Item = f32>) {
     }
 }
 
-/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the
-/// reaches of this last relay, and `from` the reaches of the relay before it on the pass, m.
+/// Returns the result of a pass of target SIRs (a sweep), computed by its last relay, `link`. `reaches` are the reaches
+/// of this relay, and `from` those of the previous relay of the pass, m.
 pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> Verdict {
     let targets = ladder.targets();
     let mut slacks = PerTarget::new();
@@ -433,8 +432,8 @@ pub fn close(link: &Link<'_>, ladder: Ladder, from: &[f32], reaches: &[f32]) -> 
 /// Result of a sweep (a pass of target SIRs): slacks, and the target that the chain commits to, if any.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Verdict {
-    /// Index, in the pass's list of targets, of the committed target. The relays take their positions for this
-    /// target. `None` if no target is committed and the search goes on.
+    /// Index of the committed target in the pass's list of targets. The relays take their positions for this target.
+    /// `None` if no target is committed and the search goes on.
     pub commit: Option<u8>,
     /// Slack of the chain for each target that every hop can meet, m. The slack is 0 or more if the chain meets the
     /// target.
@@ -473,8 +472,7 @@ impl Verdict {
 }
 
 /// Returns the number of targets up to the highest target that is met; 0 if none is met. A target is met if its slack
-/// is 0 or more. With equal altitudes all lower targets are met, too. In a varying field, or with different altitudes,
-/// some lower targets can be missed. They count all the same.
+/// is 0 or more. In a varying field, or with different altitudes, lower targets can be missed; they count all the same.
 pub(crate) fn met(slacks: &[f32]) -> usize {
     slacks
         .iter()
@@ -533,8 +531,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         })
     }
 
-    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. No relay has
-    /// the index 0. With index 0 the result is `Some` if all relays can take their reaches, else `None`.
+    /// Returns the reach of relay `index`, m, if every relay can take its reach; `None` if some cannot. `index` is 0
+    /// for no relay: the result is then `Some` if all relays can take their reaches.
     fn at_reach(&self, index: u16) -> Option<f32> {
         let plain = self.plainly();
         let mut place = None;
@@ -563,8 +561,8 @@ impl<'a, F: Fn(u16) -> Profile> Walk<'a, F> {
         own.map(|(_, _, reach)| reach)
     }
 
-    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. No relay has the
-    /// index 0. With index 0 the result is `Some` if all relays can take their required positions, else `None`.
+    /// Returns the x of relay `index`, m; `None` if some relay cannot take its required position. `index` is 0 for no
+    /// relay: the result is then `Some` if all relays can take their required positions.
     pub fn place(&self, index: u16) -> Option<f32> {
         if self.plain && index > 0 {
             return self.reach(Some(index));

@@ -14,22 +14,21 @@ use crate::place::Placement;
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Agreed {
-    /// Ladder, the list of target SIRs, of the last sweep (pass along the chain). The committed target is one of
-    /// them.
+    /// Ladder (list of target SIRs) of the last pass along the chain. The committed target is one of them.
     pub ladder: Ladder,
-    /// Index of the committed target SIR in the ladder, the list of targets.
+    /// Index of the committed target SIR in the ladder.
     pub commit: u8,
     /// Target SIR that the chain has agreed on, linear.
     pub target: f32,
-    /// Upper bound of the SIR, linear: no chain at these altitudes meets this target SIR. `None` with the paper's
-    /// fixed step, whose passes do not try all chains, and for traffic in both directions.
+    /// Target SIR that no chain at these altitudes can meet, linear. `None` with the paper's fixed step, whose passes
+    /// do not try all chains, and for data in both directions.
     pub most: Option<f32>,
-    /// Number of passes along the chain (sweeps) that the search took.
+    /// Number of passes along the chain that the search took.
     pub sweeps: u32,
 }
 
 /// Solver for the positions of a whole chain in one program, without messages between relays. It computes a few hops
-/// per call. Its size does not depend on N, the number of relays.
+/// per call. Its size does not depend on the number of relays.
 #[derive(Clone, Debug)]
 pub struct Planner {
     search: Search,
@@ -126,7 +125,7 @@ impl Planner {
 
 /// Solves the chain in one call: at most about fifty passes over N hops with the bracketed schedule.
 ///
-/// Some relays may have to stay short of their farthest position; their positions are then checked, too.
+/// If some relays have to stay short of their farthest position, their positions are checked, too.
 ///
 /// # Errors
 /// [`Infeasible`] if no target can be met.
@@ -163,8 +162,7 @@ pub fn solve(
 }
 
 impl Mission {
-    /// Returns the position that relay `index` computes without messages. Every relay must have the mission's common
-    /// profile.
+    /// Returns the position that relay `index` computes without messages. All relays must have the mission's profile.
     ///
     /// This position is, to the bit, the position on which relays agree by messages:
     /// `silent_places_equal_those_by_messages` in `host-tests/tests/chain.rs`. `None` if no target can be met.

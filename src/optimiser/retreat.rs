@@ -10,8 +10,8 @@
 //! This is the paper's eq. (num), for relays at different altitudes. For the last hop x0 = D, h0 = 0 and A = p Upsilon(D) / eta.
 //! The printed algorithm lets a position become negative; here a sender stops where there is just room for those before it.
 //!
-//! The receiver need not be as close to Tx as possible: with less interference the hop may be longer. The positions from which a
-//! relay can be continued to Rx form a range [l, r], and the next range starts at
+//! The receiver need not be as close to Tx as possible: with less interference the hop may be longer. The positions of
+//! a relay from which the chain can be continued to Rx form a range [l, r], and the next range starts at
 //!
 //! ```text
 //! l_k = min { y - d(y) : l_{k+1} <= y <= r_{k+1} }.
@@ -24,8 +24,8 @@
 //!
 //! # Way back
 //!
-//! The receiver y of a hop sends on the way back, and its sender x receives. With A' = p' Upsilon(x) / (`mu_los` r) for p' watts at
-//! y the way back meets the target if
+//! On the way back (data from Rx to Tx) the hop's receiver at y sends, and its sender at x receives. With A' = p'
+//! Upsilon(x) / (`mu_los` r) for p' watts at y the way back meets the target if
 //!
 //! ```text
 //! (y - x)^2 <= A' / gamma - q.
@@ -34,9 +34,10 @@
 //! Between two points of the field the right side is linear in x, so the margin is concave there, and the first x from which both
 //! directions work is a root of a quadratic.
 //!
-//! If x stays between two points of the field, and y too, each direction allows a convex set of pairs (x, y). So the smallest x has one
-//! of three kinds of y: the smallest or largest y of that part of the field, the y that is best on the way there, or one with which the
-//! hop just meets the target in both directions. With y = x + z, c = p / (`mu_los` gamma) and c' = p' / (`mu_los` r gamma) the last is
+//! If x stays between two points of the field, and y too, each direction allows a convex set of pairs (x, y). So the
+//! smallest x has one of three kinds of y: the smallest or largest y of that part of the field, the y that is best for
+//! data toward Rx, or one with which the hop just meets the target in both directions. With y = x + z, c = p /
+//! (`mu_los` gamma) and c' = p' / (`mu_los` r gamma) the last is
 //!
 //! ```text
 //! z^2 = c Upsilon(y) - q,    c Upsilon(y) = c' Upsilon(x).
@@ -60,16 +61,17 @@ use crate::sir::{Sender, square};
 /// Relative tolerance, for rounding errors, on the maximum squared length of a hop toward Tx.
 const ROUNDING: f32 = 4e-6;
 
-/// Maximum number of f32 steps by which a computed hop is shortened until it meets its target.
+/// Maximum number of f32 steps that shorten a computed hop until it meets its target.
 const ULPS: u8 = 8;
 
-/// Hop toward Rx in an interference field, whose receiver is at a known position. In a pass toward Tx, a relay computes
-/// from this hop the sender's x for many targets.
+/// Hop toward Rx in an interference field, with a receiver at a known position. It gives the sender's x for each
+/// target.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Retreat<'a> {
-    /// Gain A of the hop, m^2. The SIR of the hop is A times `quiet`, divided by the squared length. Upsilon = E[1/I]
-    /// is the mean inverse of the interference power I. `quiet` is Upsilon at the receiver divided by the field's
-    /// largest Upsilon. For the hop to Rx, A includes Upsilon at Rx, and `quiet` is 1.
+    /// Gain A of the hop, m^2. The hop's SIR is A times `quiet`, divided by the squared length.
+    ///
+    /// `quiet` is Upsilon at the receiver divided by the field's largest Upsilon. Upsilon = E[1/I] is the mean inverse
+    /// of the interference power I. For the hop to Rx, A includes Upsilon at Rx, and `quiet` is 1.
     gain: f32,
     /// Squared altitude difference of the hop's sender and receiver, m^2.
     climb_squared: f32,
@@ -78,14 +80,14 @@ pub struct Retreat<'a> {
     end_m: f32,
     to_rx: bool,
     /// Backward hop from the receiver to the sender: its gain, and the interference at the sender. `None` for data in
-    /// one direction. The gain is for the field's largest Upsilon = E[1/I], and is divided by r, the required ratio
-    /// of backward to forward SIR.
+    /// one direction. The gain is for the field's largest Upsilon = E[1/I]. It is divided by r, the required ratio of
+    /// backward to forward SIR.
     back: Option<(f32, HopInterference<'a>)>,
 }
 
 impl<'a> Retreat<'a> {
-    /// Returns the hop from relay `index` to a relay at `altitude_m`, m. With `None` the hop leads to Rx. `own` has
-    /// the altitude and power of relay `index`.
+    /// Returns the hop from relay `index` to a relay at `altitude_m`, m; with `None` it leads to Rx. `own` has the
+    /// altitude and power of relay `index`.
     pub fn new(mission: &Mission, own: Station, index: u16, altitude_m: Option<f32>) -> Self {
         let climb_squared = square(own.cross_section.altitude_m - altitude_m.unwrap_or(0.0));
         let (gain, least_step) = match altitude_m {
@@ -106,10 +108,10 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns this hop together with the backward hop, if the mission has traffic in both directions.
+    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx.
     ///
-    /// The sender of the backward hop has `power_w` watts; with `None` the sender is Rx. The receiver of the backward
-    /// hop is the sender of this hop. It has measured `measured_per_w`: Upsilon, the mean inverse interference power,
+    /// The backward hop's sender, which receives this hop, has `power_w` watts; `None` if it is Rx. The backward hop's
+    /// receiver, which sends this hop, has measured `measured_per_w`: Upsilon, the mean inverse interference power,
     /// 1/W.
     pub(super) fn both_ways(
         self,
@@ -135,8 +137,7 @@ impl<'a> Retreat<'a> {
         if REVERSE { self.back } else { None }
     }
 
-    /// Returns this hop with a sender at any x down to Tx. No separation is reserved for the relays between `index` and
-    /// Tx.
+    /// Returns this hop with a sender at any x down to Tx: relays closer to Tx need no separation along x.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -144,8 +145,8 @@ impl<'a> Retreat<'a> {
         }
     }
 
-    /// Returns the smallest permitted x of the receiver, m. This is the sender's smallest permitted x plus the
-    /// minimum step.
+    /// Returns the smallest permitted x of the receiver, m. It is the sender's smallest permitted x plus the minimum
+    /// step.
     fn nearest(&self) -> f32 {
         let place = self.end_m + self.least_step;
         if place - self.end_m < self.least_step {
@@ -225,9 +226,8 @@ impl<'a> Retreat<'a> {
         is_met(end, heard.quiet(end)).then(|| hop(end)).flatten()
     }
 
-    /// Returns the largest x of the receiver, m, at which the backward hop meets `target`. The sender, at `place`,
-    /// receives the backward hop. The result is infinite for traffic in one direction, and -infinite if no x meets
-    /// `target`.
+    /// Returns the largest x of the receiver, m, at which the sender at `place` receives the backward hop. The result
+    /// is infinite for data in one direction, and -infinite if no x meets `target`.
     pub(super) fn heard_up_to(&self, target: f32, place: f32) -> f32 {
         let Some((gain, heard)) = self.back() else {
             return f32::INFINITY;
@@ -268,8 +268,8 @@ impl<'a> Retreat<'a> {
         (place < from_m || self.to_rx).then_some(place)
     }
 
-    /// Returns the hop that meets `target` and whose sender has the smallest x; `None` if no hop meets it. The x of
-    /// the receiver is from `low` to `high`, m.
+    /// Returns the hop that meets `target` with the smallest x of the sender; `None` if no hop meets it. The x of the
+    /// receiver is from `low` to `high`, m.
     pub fn longest(
         &self,
         interference: HopInterference<'_>,
@@ -284,8 +284,8 @@ impl<'a> Retreat<'a> {
         self.longest_both_ways(interference, target, low, high, there)
     }
 
-    /// Returns the longest hop, as [`Retreat::longest`] does, but for data in both directions. `there` is the longest
-    /// hop for data toward Rx only.
+    /// Returns the hop of [`Retreat::longest`] for data in both directions. `there` is this hop for data toward Rx
+    /// only.
     #[inline(never)] // keeps a sweep of one direction small
     fn longest_both_ways(
         &self,
@@ -334,8 +334,8 @@ impl<'a> Retreat<'a> {
     /// Returns the smallest x of the sender for a receiver at `y_m`, m. `quiet` is the receiver's Upsilon divided by
     /// the field's largest Upsilon.
     ///
-    /// Without `best_m` only the traffic toward Rx counts. With `best_m` both directions count. The sender's x then has
-    /// to be smaller than `best_m`, and replaces `best_m`.
+    /// Without `best_m` only data toward Rx count. With `best_m` both directions count. The result is then below
+    /// `best_m`, and replaces it.
     #[inline]
     fn sender(&self, target: f32, y_m: f32, quiet: f32, best_m: Option<&Cell<f32>>) -> Option<f32> {
         let place = self.onward(target, y_m, quiet)?;
@@ -348,7 +348,7 @@ impl<'a> Retreat<'a> {
     }
 
     /// Returns the hop with the smallest x of its sender, by the search of [`least`] for the receiver's x.
-    #[inline(never)] // one copy for both directions and for one
+    #[inline(never)] // one copy for data in one and in both directions
     fn searched(
         &self,
         interference: HopInterference<'_>,
@@ -365,7 +365,7 @@ impl<'a> Retreat<'a> {
     }
 
     /// Returns the x of the receiver, m, for each hop that just meets the target in both directions. There are at most
-    /// two such hops.
+    /// two.
     ///
     /// The sender is in the part `from` of the field, the receiver in the part `to`. `gains` has the forward and the
     /// backward gain, each divided by the target.
@@ -390,7 +390,7 @@ impl<'a> Retreat<'a> {
         })
     }
 
-    /// Returns the hop of [`Retreat::longest`] for the traffic toward Rx only.
+    /// Returns the hop of [`Retreat::longest`] for data toward Rx only.
     pub(super) fn longest_there(
         &self,
         interference: HopInterference<'_>,
@@ -414,7 +414,7 @@ pub struct Step {
 /// Interference at a hop's receiver, as a function of the receiver's x.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum HopInterference<'a> {
-    /// The interference is equal at every x, as measured. The value is the measured Upsilon, the mean inverse
+    /// Measured interference, taken as equal at every x. The value is the measured Upsilon, the mean inverse
     /// interference power, divided by the largest Upsilon of the mission's field.
     Evenly(f32),
     /// Interference field of the mission, with receiver noise.
@@ -442,7 +442,7 @@ impl<'a> HopInterference<'a> {
         }
     }
 
-    /// Returns the part of the line from `start_m`, m, to the next point of the field or to `end_m`.
+    /// Returns the part of the field from `start_m`, m, to the next point of the field or to `end_m`.
     #[inline(never)] // one copy for all loops
     fn piece(self, start_m: f32, end_m: f32) -> Piece {
         let points = match self {
@@ -466,12 +466,11 @@ impl<'a> HopInterference<'a> {
     }
 }
 
-/// Part of the line in which Upsilon = E[1/I], the mean inverse interference power, is linear in x.
+/// Part of the interference field in which Upsilon is linear in x. Upsilon = E[1/I] is the mean inverse interference
+/// power.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Piece {
-    /// Smallest x of this part of the interference field, m.
     start_m: f32,
-    /// Largest x of this part of the interference field, m.
     end_m: f32,
     /// Upsilon at the smallest x of this part, divided by the field's largest Upsilon. Upsilon is the mean inverse
     /// interference power.
@@ -480,14 +479,13 @@ struct Piece {
     slope: f32,
 }
 
-/// Returns the hop whose sender's x is smallest, for a receiver's x in [`low`, `high`], m. Of equally good hops the
-/// result is the hop with the smallest x of the receiver.
+/// Returns the hop with the smallest x of its sender, for a receiver's x in [`low`, `high`], m. Of equally good hops it
+/// returns the one with the smallest x of the receiver.
 ///
-/// `value` returns the sender's x for the receiver's x, y, and for `quiet`, which is Upsilon = E[1/I] at y divided by
-/// the field's largest Upsilon. This sender's x is y - sqrt(`c` quiet - s). `c` is the sender's gain divided by the
-/// target, and s is the first of `squares`. `value` returns `None` if the square under the root is below the second of
-/// `squares` minus the first. Work: at most three values for each field point from `low` to `high` that a hop could
-/// reach.
+/// `value` returns the sender's x, y - sqrt(`c` quiet - s), for the receiver's x, y, and for `quiet`. `quiet` is
+/// Upsilon = E[1/I] at y divided by the field's largest Upsilon. `c` is the sender's gain divided by the target, and s
+/// is the first of `squares`. `value` returns `None` if the square under the root is below the second of `squares`
+/// minus the first. Work: at most three values for each field point from `low` to `high` that a hop could reach.
 pub(super) fn least(
     interference: HopInterference<'_>,
     c: f32,
@@ -535,7 +533,7 @@ pub(super) fn least(
         } else {
             weigh(low, interference.quiet(low))
         };
-        // To start closer to Tx than the best, a hop would have to be longer than possible here.
+        // To start closer to Tx than the best hop, a hop would have to be longer than possible here.
         if let Some(best) = best
             && left.x_m > best.from_m
             && square(left.x_m - best.from_m) + apart > c * start.max(end)
@@ -543,7 +541,7 @@ pub(super) fn least(
             continue;
         }
         let slope = (end - start) / (right.x_m - left.x_m);
-        // The points at which the root is c slope / 2, and at which it is just long enough to count.
+        // The points at which the root is c slope / 2, and at which the root is just long enough to count.
         let steepest = (square(0.5 * c * slope) + apart) / c;
         let shortest = least_apart / c * (1.0 + 1e-6);
         for quiet in [steepest, shortest] {

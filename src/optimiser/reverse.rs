@@ -1,4 +1,4 @@
-//! Hop of the way back, and the combined reach of a hop in both directions.
+//! Hop for data from Rx to Tx (the way back), and the combined reach of a hop in both directions.
 //!
 //! On the way back from Rx to Tx hop k is sent by node k and received by node k - 1, so another power and the interference at
 //! another position count. With node 0 = Tx, node N + 1 = Rx, the path gain g and the noise N
@@ -11,26 +11,29 @@
 //!
 //! # Combined reach
 //!
-//! With the sender of the way there at x0, s0 its squared distance from the interferer, q(s) = s / (1 + nu s) and A' the gain of
+//! With the forward sender at x0, s0 its squared distance from the interferer, q(s) = s / (1 + nu s) and A' the gain of
 //! the receiver's power, B_k = A' q(s0) / l with l = d^2 + b^2 the squared length of the hop. Position x0 is given, so
 //!
 //! ```text
 //! B_k >= r gamma    <=>    d <= sqrt((A' / r) q(s0) / gamma - b^2)
 //! ```
 //!
-//! with noise as without it. For the first hop Tx receives, and K_tx takes the place of A' q(s0): it is the counterpart at Tx of K
-//! at Rx. The lengths that meet the target on the way back are an interval from 0, which those that meet it on the way there are
-//! not (see [`spacing`](super::spacing)). So the combined reach is not the smaller of the two: it is the largest d up to the limit
-//! above that meets the target on the way there, which is [`Hop::reach`](super::spacing::Hop::reach) with that limit as the end.
-//! No term cancels: s0 is a sum of squares, and the difference with b^2 has the rounding error of the SIR itself.
+//! with noise as without it. For the first hop Tx receives, and K_tx takes the place of A' q(s0): it is the counterpart
+//! at Tx of K at Rx. The lengths that meet the target backward are an interval from 0. Those that meet it forward are
+//! not (see [`spacing`](super::spacing)). So the combined reach is not the smaller of the two: it is the largest d up
+//! to the limit above that meets the target forward, which is [`Hop::reach`](super::spacing::Hop::reach) with that
+//! limit as the end. No term cancels: s0 is a sum of squares, and the difference with b^2 has the rounding error of the
+//! SIR itself.
 //!
 //! # Sender that stays away from the interferer
 //!
-//! With gamma below A' / r the limit x0 + sqrt((A' / r) q(s0) / gamma - b^2) falls with x0 before the interferer and rises beyond: a
-//! relay in front of the interferer hears the next one worse than a relay farther back. The way there is always best from the
-//! closest position. So of all x0 up to the reach M of that relay, a given x needs the largest from which the way back works: M, or
-//! the largest below it. Seen from x this is the problem of the [last hop](super::from_rx), with x in place of Rx. On that branch
-//! F_k / gamma = (A r / A') q(s) / q(s0), and without noise, at equal altitudes, with c^2 = A' / (r gamma) and the angle v between
+//! With gamma below A' / r the limit x0 + sqrt((A' / r) q(s0) / gamma - b^2) falls with x0 before the interferer and
+//! rises beyond: a relay in front of the interferer receives the next one worse than a relay farther back does. The
+//! forward SIR is always best from the closest position. So of all x0 up to the reach M of the sender, a given x needs
+//! the largest at which the sender receives the backward hop: M, or the largest below it. Seen from x this is the
+//! problem of the [last hop](super::from_rx), with x in place of Rx. On that branch F_k / gamma = (A r / A') q(s) /
+//! q(s0), and without noise, at equal altitudes, with c^2 = A' / (r gamma) and the angle v between the directions from
+//! the sender to the interferer and to the receiver
 //! the directions from the sender to the interferer and to the receiver
 //!
 //! ```text
@@ -51,7 +54,7 @@ use crate::sir::{in_noise, square, transmitter_gain};
 /// Limit of the squared length of a hop in the computation, m^2, so that no number becomes infinite.
 const MOST_SQUARED: f32 = 1e18;
 
-/// Backward hop, for the traffic from Rx to Tx, prepared for many targets and lengths.
+/// Backward hop, for data from Rx to Tx, prepared for many targets and lengths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Back {
     /// Gain of the backward hop, divided by r, the required ratio of backward to forward SIR. The hop's SIR is the
@@ -69,8 +72,8 @@ pub struct Back {
 }
 
 impl Back {
-    /// Returns the backward hop from a relay of `power_w` watts to a relay at `to`, or to Tx. `None` for a mission of
-    /// one direction.
+    /// Returns the backward hop from a relay of `power_w` watts to a relay at `to`, or to Tx. `None` for a mission
+    /// without data from Rx to Tx.
     #[inline(never)] // keeps a sweep without a way back small
     pub(super) fn new(
         mission: &Mission,
@@ -97,8 +100,8 @@ impl Back {
         })
     }
 
-    /// Returns the squared maximum length of a backward hop, multiplied by the forward target SIR, m^2. The receiver of the backward hop is
-    /// at `x_m`.
+    /// Returns the squared maximum length of a backward hop, times the forward target SIR, m^2. The receiver is at
+    /// `x_m`.
     pub(super) fn hears(&self, x_m: f32) -> f32 {
         if self.to_tx {
             return self.gain;
@@ -108,14 +111,14 @@ impl Back {
     }
 
     /// Returns the maximum length of the backward hop along x, m, for its receiver at `x_m`. `across_squared` is the
-    /// squared length of the hop across the line, m^2. `None` if no length meets the target.
+    /// squared distance of the hop's ends perpendicular to x, m^2. `None` if no length meets the target.
     pub(super) fn reach(&self, target: f32, x_m: f32, across_squared: f32) -> Option<f32> {
         let squared = (self.hears(x_m) / target).min(MOST_SQUARED) - across_squared;
         (squared >= 0.0).then(|| sqrt(squared))
     }
 
     /// Returns the backward hop for `target` from a sender at `x_m`, as a function of its length along x.
-    /// `across_squared` is the squared length of the hop across the line, m^2.
+    /// `across_squared` is the squared distance of the hop's ends perpendicular to x, m^2.
     pub(super) fn from(&self, target: f32, x_m: f32, across_squared: f32) -> NoisyHop {
         let ratio = target / self.gain;
         NoisyHop {
@@ -129,8 +132,8 @@ impl Back {
         }
     }
 
-    /// Returns the distance along x from the interferer below which a receiver misses `target`, m. The backward hop
-    /// has the squared length `squared`, m^2. `None` if every receiver misses the target.
+    /// Returns the distance along x from the interferer, m, below which a receiver misses `target`. `None` if every
+    /// receiver misses it. The backward hop has the squared length `squared`, m^2.
     pub(super) fn zone(&self, target: f32, squared: f32) -> Option<f32> {
         zone(target * squared / self.gain, self.noise, self.aside_squared)
     }
@@ -138,9 +141,9 @@ impl Back {
 
 /// Returns the distance along x from the interferer, m, below which q is less than `needed`, m^2.
 ///
-/// q is s / (1 + `noise` s). s is the squared distance from the interferer, m^2; `aside_squared` is the part of s
-/// across x. q is the inverse of interference plus noise. `None` if q is less than `needed` at any distance, because
-/// of the noise.
+/// q = s / (1 + `noise` s) is the inverse of interference plus noise. s is the squared distance from the interferer,
+/// m^2; `aside_squared` is its part perpendicular to x. `None` if q is less than `needed` at any distance, because of
+/// the noise.
 pub(super) fn zone(needed: f32, noise: f32, aside_squared: f32) -> Option<f32> {
     let left = 1.0 - noise * needed;
     (left > 0.0).then(|| sqrt((needed / left).min(MOST_SQUARED) - aside_squared))

@@ -1,16 +1,18 @@
-//! Search for the highest target that the chain meets. Selection of the next targets from the results of the last ones.
+//! Search for the highest target that the chain meets. The results of a pass select the targets of the next one.
 //!
-//! It implements both schedules of Algorithm 1. The paper's tries gamma_0, gamma_0 - epsilon, ..., one per sweep. The bracketed
-//! one tries a ladder of targets per sweep. Feasibility is monotone in the target, so the optimum is between the highest target
-//! that was met and the lowest that was missed. The slacks are smooth in log gamma, so inverse interpolation places the dense
-//! middle of the next ladder, while its ends still span the *bracket*: the range of targets that may be the highest feasible one.
+//! It implements both schedules of Algorithm 1. The paper's schedule tries gamma_0, gamma_0 - epsilon, ..., one in each
+//! pass. The bracketed schedule tries a ladder of targets in each pass. A chain that meets a target also meets lower
+//! ones, so the optimum is between the highest target that was met and the lowest that was missed. The slacks are
+//! smooth in log gamma, so inverse interpolation places the dense middle of the next ladder. Its ends still span the
+//! *bracket*: the range of targets that may be the highest feasible one.
 //!
 //! On a plain pass, in which no relay holds back, a target may be met while lower ones are missed; it then counts as met. All
 //! other passes exclude no chain, so the lowest missed target bounds the SIR of every chain.
 //!
-//! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be one, and the
-//! relay whose required position is in it refuses. Then a plain pass finds a target that is certain, and the interval between
-//! that and the refused one is bisected. Every accepted target is flown; the last pass is for the best one.
+//! A pass assumes that a relay's positions are an interval without holes. If a separation is binding there may be a
+//! hole, and a relay whose required position is in it refuses. Then a plain pass finds a target that no relay can
+//! refuse, and the interval between this target and the refused one is bisected. Every accepted target is flown; the
+//! last pass is for the best one.
 
 use core::ops::Range;
 
@@ -23,7 +25,7 @@ use crate::root::sqrt;
 use crate::side::Heading;
 use crate::sir::{self, Sender};
 
-/// Schedule by which the leader selects the target SIRs of the next sweep, a pass along the chain.
+/// Schedule of the target SIRs that the leader tries, one pass along the chain after another.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Schedule {
@@ -58,13 +60,12 @@ const HIGHEST: f32 = 1e30;
 /// Lowest target that the search tries, as a fraction of the upper bound.
 const DEPTH: f32 = 1e-12;
 
-/// Maximum difference of cubic and linear interpolation up to which the cubic result is used. The unit of the
-/// difference is the gap between two targets.
+/// Maximum difference between cubic and linear interpolation for which the cubic result is used. The unit is the gap
+/// between two targets.
 const BEND: f32 = 0.25;
 
-/// Maximum ratio of the bracket's width after a pass to its width before the pass. The bracket is the interval that
-/// contains the best target. With a larger ratio the next targets are spread evenly over the bracket, and not around an
-/// interpolated optimum.
+/// Maximum ratio of the bracket's width after a pass to its width before. With a larger ratio the next targets are
+/// spread evenly over the bracket (the interval that contains the best target), not around an interpolated optimum.
 const PROGRESS: f32 = 0.25;
 
 /// Number of passes along the chain after which the search ends with the best feasible target found.
@@ -82,21 +83,18 @@ pub struct Search {
     start: f32,
     feasible: Option<f32>,
     infeasible: Option<f32>,
-    /// Relative width of the bracket before the last pass: `infeasible` / `feasible` - 1. The bracket is the interval
-    /// that contains the best target.
+    /// Relative width of the bracket before the last pass: `infeasible` / `feasible` - 1.
     width: f32,
     ladder: Ladder,
     tried: u32,
-    /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule
-    /// has only such passes. Plain passes are also used after a relay has refused a target. A relay refuses a target
-    /// if it cannot take the x that the next relay requires.
+    /// True for plain passes, in which every relay takes the farthest x that meets the target. The paper's schedule has
+    /// only plain passes. They are also used after a relay has refused a target, because it cannot take the x that the
+    /// next relay requires.
     plain: bool,
     /// Lowest target SIR known to be infeasible for every chain; `None` if no such target is known.
     most: Option<f32>,
-    /// Bisection for a target that all relays accept. `None` until a relay has refused a target, because it cannot
-    /// take its required position.
+    /// Bisection for a target that all relays accept. `None` until a relay has refused a target.
     trials: Option<StandTrials>,
-    /// True for a mission with traffic in both directions.
     both_ways: bool,
 }
 
@@ -163,18 +161,19 @@ impl Search {
     }
 
     /// Replaces the next targets by `ladder`, which the leader expects to end the search. If `ladder` is for a plain
-    /// pass, in which every relay takes its farthest x, all later passes are plain, too.
+    /// pass, all later passes are plain, too.
     pub(crate) fn begin_with(&mut self, ladder: Ladder) {
         self.plain |= ladder.is_plain();
         self.ladder = ladder.plainly(self.plain);
     }
 
-    /// Returns the lowest target known to be infeasible for every chain. `slacks` are the chain's slacks, m, for the targets of the last
-    /// pass. Plain passes prove nothing, because they do not try all chains. `None` if no such target is known, and for traffic in both
-    /// directions.
+    /// Returns the lowest target known to be infeasible for every chain; `None` if no such target is known.
+    ///
+    /// `slacks` are the chain's slacks, m, for the targets of the last pass. Plain passes prove nothing, because they
+    /// do not try all chains. `None` for data in both directions.
     pub fn most(&self, slacks: &[f32]) -> Option<f32> {
         if REVERSE && self.both_ways {
-            // Reaches and held positions of both directions are not proven to exclude no chain.
+            // For data in both directions it is not proven that reaches and held positions exclude no chain.
             return None;
         }
         if self.plain || self.trials.is_some() {
@@ -283,10 +282,10 @@ impl Search {
     }
 }
 
-/// Lowers the targets `start` and `met` to include the traffic from Rx to Tx, and returns both.
+/// Lowers the targets `start` and `met` to allow for data from Rx to Tx, and returns both.
 ///
-/// `start`, the upper bound of the search, becomes at most the maximum SIR of the backward hop to Tx. `met`, a
-/// feasible target, becomes a target that this hop and the backward hop from Rx also meet.
+/// `start` is the upper bound of the search. It becomes at most the maximum SIR of the backward hop to Tx. `met` is a
+/// feasible target. It becomes a target that this hop and the backward hop from Rx also meet.
 fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f32, f32) {
     let MissionConfig {
         distance_m, common, ..
@@ -307,9 +306,10 @@ fn with_way_back(mission: &Mission, leader: Profile, start: f32, met: f32) -> (f
     )
 }
 
-/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target). The cubic curve passes
-/// through the four points next to the change of sign. `None` if the cubic curve and a straight line give very
-/// different roots: the slack then jumps, and neither root is meaningful.
+/// Returns the target at which the chain's slack is 0, by cubic interpolation of ln(target).
+///
+/// The cubic curve passes through the four points next to the change of sign. `None` if a straight line gives a very
+/// different target: the slack then jumps, and neither target is meaningful.
 fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     let met = met(slacks);
     let reference = *targets.get(met.checked_sub(1)?)?;
@@ -329,8 +329,8 @@ fn interpolate(targets: &[f32], slacks: &[f32]) -> Option<f32> {
     trusted.then(|| reference + reference * libm::expm1f(cubic))
 }
 
-/// Returns the value at 0 of the polynomial through `points`, pairs of x and value. `None` unless the x of
-/// consecutive points strictly fall.
+/// Returns the value at 0 of the polynomial through `points`, pairs of x and value. `None` unless the x strictly fall
+/// from point to point.
 fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
     for order in 1..points.len() {
         for i in 0..points.len() - order {
@@ -350,8 +350,8 @@ fn neville_at_zero(points: &mut [(f32, f32)]) -> Option<f32> {
 #[derive(Clone, Copy, Debug)]
 struct StandTrials {
     high: f32,
-    /// Highest target that all relays accepted, with the list of targets (ladder) that proposes it again. `None`
-    /// until a target is accepted.
+    /// Highest target that all relays accepted, and the ladder that proposes it again. `None` until a target is
+    /// accepted.
     best: Option<(f32, Ladder)>,
     /// True once the bisection has ended. The best target found is then the result.
     over: bool,
@@ -360,9 +360,8 @@ struct StandTrials {
 impl Search {
     /// Returns the target that a relay has refused in the last pass; `None` if there is none.
     ///
-    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the
-    /// commit from `verdict`, the result of the pass. This function finds the refused target from the slacks in
-    /// `verdict`.
+    /// A relay refuses a target if it cannot take the position that the next relay requires. It then deletes the commit
+    /// from `verdict`, the result of the pass. The refused target follows from the slacks in `verdict`.
     #[inline(never)] // keeps its stack apart from the rest of the search
     pub fn refused(&self, mission: &Mission, verdict: &Verdict) -> Option<f32> {
         let targets = self.ladder.targets();
@@ -387,9 +386,8 @@ impl Search {
 
     /// Continues after a relay refused its required position for `target`.
     ///
-    /// First a plain pass, in which every relay takes the farthest x that meets the target, finds a target that no
-    /// relay can refuse. The interval up to the refused target is then bisected. `most` is a target that no chain can
-    /// meet, if known.
+    /// A plain pass first finds a target that no relay can refuse: every relay takes the farthest x that meets it. The
+    /// interval up to the refused target is then bisected. `most` is a target that no chain can meet, if known.
     ///
     /// # Errors
     /// [`Infeasible`] if no target is left.
@@ -420,7 +418,7 @@ impl Search {
     }
 
     /// Selects the next target of the bisection. Once the interval is small enough, it selects the best accepted
-    /// target, with which the search ends.
+    /// target, and the search ends.
     fn try_next(&mut self) -> Result<(), Infeasible> {
         let trials = self.trials.as_mut().ok_or(Infeasible)?;
         if trials.over {

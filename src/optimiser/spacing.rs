@@ -22,9 +22,9 @@
 //! targets. e is computed from a gain of twice f32's width, so targets close to A lose no digits. The printed case distinction
 //! selects wrong roots once the chain has passed the interferer.
 //!
-//! If the sender may be anywhere in [0, x0], only the one closest to the receiver matters: it is received best, and the
-//! interference does not depend on it. For a receiver at x up to x0 plus the minimum step s, that sender is s before it, and the
-//! target is met if
+//! If the sender may be anywhere in [0, x0], only the position closest to the receiver matters: it is received best,
+//! and the interference at the receiver does not depend on it. For a receiver at x up to x0 plus the minimum step s,
+//! that sender is s before it, and the target is met if
 //! ```text
 //! (X - x)^2 + (Y - y)^2 + h^2 >= (gamma / A) (s^2 + (y - y0)^2 + (h - h0)^2):
 //! ```
@@ -47,7 +47,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::{bisected, sqrt, sqrt_in_place};
 use crate::sir::{Sender, in_noise, square};
 
-/// Position of the previous relay that lets this relay's hop meet the target SIR.
+/// Position that the previous relay must take so that this relay's hop meets the target SIR.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RequiredPosition {
@@ -68,10 +68,7 @@ impl RequiredPosition {
     }
 }
 
-/// Hop toward Rx, prepared for the computation of its maximum length for many targets.
-///
-/// The terms that do not depend on the target are precomputed, so that each target takes three divisions and a square
-/// root.
+/// Hop toward Rx, prepared for many targets. Its maximum length for a target takes three divisions and a square root.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Hop {
     sender: Sender,
@@ -95,18 +92,18 @@ pub struct Hop {
     from_tx: bool,
     /// Largest permitted x of this hop's receiver, m from Tx.
     end_m: f32,
-    /// Maximum x of the receiver and of the sender, m. With these x the relays nearer to Rx have room for their
-    /// minimum separation.
+    /// Maximum x of the receiver and of the sender, m. They leave the relays nearer to Rx room for their minimum
+    /// separation.
     gathered_m: [f32; 2],
-    /// Same hop in the direction from Rx to Tx; `None` for a chain of one direction.
+    /// Same hop in the direction from Rx to Tx; `None` for a mission without data from Rx to Tx.
     back: Option<Back>,
 }
 
 impl Hop {
     /// Creates the hop from `sender` to relay `index`, which has the lateral offset and altitude `at`.
     ///
-    /// `spread_squared` is the maximum squared distance across the line between two neighbours among the relays after
-    /// `index`, m^2.
+    /// `spread_squared` concerns the relays after `index`: it is the largest squared distance between two neighbours
+    /// perpendicular to x, m^2.
     pub fn new(
         mission: &Mission,
         interferer: &Interferer,
@@ -164,8 +161,8 @@ impl Hop {
         if REVERSE { self.back.as_ref() } else { None }
     }
 
-    /// Returns this hop together with the backward hop, if the mission has traffic in both directions. The backward
-    /// hop is toward Tx. `power_w` is the power of the relay that receives this hop, W.
+    /// Returns this hop together with the backward hop, if the mission has data from Rx to Tx. `power_w` is the power
+    /// of the relay that receives this hop and sends the backward hop, W.
     #[inline]
     pub(super) fn both_ways(mut self, mission: &Mission, power_w: f32) -> Self {
         if mission.reverse() > 0.0 {
@@ -174,8 +171,7 @@ impl Hop {
         self
     }
 
-    /// Returns this hop with a receiver at any x up to Rx. No separation is reserved for the relays between `index` and
-    /// Rx.
+    /// Returns this hop with a receiver at any x up to Rx: relays nearer to Rx need no separation along x.
     pub(super) fn to_the_end(self, mission: &Mission, index: u16) -> Self {
         Self {
             end_m: mission.end_freely(index),
@@ -210,8 +206,8 @@ impl Hop {
         self.ending(place).onward(target, from_m)
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, for traffic toward Rx only. The sender is at x
-    /// = `from_m`. `None` if no x meets `target`.
+    /// Returns the largest x at which the receiver meets `target`, m, for data toward Rx only. The sender is at x =
+    /// `from_m`. `None` if no x meets `target`.
     fn onward(&self, target: f32, from_m: f32) -> Option<f32> {
         if self.is_silent() {
             self.in_silence(target, from_m)
@@ -256,7 +252,8 @@ impl Hop {
             return None;
         }
         if d >= room {
-            // With C < 0 the feasible interval is entirely beyond the end; otherwise rounding put the root on it.
+            // With C < 0 the feasible interval is entirely beyond the end; otherwise rounding has put the root on the
+            // end.
             return if c < 0.0 { None } else { Some(self.end_m) };
         }
         rounded(from_m, d)
@@ -277,9 +274,9 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The x of the sender is in
-    /// [0, `from_m`]. `back` is the backward hop. `place` is the receiver's largest x if the sender is at `from_m`.
-    /// The result is larger than `place` if a sender at a smaller x receives the backward hop better.
+    /// Returns the largest x of the receiver, m, at which both directions meet `target`. The sender is in [0,
+    /// `from_m`]. `back` is the backward hop. `place` is the receiver's largest x for a sender at `from_m`. The result
+    /// is larger than `place` if a sender at a smaller x receives the backward hop better.
     #[inline(never)] // keeps a sweep without a way back small
     fn beyond(&self, back: &Back, target: f32, from_m: f32, place: f32) -> f32 {
         let end_m = self.end_m;
@@ -299,8 +296,8 @@ impl Hop {
         bisected(place, end_m, HALVINGS, is_met).0
     }
 
-    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. The receiver is at
-    /// `place`; `None` if there is no such x.
+    /// Returns the sender's largest x up to `near`, m, from which both directions meet `target`. `None` if there is
+    /// none. The receiver is at x = `place`.
     fn sender(&self, back: &Back, target: f32, near: f32, place: f32) -> Option<f32> {
         let hop = back.from(target, place, self.across_squared);
         let least = place - near;
@@ -398,7 +395,8 @@ impl Hop {
             return at(from_m);
         }
         let near = from_m.min(self.before(place));
-        // If all relays gather at the end, they are spaced as evenly as by a pass that leaves them room from the start.
+        // If all relays gather at the end, they are spaced as evenly as by a pass that plans room for them from the
+        // start.
         let [own, sender] = self.gathered_m;
         let gathered = (place >= own && !(self.across_squared > 0.0)).then(|| at(near.min(sender)));
         let required = gathered.flatten().or_else(|| at(near));
@@ -408,11 +406,11 @@ impl Hop {
         })
     }
 
-    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. Without
-    /// this step the result is a smooth function, as the joint method requires.
+    /// Returns the largest x at which the receiver meets `target`, m, without regard to the minimum step. So the result
+    /// is a smooth function, as the joint method requires.
     ///
-    /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance across the
-    /// line alone exceeds the hop's maximum length.
+    /// `None` if there is no such x. The result is less than `from_m`, the sender's x, if the distance perpendicular to
+    /// x alone exceeds the hop's maximum length.
     pub(crate) fn stretched(&self, target: f32, from_m: f32) -> Option<f32> {
         let place = self.stretched_freely(target, from_m)?;
         if self.is_silent() {
@@ -424,7 +422,8 @@ impl Hop {
             return Some(place);
         }
         let heard = hop.through_noise()?;
-        // Below A the target may be met on two intervals, the one before the sender being no hop; above A on one.
+        // Below A the target may be met on two intervals, but the one before the sender is no hop. Above A it is met on
+        // one.
         let least = if hop.excess > 0.0 { -heard } else { 0.0 };
         Some(from_m + hop.last(least, heard.min(most))?)
     }
@@ -465,8 +464,8 @@ impl Hop {
 /// Relative tolerance of a hop's SIR for rounding errors, when a position is checked.
 const ROUNDING: f32 = 4e-6;
 
-/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the rounded value equals `from_m`, because two
-/// relays must not have the same x.
+/// Returns `from_m` + `d`, m, rounded toward `from_m`. `None` if the result equals `from_m`: two relays must not have
+/// the same x.
 #[expect(
     clippy::inline_always,
     reason = "a call would cost a sweep a hundred instructions"
@@ -505,7 +504,7 @@ impl Hop {
     }
 
     /// Returns the receiver noise divided by the interferer's power received at 1 m: nu, 1/m^2. Without the feature
-    /// `noise` the result is the constant 0, so that the compiler drops the search in noise.
+    /// `noise` it is the constant 0, so that the compiler drops the search in noise.
     fn nu(&self) -> f32 {
         if NOISE { self.noise } else { 0.0 }
     }

@@ -1,28 +1,29 @@
-//! Identification of a relay or an end of the chain with measurements that do not fit the others.
+//! Search for a relay, or an end of the chain, whose measurements do not fit the others.
 //!
 //! # Relay
 //!
 //! A relay's measurements do not fit those of the others because its receiver is faulty or it reports false values.
 //!
-//! If the measurements do not fit a single source, the leader excludes one relay after the other from a pass. Without the faulty
-//! relay the others are consistent; without any other relay they are not.
+//! If the measurements do not fit a single source, the leader repeats the sensing pass (the collection of measurements)
+//! without one relay after the other. Without the faulty relay the others are consistent; without any other relay they
+//! are not.
 //!
 //! | pass | excluded | result | next |
 //! | --- | --- | --- | --- |
 //! | usual | none | fits, or the last trial failed less than [`REST`] passes ago | usual |
-//! | usual | none | does not fit, with four relays or fewer | usual, and the result counts: the faulty relay is unknown |
+//! | usual | none | does not fit, with four relays or fewer | usual; the measurements are used |
 //! | usual | none | does not fit | trial of relay 1 |
 //! | trial of n | n | variance of the others | trial of n + 1 |
 //! | trial of the last | last | without one relay the others fit far better than without any other | first notice |
-//! | trial of the last | last | no such relay: the faulty one is unknown | usual, and the result counts |
+//! | trial of the last | last | no such relay: the faulty one is unknown | usual; the measurements are used |
 //! | first notice | faulty relay | | second notice |
-//! | second notice | faulty relay | measurements of the others | usual, and the result counts |
+//! | second notice | faulty relay | measurements of the others | usual; the measurements are used |
 //!
-//! A relay with an absurd measurement, a factor of 300 off the estimate and inconsistent with the others, excludes itself at
-//! once, and reports that on the way back.
+//! A relay excludes itself at once if its measurement is absurd: a factor of 300 off the estimate, and inconsistent
+//! with the others. It reports that in the reply of the pass.
 //!
-//! A relay that is excluded from two successive passes excludes itself from then on, until it fits the others again. No new
-//! estimate is adopted from the first pass of a trial to its last.
+//! A relay that is excluded from two successive passes excludes itself from then on, until it fits the others again. No
+//! new estimate is adopted from the first pass of a trial to its last.
 //!
 //! # Transmitter and ground receiver
 //!
@@ -45,44 +46,42 @@ use super::sums::{EndsOff, Level, Levels, MEASURED_W, Sums, Terms, UNIT_W, terms
 use crate::mission::Mission;
 use crate::place::Placement;
 
-/// Maximum variance of the measurements' errors, divided by the variance that the operator expects. If the variance
-/// is larger, the search for a faulty relay starts.
+/// Variance of the measurements, divided by the expected one, above which a faulty relay is searched. The operator sets
+/// the expected variance.
 const OUT_OF_LINE: f64 = 4.0;
 
-/// Minimum squared deviation of a faulty relay's measurement, as a multiple of the variance. Without this relay, the
-/// fit's residual must be smaller by at least this multiple of the variance.
+/// Minimum drop of the fit's residual without the faulty relay. The unit is the variance of the other measurements.
 const DEVIATIONS: f64 = 49.0;
 
-/// Minimum residual of the fit to all measurements for which a faulty relay is searched. The residual is the sum of
-/// squared relative errors. One measurement that is wrong by some 15 % causes this residual.
+/// Minimum residual of the fit, and minimum drop without one relay, that can show a faulty relay. The residual is the
+/// sum of squared relative errors. One measurement that is wrong by some 15 % causes this residual.
 const LEAST: f64 = 0.02;
 
-/// Minimum ratio of the second smallest variance to the smallest variance that shows one faulty relay. Each variance
-/// belongs to a fit that leaves out one relay.
+/// Minimum ratio of the second smallest variance to the smallest that identifies a faulty relay. Each variance belongs
+/// to a fit that leaves out one relay.
 const DECISIVE: f64 = 6.0;
 
-/// Maximum variance of the relative differences between consistent measurements and their fit. The value is a standard
-/// deviation of 0.32, or some 1.5 dB.
+/// Maximum variance of the relative differences between consistent measurements and their fit. The standard deviation
+/// is 0.32, or some 1.5 dB.
 const CONSISTENT: f64 = 0.1;
 
-/// Number of sensing passes between a failed search for a faulty relay and the next search. A sensing pass collects
+/// Number of sensing passes between a failed search for a faulty relay and the next one. A sensing pass collects
 /// measurements.
 const REST: u8 = 4;
 
-/// Limits within which an excluded relay's measurement fits the other measurements, and is used again. The first limit
-/// is a multiple of the variance, the second a squared relative difference. The larger of the two limits counts.
+/// Limits within which an excluded relay's measurement fits the others again. The first is a multiple of the variance,
+/// the second a squared relative difference. The larger one counts.
 const AGAIN: (f64, f64) = (25.0, 0.1);
 
-/// Minimum number of relays to identify a faulty relay. With four relays, an exclusion leaves three measurements, and
-/// the three unknowns fit any three measurements.
+/// Minimum number of relays to identify a faulty relay. With four relays only three measurements are left, which always
+/// fit the three unknowns.
 const FEWEST: u16 = 5;
 
-/// Minimum number of measured positions with which a faulty relay can be found. Older positions count less, see
-/// [`Sums::count`].
+/// Minimum number of measured positions to find a faulty relay. Older positions count less, see [`Sums::count`].
 const ENOUGH: f32 = 3.5;
 
-/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above this ratio, rounding
-/// errors of the sums exceed the share of this relay in the sums.
+/// Maximum ratio of the mean weight of all positions to the weight of one relay's position. Above it, rounding errors
+/// of the sums exceed this relay's part of the sums.
 const LOST: f32 = 3e3;
 
 #[derive(Clone, Copy, Debug)]
@@ -91,9 +90,10 @@ enum Stage {
     /// Trial: a sensing pass that leaves out the measurements of the node with this number. If the measurements of
     /// the other nodes fit far better then, that node is faulty.
     Trying(u16),
-    /// Notice: a sensing pass that informs the faulty node, which has this number, that it is excluded. There are two
-    /// such passes in a row. In the first pass the flag is false, and the measurements of the other nodes are
-    /// discarded. In the second pass the flag is true, and the measurements of the other nodes give the estimate.
+    /// Notice: a sensing pass that tells the faulty node, which has this number, that it is excluded.
+    ///
+    /// There are two such passes. In the first one the flag is false, and the measurements of the other nodes are
+    /// discarded. In the second one the flag is true, and they give the estimate.
     Announcing(u16, bool),
 }
 
@@ -103,20 +103,19 @@ pub(crate) struct Trial {
     stage: Stage,
     /// Number of sensing passes (collections of measurements) before the next search is allowed to start.
     cooldown: u8,
-    /// Node whose exclusion has given the fit with the smallest variance so far.
+    /// Node whose exclusion has given the smallest variance so far.
     best: u16,
     /// Residual of the fit to the measurements of all relays, the sum of squared relative errors.
     seen: f32,
     /// Residual of the fit without the node `best`: sum of the squared relative errors.
     seen_best: f32,
-    /// Smallest variance of relative errors among the fits that each leave out one node. This fit leaves out the node
-    /// `best`.
+    /// Smallest variance of relative errors among the fits that each leave out one node. The node left out is `best`.
     least: f32,
     /// Second smallest variance of relative errors among the fits that each leave out one node.
     second: f32,
 }
 
-/// Action after a collection of measurements, as decided by the search for a faulty relay.
+/// Action after a sensing pass, as decided by the search for a faulty relay.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Next {
     /// Use the measurements of this sensing pass for the interference estimate.
@@ -138,7 +137,7 @@ impl Trial {
         second: f32::MAX,
     };
 
-    /// Node whose measurements the next collection along the chain leaves out; 0 for none.
+    /// Node whose measurements the next sensing pass leaves out; 0 for none.
     pub(crate) const fn left_out(&self) -> u16 {
         match self.stage {
             Stage::Normal => 0,
@@ -146,8 +145,8 @@ impl Trial {
         }
     }
 
-    /// Evaluates the `sums` of collected measurements in the search for a faulty relay. The chain has agreed on
-    /// `relays` members, whose node numbers are within 1 to `nodes`.
+    /// Evaluates the `sums` of a sensing pass in the search for a faulty relay. The chain has `relays` members, whose
+    /// node numbers are within 1 to `nodes`.
     pub(crate) fn update(
         &mut self,
         sums: &Sums,
@@ -235,11 +234,11 @@ fn narrow(number: f64) -> f32 {
     number as f32
 }
 
-/// Ratio of a relay's measurement to the estimate above which the relay doubts its measurement. A ratio below the
-/// inverse of this value has the same effect.
+/// Factor between measurement and estimate above which a relay doubts its measurement. A factor below the inverse has
+/// the same effect.
 const ABSURD: f32 = 300.0;
 
-/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. An absurd measurement is far off the estimate
+/// Returns true if the measurement at `place` is absurd, so that the relay excludes it. It is then far off the estimate
 /// `expected` at that place, and does not fit the other relays' measurements, whose sums are `others`.
 pub(crate) fn is_absurd(
     others: &Sums,
@@ -262,9 +261,9 @@ pub(crate) fn is_absurd(
 
 /// Returns true if the measurement of an excluded relay still does not fit the other relays.
 ///
-/// The measurement v = 1e-12 W / I at `place` is compared with a value e. e is the value at this place by the fit to
-/// the other relays' sums, `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v
-/// by the current estimate, and sets the measurement's weight.
+/// The measurement v = 1e-12 W / I at `place` is compared with e, the value of the fit to the other relays' sums,
+/// `others`. The difference is (v / e - e / v) / 2, which is symmetric in both. `expected` is v by the current
+/// estimate, and sets the measurement's weight.
 pub(crate) fn is_off(
     others: &Sums,
     place: &Place,
@@ -305,8 +304,8 @@ pub(crate) fn is_deaf(others: &Sums, there: &Terms, noise_w: f32, relative_error
         && heard_w > 4.0 * f64::from(noise_w.max(MEASURED_W.0))
 }
 
-/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. The squared difference
-/// ((ratio - 1 / ratio) / 2)^2 must exceed two numbers: `deviations` times the variance `unsure`, and `least`.
+/// Returns true if a ratio of powers differs from 1 by more than measurement errors explain. ((ratio - 1 / ratio) /
+/// 2)^2 must then exceed both `deviations` times the variance `unsure`, and `least`.
 pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64)) -> bool {
     if !(ratio > 0.0) {
         return true;
@@ -315,9 +314,8 @@ pub(super) fn is_apart(ratio: f64, unsure: f64, (deviations, least): (f64, f64))
     off * off > least.max(deviations * unsure)
 }
 
-/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first limit is a
-/// multiple of the variance, the second a squared relative difference, here a factor of 1.5. The larger of the two
-/// limits counts.
+/// Limits above which the level measured at Tx or Rx does not fit the relays' measurements. The first is a multiple of
+/// the variance, the second a squared relative difference, here a factor of 1.5. The larger one counts.
 const APART: (f64, f64) = (49.0, 0.174);
 
 /// Minimum number of relays to check the levels measured at Tx and Rx. With fewer it is unknown which measurement is
@@ -337,14 +335,14 @@ impl EndLevel {
     }
 }
 
-/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it. The conversion
-/// uses the mission's path loss over the ground.
+/// Converts the `level` measured at Tx or Rx to v = 1e-12 W / I, as a drone there would measure it. The conversion uses
+/// the mission's path loss over the ground.
 pub(super) fn v_at_end(mission: &Mission, level: Level) -> f64 {
     let channel = mission.config().channel;
     f64::from(UNIT_W) * (channel.eta() / channel.mu_nlos()) / f64::from(level.power_w)
 }
 
-/// Compares the levels measured at Tx and Rx with the relays' measurements. Returns which of the two do not fit.
+/// Compares the levels measured at Tx and Rx with the relays' measurements. Returns which of them do not fit.
 ///
 /// `fit` is the source that was fitted to the relays' measurements.
 pub(super) fn judge_ends(
@@ -384,7 +382,7 @@ pub(super) fn judge_ends(
             let alike = !is_apart(tx.ratio / rx.ratio, tx.unsure + rx.unsure, APART);
             off(false, false, !alike)
         }
-        // A faulty end remains faulty; about the other one nothing new is known.
+        // A faulty end stays faulty; nothing new is known about the other end.
         (None, Some(rx)) if before.receiver && !rx.fits() => before,
         (Some(tx), None) if before.transmitter && !tx.fits() => before,
         (None, Some(end)) | (Some(end), None) => off(false, false, !end.fits()),

@@ -11,9 +11,10 @@
 //!
 //! # Track of a moving interferer
 //!
-//! The track has the interferer's velocity, and predicts its position. There is a Kalman filter of position and velocity for each axis; the velocity is a random walk. A fit refers to the mean time
-//! of its measurements. Two successive fits share the measurements that have not faded between them, so each counts in proportion
-//! to the time between them over the half-life.
+//! The track has the interferer's velocity, and predicts its position. Each axis has a Kalman filter of position and
+//! velocity; the velocity is a random walk. A fit refers to the mean time of its measurements. Two successive fits
+//! share measurements that have not faded between them. So a fit counts in proportion to the time since the previous
+//! one, divided by the half-life.
 
 use super::doubt::{judge_ends, v_at_end};
 use super::fit::{Fit, FoundSource, Unfit, misfit};
@@ -30,7 +31,7 @@ pub enum InterferenceEstimate {
     /// Interference as the mission configures it; measurements have not changed it.
     #[default]
     Mission,
-    /// Unknown interference; the relays take this spacing along the line Tx to Rx in order to measure it.
+    /// Unknown interference. The relays take this spacing along the line Tx to Rx in order to measure it.
     Unknown(Spread),
     /// Single interfering transmitter on the ground.
     Source {
@@ -107,51 +108,50 @@ const WORTH: f64 = 1e-5;
 const CHANGE: f64 = 1e-4;
 
 /// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a stationary source.
-/// With a smaller ratio the new estimate is only a refinement.
+/// Below it the new estimate is only a refinement.
 const BEYOND_CHANCE: f64 = 8.0;
-/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a moving source. With
-/// a smaller ratio the new estimate is only a refinement.
+/// Minimum ratio of an estimate's mean square change to the change expected by chance. It is for a moving source. Below
+/// it the new estimate is only a refinement.
 const FOLLOWED: f64 = 1.5;
 
-/// Minimum change of the estimate that shows another interferer, in a chain that has settled. The change is a ratio:
-/// the mean square change divided by the change expected by chance. A chain has settled after [`REFINED`] refinements.
+/// Minimum ratio of the change of the estimate to the change by chance that shows another interferer. Both are mean
+/// square changes. It applies after [`REFINED`] refinements, for a stationary source.
 const ANOTHER: f64 = 64.0;
 
 /// Minimum squared relative change of the level measured at Rx that counts as changed interference.
 const LOUDER: f64 = 0.025;
 
-/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. If the deviation
-/// is larger, the position is not predicted from the track.
+/// Maximum squared deviation of the interferer's track from the fit, divided by the fit's variance. Above it the
+/// position is not predicted from the track.
 const ASTRAY: f64 = 4.0;
 
 /// Minimum factor by which the information must have grown for a refined estimate. Information is the number of
-/// measured positions divided by the variance of the error at one position.
+/// measured positions divided by the error variance of one position.
 const LEARNED: f64 = 1.1;
-/// Number of refined estimates after which a chain with a stationary interferer counts as settled. The chain then gets no new estimate
-/// until the interference changes.
+/// Number of refined estimates after which an estimate stays until the interference changes. It is for a stationary
+/// interferer.
 const REFINED: u8 = 4;
 
-/// Time that drones are assumed to need to fly a few metres. The position of a moving interferer is predicted this
-/// far ahead, plus half the interval between two collections of measurements.
+/// Time that drones are assumed to need for a few metres. A moving interferer is predicted this far ahead, plus half
+/// the interval between two sensing passes.
 const FLIGHT: Duration = Duration::from_millis(1_000);
 
-/// Minimum mean square relative error of measurements that contradicts the estimated source. The relays then treat
+/// Mean square relative error of measurements above which they contradict the estimated source. The relays then treat
 /// the interference as unknown.
 const CONTRADICTED: f64 = 0.25;
 
-/// Minimum mean square error of measurements that contradicts the mission's interference. It is a multiple of the
+/// Mean square error of measurements above which they contradict the mission's interference. It is a multiple of the
 /// variance that the operator expects. The relays then treat the interference as unknown.
 const GUESSED: f64 = 16.0;
 
-/// Quality that the current estimate had when it was adopted, and the track of the interferer.
+/// Quality of the current estimate when it was adopted, and the track of the interferer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Knowledge {
-    /// Information in the measurements. It is the number of positions divided by the variance of the error at one
-    /// position.
+    /// Information in the measurements: number of positions divided by the error variance of one position.
     information: f64,
     /// Expected mean square relative error of the current estimate.
     chance: f64,
-    /// Number of estimates adopted for the same interferer, limited by [`REFINED`].
+    /// Number of estimates adopted for the same interferer, up to [`REFINED`].
     refined: u8,
     track: Track,
 }
@@ -273,8 +273,8 @@ pub(crate) fn review(
     }
 }
 
-/// Returns the fit to all measurements, and the source of interference that the fit gives. If the level measured at Tx
-/// or at Rx does not fit, it is cleared in `levels`.
+/// Returns the fit to all measurements, and the source of interference by this fit. Clears a level in `levels`,
+/// measured at Tx or Rx, that does not fit.
 fn fitted(
     mission: &Mission,
     sums: &Sums,
@@ -301,7 +301,7 @@ fn fitted(
     Ok((fit, fit.source(mission, side_m)?))
 }
 
-/// Returns a moving interferer at its predicted position at the time when the drones have moved. `None` if the
+/// Returns a moving interferer at the position predicted for the time when the drones have moved. `None` if the
 /// interferer does not move, or if its track deviates too much from the fit. `heard` is the mean time of the
 /// measurements.
 fn followed(
@@ -326,9 +326,8 @@ fn followed(
     None
 }
 
-/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added to the relays' measurements. If the level does
-/// not agree with them, the real path loss over the ground differs from the mission's, and `fit` is returned
-/// unchanged.
+/// Returns `fit` with the level measured at Tx or Rx, at `x_m`, added to the relays' measurements. Returns `fit`
+/// unchanged if the level does not agree with them: the path loss over the ground then differs from the mission's.
 #[expect(
     clippy::large_types_passed_by_value,
     reason = "it is what comes of it, too"
@@ -360,9 +359,10 @@ fn with_end(
     Fit::of(sums, relative_error).unwrap_or(fit)
 }
 
-/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it. It is the mean of two
-/// powers, weighted by their variances: the power measured at Rx, and the power computed for Rx from `source` and the
-/// path loss. If the two differ too much, the measured power is returned.
+/// Returns the interference power at the ground receiver Rx, W; 0 if Rx has not measured it.
+///
+/// It is the mean of the power measured at Rx and the power computed from `source` and the path loss, weighted by their
+/// variances. If the two differ too much, it is the measured power.
 #[expect(clippy::cast_possible_truncation, reason = "checked")]
 fn at_receiver(
     mission: &Mission,
@@ -438,8 +438,8 @@ const SPEED: f32 = 10.0;
 /// Minimum squared velocity, relative to its variance, of an interferer that counts as moving.
 const CERTAIN: f32 = 16.0;
 
-/// Minimum squared deviation of a new position from the track that shows another interferer. The deviation is divided
-/// by the track's variance. The track then starts again.
+/// Squared deviation of a new position from the track that shows another interferer. It is divided by the track's
+/// variance. The track then starts again.
 const ELSEWHERE: f32 = 49.0;
 
 /// Kalman filter of the interferer along one axis: position, m, velocity, m/s, and their covariance.

@@ -31,8 +31,8 @@ pub enum Unfit {
 /// Weight of the operator's expected error in the estimated variance: a number of measured positions.
 const EXPECTED: f64 = 4.0;
 
-/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance
-/// the measurements do not show on which side of the line the source is.
+/// Minimum variance of 2 y / D of the measured positions; D is the distance from Tx to Rx. With a smaller variance the
+/// measurements do not show if the source is to the right or to the left of the line Tx to Rx.
 const SIDES: f64 = 2.5e-5;
 
 /// Source of interference estimated from the measurements.
@@ -52,13 +52,13 @@ pub struct FoundSource {
 struct Factor {
     below: [f64; 6],
     diagonal: [f64; 4],
-    /// True if the fit determines all four unknowns. False if it leaves out the last unknown, which shows on which side
-    /// of the line Tx to Rx the source is.
+    /// True if the fit determines all four unknowns. False if it leaves out the last one, which shows if the source is
+    /// to the right or to the left of the line Tx to Rx.
     full_rank: bool,
 }
 
-/// Minimum pivot of the matrix factorisation, relative to the first pivot. With a smaller pivot the measured positions
-/// cannot separate the unknowns of the fit.
+/// Minimum pivot of the matrix factorisation, relative to the first pivot. Below it the measured positions cannot
+/// separate the unknowns of the fit.
 const SINGULAR: f64 = 2e-6;
 
 impl Factor {
@@ -223,8 +223,8 @@ impl Fit {
         self.seen
     }
 
-    /// Returns true if the fit has more positions than unknowns, and small errors. The errors are small if their
-    /// variance is below four times the variance that the operator expects.
+    /// Returns true if the fit has more positions than unknowns, and a small variance. It must be below four times the
+    /// variance that the operator expects.
     pub(crate) fn is_consistent(&self) -> bool {
         self.beyond > 1.5 && self.variance < 4.0 * self.expected
     }
@@ -236,16 +236,16 @@ impl Fit {
         self.count / self.variance
     }
 
-    /// Returns the mean square relative difference of two sources' interference at the measured positions. Each
-    /// source is given by its four coefficients ([`coefficients`]).
+    /// Returns the mean square relative difference of two sources' interference at the measured positions. Each source
+    /// is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_difference(&self, one: &[f64; 4], others: &[f64; 4]) -> f64 {
         let [a, b, c, d] = *one;
         let [p, q, r, s] = *others;
         quadratic(&self.products, [a - p, b - q, c - r, d - s]) / self.count
     }
 
-    /// Returns the mean square relative difference in interference of the fit and another source. That source is
-    /// given by its four coefficients ([`coefficients`]).
+    /// Returns the mean square relative difference in interference between the fit and another source. It is the mean
+    /// over the measured positions. The source is given by its four coefficients ([`coefficients`]).
     pub(crate) fn mean_square_from_fit(&self, others: &[f64; 4]) -> f64 {
         self.mean_square_difference(&self.coefficients, others)
     }
@@ -258,8 +258,8 @@ impl Fit {
 
     /// Returns the source of interference that fits the measurements, or else the closest one.
     ///
-    /// `side_m`, a lateral offset y, selects the source's side of the line Tx to Rx if the measured positions do not
-    /// determine it.
+    /// The measured positions may not determine if the source's y is above or below their mean y. It is then on the
+    /// side of `side_m`, a lateral offset y.
     ///
     /// # Errors
     /// [`Unfit::NoSource`] if no source on the ground fits.
@@ -322,7 +322,7 @@ impl Fit {
     }
 }
 
-/// Returns the mean square relative error of measurements if a source had these `coefficients`. `sums` are the sums
+/// Returns the mean square relative error of the measurements if a source had these `coefficients`. `sums` are the sums
 /// of the measurements.
 pub(crate) fn misfit(sums: &Sums, coefficients: &[f64; 4]) -> f64 {
     let [products @ .., av, bv, cv, dv, vv, count, _, _] = sums.numbers.map(f64::from);
@@ -339,9 +339,8 @@ fn quadratic(products: &[f64; 10], [a, b, c, d]: [f64; 4]) -> f64 {
         + dd * d * d
 }
 
-/// Returns a function from the terms of a position to the inverse interference v = 1e-12 W / I there. I is the
-/// interference power of the mission's interferer. The function gives `None` without a known source, or outside of
-/// the measurable range.
+/// Returns a function that converts the terms of a position to v = 1e-12 W / I there. I is the interference power of
+/// the mission's interferer. The function gives `None` without a known source, or outside of the measurable range.
 pub(crate) fn expected_at(mission: &Mission) -> impl Fn(&Terms) -> Option<f32> {
     let known = mission
         .known_source()
@@ -366,8 +365,8 @@ const FINER: u8 = 5;
 /// Returns position X', Y' and strength k of the best-fitting source; `None` if none fits. They are searched on
 /// grids. Positions are in units of half the distance from Tx to Rx.
 ///
-/// The search covers one side of the line of measured positions, whose Y' is `side`: larger Y' if `sign` is 1,
-/// smaller Y' if -1. 414 positions, some 16 000 instructions on a Cortex-M4F.
+/// The search covers Y' above `side`, the mean Y' of the measured positions, if `sign` is 1, and Y' below it if `sign`
+/// is -1. It tries 414 positions, in some 16 000 instructions on a Cortex-M4F.
 pub(super) fn nearest(
     products: &[f32; 10],
     right: &[f32; 4],

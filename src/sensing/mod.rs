@@ -54,9 +54,9 @@ pub struct Listen {
     /// Interval between an agreement and the leader's next collection of measurements; above 0. While the collections change nothing, the
     /// interval grows to at most 64 times this value.
     pub every: Duration,
-    /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. If it is
-    /// at least ten times `every`, the interferer is assumed to be stationary: after five estimates the chain moves
-    /// again only for a change that chance does not explain, of more than eight standard deviations.
+    /// Half-life of the weight of earlier measurements; above 0. Use a few seconds for a moving interferer. If it is at
+    /// least ten times `every`, the interferer is assumed to be stationary. After five estimates the chain then moves
+    /// again only for a change of more than eight standard deviations.
     pub half_life: Duration,
     /// Relative error of a measurement, 1e-3 to 1: 1 / sqrt(number of independent samples in it).
     pub relative_error: f32,

@@ -1,7 +1,7 @@
 //! Sums of the measurements, collected by a pass along the chain: eighteen numbers for the fit.
 //!
-//! `Terms` are the terms of a position; 1 / I is a linear combination of them, and a source has one coefficient for each. A [`Level`] is the interference
-//! at an end of the chain, on the ground, within the measurable range of powers.
+//! `Terms` are the terms of a position. 1 / I is a linear combination of them, and a source has one coefficient for
+//! each. A [`Level`] is the interference at an end of the chain, on the ground, within the measurable range of powers.
 //! A `Listener` has the measurements of one relay: the average at its position, and faded sums of earlier positions.
 
 use crate::mission::{Interferer, Mission};
@@ -25,7 +25,7 @@ pub struct Level {
     pub count: f32,
 }
 
-/// Flags of the levels measured at Tx and Rx: true if a level does not fit the relays' measurements.
+/// Flags for the levels measured at Tx and Rx: true if a level does not fit the relays' measurements.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct EndsOff {
     pub(crate) transmitter: bool,
@@ -42,7 +42,7 @@ impl EndsOff {
     };
 }
 
-/// Interference levels measured at Tx and Rx, with the result of their last check. The check compares them with the
+/// Interference levels measured at Tx and Rx, and the result of their last check. The check compares them with the
 /// relays' measurements.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Levels {
@@ -83,8 +83,8 @@ pub(crate) fn terms(distance_m: f32, at: Placement) -> Terms {
     [1.0, u, u * u - 1.0 / 3.0 + t * t + z * z, t]
 }
 
-/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is the middle of the measurable
-/// range, so that the square of v is in the range of an f32.
+/// Unit of interference power, W. Measurements are used as v = 1e-12 W / I. The unit is in the middle of the measurable
+/// range, so that an f32 holds the square of v.
 pub(crate) const UNIT_W: f32 = 1e-12;
 
 /// Range of v = 1e-12 W / I for the measurable range of the interference I, [`MEASURED_W`].
@@ -100,9 +100,8 @@ pub(crate) fn expected_v(v: f64) -> Option<f32> {
     (least..=most).contains(&v).then_some(v as f32)
 }
 
-/// Converts between a source's power and its strength k = eta D^2 [`UNIT_W`] / (4 P). P is `power_w`, in W, eta the
-/// mission's path-loss factor to the ground, and D its distance. The same function converts a power to a strength, and
-/// a strength to a power.
+/// Converts a source's power to its strength k = eta D^2 [`UNIT_W`] / (4 P), and a strength to a power. P is `power_w`,
+/// in W, eta the mission's path-loss factor to the ground, and D its distance from Tx to Rx.
 pub(crate) fn strength(mission: &Mission, power_w: f64) -> f64 {
     let config = mission.config();
     let d = f64::from(config.distance_m);
@@ -134,8 +133,8 @@ pub(crate) fn value(coefficients: &[f64; 4], terms: &Terms) -> f64 {
     a * one + b * u + c * q + d * t
 }
 
-/// Number of sums that a pass along the chain collects. They are products of terms, terms times v, v squared, number
-/// of positions, number of measurements, and age.
+/// Number of sums that a sensing pass collects. They are products of terms, terms times v, v squared, number of
+/// positions, number of measurements, and age.
 pub const SUMS: usize = 18;
 
 /// Weighted sums over the measured positions, from which the interferer is estimated.
@@ -164,8 +163,8 @@ impl Sums {
         numbers: [0.0; SUMS],
     };
 
-    /// Adds a measured position with its `terms`, the measured `v`, and the `expected` v, both above 0. v is 1e-12 W
-    /// / I. The position's weight follows from both, and is multiplied by `share`. `measured` is the number of
+    /// Adds a measured position with its `terms`, the measured `v`, and the `expected` v, both above 0. v is 1e-12 W /
+    /// I. The position's weight follows from both v, and is multiplied by `share`. `measured` is the number of
     /// measurements there. At most 60 instructions.
     pub(crate) fn add(&mut self, terms: &Terms, v: f32, expected: f32, share: f32, measured: f32) {
         let even = sqrt(v / expected);
@@ -291,8 +290,8 @@ impl Listener {
     }
 
     /// Adds a measurement of the interference at the position `at`. `heard` is the measured power, above 0, in units of
-    /// [`UNIT_W`]. `expected` returns the inverse power, 1e-12 W / I, that the current estimate predicts for the terms
-    /// of a position. This prediction is needed for the weights of the measurements.
+    /// [`UNIT_W`]. `expected` returns 1e-12 W / I for the terms of a position by the current estimate, as needed for
+    /// the weights.
     pub(crate) fn add(
         &mut self,
         now: Instant,

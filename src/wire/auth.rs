@@ -47,7 +47,7 @@ impl defmt::Format for Key {
     }
 }
 
-/// Credentials with which a relay signs its frames.
+/// Credentials of a relay for signing its frames.
 ///
 /// ```
 /// use uav_relay::{Auth, Key, Settings};
@@ -64,8 +64,8 @@ pub struct Auth {
     /// Secret key that authenticates the frames of the network.
     pub key: Key,
     /// Start counter of this relay, from 1, larger at every start. Use a number in flash that is incremented before
-    /// use, or the seconds of a clock that never runs backward. If an epoch is reused, frames recorded in it are
-    /// accepted again.
+    /// use, or the seconds of a clock that never runs backward. With a reused epoch, frames recorded in it are accepted
+    /// again.
     pub epoch: u32,
 }
 
@@ -108,7 +108,7 @@ impl Nonces {
     }
 }
 
-/// Key and nonces with which one node authenticates its frames to another.
+/// Key and nonces of one node for authenticating its frames to another.
 #[derive(Clone, Copy)]
 pub(crate) struct Signer<'a> {
     pub(crate) key: &'a Key,
@@ -127,8 +127,8 @@ pub(crate) fn is_same(one: [u8; TAG], other: [u8; TAG]) -> bool {
     u64::from_le_bytes(one) ^ u64::from_le_bytes(other) == 0
 }
 
-/// Replay protection for one sender: the frame counters that were accepted. It has the newest accepted frame counter, and a flag for each
-/// of the 63 counters below it.
+/// Replay protection for one sender: the frame counters that were accepted. It has the newest accepted frame counter,
+/// and a flag for each of the 63 counters below it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(C, packed(4))] // 12 bytes; a relay has eight of them
 pub(crate) struct Window {

@@ -15,7 +15,7 @@ pub fn digest(mission: &Mission) -> u16 {
 }
 
 impl Mission {
-    /// Returns the 16-bit digest of all parameters, by which relays detect that their missions differ.
+    /// Returns the 16-bit digest of all parameters. Relays detect by it that their missions differ.
     ///
     /// It detects mistakes, not attacks: two different missions have the same digest with a probability of 1 in 65 536.
     pub fn digest(&self) -> u16 {

@@ -14,14 +14,12 @@ use crate::time::{Duration, Instant};
 /// Frame that is ready to send: its destination and its length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sent {
-    /// Node number of the frame's destination.
     pub(crate) to: u16,
     /// Length of the encoded frame, bytes.
     pub(crate) len: usize,
 }
 
-/// Endpoint of one node: checks received frames, and addresses, numbers and signs sent frames. The endpoint has the
-/// node number, the frame counter, and the authentication sessions.
+/// Endpoint of one node: checks received frames; addresses, numbers and signs sent frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Endpoint {
     network: u16,
@@ -71,8 +69,8 @@ impl Endpoint {
         None
     }
 
-    /// Checks the authentication tag of `frame`. Counts every result but a valid new message in `stats`. `None` if
-    /// this node does not use authentication.
+    /// Checks the authentication tag of `frame`; `None` if this node does not use authentication. Counts every result
+    /// but a valid new message in `stats`.
     pub(crate) fn check(
         &mut self,
         now: Instant,
@@ -91,14 +89,14 @@ impl Endpoint {
         Some(checked)
     }
 
-    /// Returns true once a signing node has used all frame counters. It must not send any more frames until it restarts
-    /// with a new epoch, because a counter must not be used twice.
+    /// Returns true once a signing node has used all frame counters. It must not send before it restarts with a new
+    /// epoch, because a counter must not be used twice.
     pub(crate) const fn is_exhausted(&self) -> bool {
         self.counter == u32::MAX && self.session().is_some()
     }
 
-    /// Encodes `message`, which goes to node `to`, into `frame`. If node `to` cannot verify this node's tags yet, a
-    /// handshake is written instead, and the caller sends the message later.
+    /// Encodes `message` to node `to` into `frame`. If node `to` cannot verify this node's tags yet, a handshake is
+    /// written instead, and the caller sends the message later.
     pub(crate) fn transmit(
         &mut self,
         to: u16,
@@ -164,7 +162,7 @@ impl Endpoint {
         }
     }
 
-    /// Schedules an authentication handshake to node `to`, by which both learn each other's nonce.
+    /// Schedules an authentication handshake to node `to`. Both nodes then learn each other's nonce.
     pub(crate) fn greet(&mut self, to: u16) {
         if let Some(session) = self.session_mut() {
             session.greet(to);

@@ -104,8 +104,7 @@ pub(crate) fn encode_handshake(
     close(header, SIGNED | HANDSHAKE, len, Some(signer), out)
 }
 
-/// Returns the part of the buffer `out` into which a frame's body is written. This part begins after the COBS code
-/// byte and the header.
+/// Returns the part of the buffer `out` for a frame's body. It begins after the COBS code byte and the header.
 fn body(out: &mut FrameBuf) -> Option<&mut [u8]> {
     out.get_mut(1 + HEADER..)?.get_mut(..MAX_BODY)
 }
@@ -228,9 +227,8 @@ pub fn decode(plain: &[u8]) -> Result<(Header, Message), FrameError> {
     Ok((header, message))
 }
 
-/// Encodes a frame by COBS in place, and appends the delimiter; returns the total length. The frame to encode is at
-/// `out[1..=len]`, fewer than 254 bytes. The encoders of the crate `cobs` are not used, because they need a second
-/// buffer.
+/// Encodes a frame by COBS in place, and appends the delimiter; returns the total length. The frame is at
+/// `out[1..=len]`, fewer than 254 bytes. The encoders of the crate `cobs` would need a second buffer.
 fn stuff(out: &mut FrameBuf, len: usize) -> usize {
     // From the end: every zero, and the byte before the first one, becomes the distance to the next.
     let mut run: u8 = 1;

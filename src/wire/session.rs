@@ -1,10 +1,11 @@
 //! Sessions: authentication of received frames and signing of sent ones, with one session per node.
 //!
-//! Toward each other node a relay has a *nonce*: its epoch, and in the lower half a number that counts up from the relay's claim
-//! number (`node::duplicate`). A frame's tag covers the sender's nonce toward the receiver and the receiver's toward the sender. So a
-//! frame that was recorded before either of them started, or had forgotten the other, is rejected. The other's nonce comes in a
-//! *handshake*: a frame whose body is the sender's nonce, the receiver's as far as the sender knows it, and whether the sender
-//! still lacks the proof that the receiver is present.
+//! Toward each other node a relay has a *nonce*: its epoch in the upper half, and in the lower half a number that
+//! counts up from the relay's claim number (`node::duplicate`). A frame's tag covers two nonces: the sender's toward
+//! the receiver, and the receiver's toward the sender. So a recorded frame is rejected once one of the two has
+//! restarted or has forgotten the other. A node learns the other's nonce from a *handshake*. The body of a handshake is
+//! the sender's nonce, the receiver's nonce as far as the sender knows it, and a flag: true if the sender still lacks
+//! the proof that the receiver is present.
 //!
 //! | handshake with the right tag and | action |
 //! | --- | --- |
@@ -20,10 +21,10 @@
 //! with proved presence; nothing else is answered. So replayed frames cause at most one handshake each, which is replaced by
 //! another pending message, if there is one.
 //!
-//! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It is no proof,
-//! because it does not contain this relay's new nonce: it is no sign of life, it causes nothing but a handshake, and an old nonce
-//! is replaced by the current one, which is larger. So it does no lasting harm: before the current handshake, nothing can be sent
-//! to that node.
+//! A recorded handshake can be new to a relay only if the relay has just started or had forgotten its sender. It does
+//! not contain this relay's new nonce, so it is no proof that its sender is present: it causes only a handshake in
+//! reply. If its nonce is old, the current nonce is larger and replaces it. So it does no lasting harm: before the
+//! current handshake, nothing can be sent to that node.
 
 use super::auth::{Auth, Key, Nonces, Signer, TAG, Window, is_same};
 use super::frame::Opened;
@@ -48,13 +49,13 @@ pub(crate) struct Rival {
     pub(crate) newer_epoch: bool,
     /// True if the other node is passive: it has no setpoint and does not take part in the chain.
     pub(crate) passive: bool,
-    /// True if the other node certainly sent the claim after this relay's start. The proof is this relay's own claim number in the message,
-    /// or a signature.
+    /// True if the other node certainly sent the claim after this relay's start. The proof is a signature, or this
+    /// relay's own claim number in the message.
     pub(crate) is_current: bool,
 }
 
-/// Bit that a relay with a position sets in its claim number. With this bit the relay wins against a node that starts
-/// later. Of two nodes with the same node number, the one with the larger claim number wins.
+/// Bit that a relay with a position sets in its claim number, to win against a node that starts later. Of two nodes
+/// with the same node number, the one with the larger claim number wins.
 pub(crate) const RAISED: u32 = 1 << 31;
 
 /// Length of an authentication handshake's body, bytes.
@@ -62,13 +63,13 @@ pub(crate) const HANDSHAKE_LENGTH: usize = 17;
 
 const PEERS: usize = 8;
 
-/// Maximum difference between the numbers in two nonces that one node uses in one epoch. A nonce's number is its
-/// lower half. A node draws a random first number at its start, and counts up from it. A larger difference therefore
-/// shows that two nodes use the same node number.
+/// Maximum difference between the numbers in two nonces of one node and epoch. A nonce's number is its lower half. A
+/// node draws a random first number at its start, and counts up from it. A larger difference therefore shows that two
+/// nodes use the same node number.
 const MAX_GAP: u32 = 1 << 12;
 
-/// Number of consecutive handshakes of an older epoch that prove that the node's epoch went back. A smaller number
-/// can be due to delayed frames.
+/// Number of consecutive handshakes of an older epoch that show that the node's epoch went back. Delayed frames can
+/// cause a smaller number.
 const WENT_BACK: u8 = 5;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -76,16 +77,16 @@ struct Peer {
     node: u16,
     /// True if an authentication handshake to this node must be sent.
     handshake: bool,
-    /// True if the next handshake to this node requests a reply in any case. If false, it requests a reply only until
-    /// the node has proved its presence.
+    /// True if the next handshake requests a reply in any case. If false, it requests one only until the node has
+    /// proved its presence.
     requests_reply: bool,
-    /// True if the node has repeated this relay's nonce. The repetition proves that the node is present, and that
-    /// both nodes know each other's nonce.
+    /// True if the node has repeated this relay's nonce. The node is then present, and both nodes know each other's
+    /// nonce.
     proven: bool,
     /// Value of `Session::clock` at the last use of this table entry.
     used: u32,
-    /// Time of the last frame that proved the node present. A handshake with a larger nonce than all earlier nonces
-    /// also counts as proof.
+    /// Time of the last frame that proved the node present. A handshake with the largest nonce so far also counts as
+    /// proof.
     last_proof: Instant,
     /// Lower half of this relay's nonce toward the node; the upper half is the epoch.
     own_number: u32,
@@ -150,7 +151,7 @@ pub(crate) struct Session {
     /// Claim of another node to this relay's node number, as shown by a handshake. `None` once the claim has been
     /// read.
     rival: Option<Rival>,
-    /// Number of uses of session table entries so far, wrapping. By this number the entries are ordered by their last use.
+    /// Number of uses of table entries so far, wrapping. Each entry stores it at its last use.
     clock: u32,
     /// Current neighbours, whose table entries are never replaced.
     pinned: [Option<u16>; 2],
@@ -162,11 +163,11 @@ pub(crate) struct Session {
 /// Result of authenticating a received frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Checked {
-    /// Valid message that was not received before. It proves that its sender is present. `first` is true if the
-    /// sender had not proved this before in the present session.
+    /// Valid message that was not received before, so its sender is present. `first` is true for the sender's first
+    /// proof of this in the present session.
     Fresh { first: bool },
-    /// New handshake that contains this relay's current nonce, which proves that its sender is present. `first` is
-    /// true if the sender had not proved this before in the present session.
+    /// New handshake that contains this relay's current nonce, so its sender is present. `first` is true for the
+    /// sender's first proof of this in the present session.
     Handshake { first: bool },
     /// Handshake with the right tag but without this relay's current nonce. It can be a recorded handshake, so it does
     /// not prove that its sender is present.
@@ -175,16 +176,15 @@ pub(crate) enum Checked {
     Unsigned,
     /// Frame whose tag does not match the nonces of the current session.
     Forged,
-    /// Authentic frame that was received before. Also a frame whose counter is so old that it is unknown if the frame
-    /// was received before.
+    /// Authentic frame that was received before, or whose counter is too old to know that.
     Replayed,
     /// Fifth outdated handshake in a row, which proves that the node's epoch went back or was used twice.
     WentBack,
 }
 
 impl Session {
-    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. If a node is silent
-    /// for `gone_after`, another node with its number can replace it.
+    /// Creates an empty session table. This relay's nonces count up from `claim`, drawn at start. After a silence of
+    /// `gone_after`, another node with the same number can replace a node.
     pub(crate) const fn new(auth: Auth, claim: u32, gone_after: Duration) -> Self {
         let (key, epoch) = auth.parts();
         Self {
@@ -255,8 +255,8 @@ impl Session {
 
     /// Schedules a handshake that requests a reply from the silent node `to`.
     ///
-    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce;
-    /// with it the node could continue its former session and use frame counters twice.
+    /// Does nothing if the node has restarted in the same epoch. The handshake would tell the node its former nonce.
+    /// The node could then continue its former session, and use frame counters twice.
     pub(crate) fn request_reply_of_silent(&mut self, to: u16) {
         let begun_anew =
             |peer: &Peer| peer.older.times > 0 && u64::from(peer.older.epoch) == peer.nonce >> 32;
@@ -454,9 +454,11 @@ impl Session {
         Some(peer)
     }
 
-    /// Creates a table entry for `node` if there is none. If the table is full, it replaces an entry that is not
-    /// pinned: if possible the entry of a node without proof of presence, otherwise the least recently used entry.
-    /// After four billion entries the function creates no more, because a nonce must not be used twice.
+    /// Creates a table entry for `node` if there is none.
+    ///
+    /// If the table is full, it replaces an entry that is not pinned: if possible the entry of a node without proof of
+    /// presence, otherwise the least recently used one. After four billion entries it creates no more, because a nonce
+    /// must not be used twice.
     fn insert(&mut self, node: u16) {
         if self.find(node).is_some() {
             return;

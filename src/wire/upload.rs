@@ -1,4 +1,4 @@
-//! Uploaded mission, which replaces the one loaded before flight. Also the format in which a relay stores it across a reboot.
+//! Uploaded mission, which replaces the mission loaded before flight. Also the format in which a relay stores it.
 //!
 //! An upload has a *version*, which identifies the newest one, and the digest of its *base*, the mission loaded before flight;
 //! relays with another base reject it. It keeps the number of relays, because nodes are numbered by it, and it has one
@@ -16,11 +16,11 @@ use crate::mission::{Interference, Mission, MissionConfig, MissionError};
 pub struct Upload {
     version: u16,
     base: u16,
-    /// Valid parameters of the uploaded mission. Its interference comes from a single interferer, because a mission
-    /// with an interference field (known distribution along x) cannot be uploaded.
+    /// Valid parameters of the uploaded mission. It has a single interferer: a mission with an interference field
+    /// cannot be uploaded.
     config: MissionConfig,
-    /// Positions of Tx and Rx of this mission. `None` if relays must use the positions of their configuration. The
-    /// positions are valid, but each relay still checks that they fit the mission.
+    /// Positions of Tx and Rx of this mission; `None` for the positions in the relays' configuration. The positions are
+    /// valid, but each relay still checks that they fit the mission.
     sites: Option<Sites>,
 }
 
@@ -94,8 +94,7 @@ impl Upload {
         Self::checked(version, digest(base), config, None)
     }
 
-    /// Adds the positions of Tx and Rx to the uploaded mission. Relays then compute latitudes and longitudes from the
-    /// line between these positions.
+    /// Adds the positions of Tx and Rx to the uploaded mission. Relays compute latitudes and longitudes from them.
     ///
     /// Without this call, relays use the Tx and Rx positions of their configuration, even if an earlier upload had
     /// others.

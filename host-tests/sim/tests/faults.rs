@@ -79,7 +79,7 @@ fn median_and_worst(mut all: Vec<f64>) -> (f64, f64) {
 /// Time at which relay 4 of eight is switched off, s.
 const DIES_S: u64 = 20;
 
-/// Returns the time, s, for which the chain was not at its best positions after the loss of relay 4.
+/// Returns the total time, s, without the best positions of the chain after the loss of relay 4.
 ///
 /// `None` if the relays never agreed, or unless the seven remaining relays are in one view at the end.
 fn recovery(outcome: &Outcome) -> Option<f64> {

@@ -1,32 +1,32 @@
 //! Step control of an ascent: the target's increase, the fraction of the step, and the trust region.
 //!
-//! A backward pass gives the slack's derivative by ln gamma and the expected gain of the steps. A forward pass tries the steps
-//! with the target that they should just allow. The trial is accepted if its zero-slack target is higher than before. Otherwise a
-//! smaller fraction of the step is tried, and after the last one a smaller trust region.
+//! A backward pass gives the slack's derivative by ln gamma and the expected gain of the steps. A forward pass tries
+//! the steps, together with the target that they should just allow. The trial is accepted if the chain's zero-slack
+//! target becomes higher. Otherwise a smaller fraction of the steps is tried, and after the last fraction a smaller
+//! trust region.
 
 use super::outlook::Outlook;
 
-/// Fractions of the relays' computed moves that one iteration of the joint method tries, in this order. If the chain
-/// does not improve with a fraction, the next fraction is tried.
+/// Fractions of the relays' computed moves. An iteration tries them in this order until the chain improves.
 const SHARES: [f32; 3] = [1.0, 0.3, 0.09];
 
-/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. The same number
-/// is the maximum of the change of ln(target SIR).
+/// First *trust*: maximum move of a relay in an iteration, divided by its distance to the interferer. It also limits
+/// the change of ln(target SIR).
 const TRUST: f32 = 0.5;
 
-/// Minimum trust at which an improvement's final target is predicted. Trust limits the relays' moves. With a smaller
-/// trust the prediction would be too low.
+/// Minimum trust (limit of the relays' moves) at which an improvement's final target is predicted. With a smaller trust
+/// the prediction would be too low.
 const RESTRAINED: f32 = 0.05;
 
-/// Minimum trust (limit of the relays' moves). With a smaller trust the improvement of a chain ends without progress.
+/// Trust (limit of the relays' moves) below which the improvement of a chain ends without progress.
 const LEAST_TRUST: f32 = 1e-4;
 
-/// Minimum rate at which a rising ln(target SIR) is assumed to shorten the chain. The unit of length is the distance
-/// from Tx to Rx. The minimum is needed because the rate is a divisor; the rate is usually 0.5.
+/// Minimum assumed rate at which a rising ln(target SIR) shortens the chain. The unit of length is the distance from Tx
+/// to Rx. The rate is a divisor; it is usually 0.5.
 const LEAST_SLOPE: f32 = 0.3;
 
-/// First increase of the limit of the target, in ln(SIR). The limit is raised if the chain meets it, but does not meet
-/// the upper bound of all chains.
+/// First increase of the target's limit, in ln(SIR). The limit is raised if the chain meets it but misses the upper
+/// bound of all chains.
 const EXCESS: f32 = 0.03;
 
 /// First upper limit on the chain's slack, divided by the distance from Tx to Rx. Without the limit a large slack could
@@ -45,14 +45,14 @@ const CLOSE: f32 = 3e-6;
 /// Expected increase of ln(target SIR) below which the improvement of a chain ends.
 const SETTLED: f32 = 0.3 * CLOSE;
 
-/// Expected increase of ln(target SIR) below which an improvement's final target is predicted.
+/// Expected increase of ln(target SIR) below which the final target of an improvement can be predicted.
 const FORESEEN: f32 = 1e-4;
 
 /// Number of iterations after which a chain that falls far short of Rx counts as diverged.
 const ASTRAY_AFTER: u8 = 12;
 const ASTRAY: f32 = 0.3;
 
-/// Largest shortfall from Rx with which a chain is improved again. It is a fraction of the distance from Tx to Rx.
+/// Largest shortfall from Rx of a chain that is improved again. The unit is the distance from Tx to Rx.
 const ASTRAY_AT_END: f32 = 0.1;
 
 const ITERATIONS: u8 = 40;
@@ -63,8 +63,7 @@ pub(crate) enum AscentStep {
     Try { share: f32, sigma: f32 },
     /// Raise the target SIR as far as the unchanged chain allows.
     Raise,
-    /// Compute new moves of the relays for the current chain. This takes a backward pass from the last relay to the
-    /// first.
+    /// Compute new moves of the relays by a backward pass, from the last relay to the first.
     Again,
     /// End the improvement of this chain, or repeat the improvement with a lower limit on the slack.
     Over,
@@ -74,17 +73,17 @@ pub(crate) enum AscentStep {
 pub(crate) struct Ascent {
     /// Target SIR of the current chain, as ln(SIR).
     pub(crate) sigma: f32,
-    /// Slack of the current chain, m: the length by which it could reach beyond Rx at its target SIR. It is below 0
-    /// if the chain is too short.
+    /// Slack of the current chain, m: how far it could reach beyond Rx at its target SIR. Below 0 if the chain is too
+    /// short.
     pub(crate) slack: f32,
     floor: f32,
-    /// Target, as ln(SIR), at which the chain is checked against the upper bound of all chains. If the chain misses
-    /// the bound, this limit is raised.
+    /// Target, in ln(SIR), at which the chain is compared with the upper bound of all chains. It is raised if the chain
+    /// misses this bound.
     pub(crate) limit: f32,
-    /// Next increase of `limit`, the target at which the chain is checked, in ln(SIR).
+    /// Next increase of `limit`, in ln(SIR).
     excess: f32,
-    /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. The limit is lowered if relays
-    /// are too near the interferer, because a large slack would outweigh the penalty for their positions.
+    /// Upper limit on the chain's slack, as a fraction of the distance from Tx to Rx. It is lowered if relays are too
+    /// near the interferer, because a large slack would outweigh the penalty for them.
     spare: f32,
     /// Penalty for relays too near the interferer, m. It is subtracted from the chain's slack.
     pub(crate) penalty: f32,
@@ -109,8 +108,8 @@ impl Ascent {
         ..Self::new(0.0, 0.0, 0.0, 0.0)
     };
 
-    /// Starts the improvement of a chain. `slack` is the chain's slack, m, for the target `sigma`. Targets are in ln(SIR), and never fall
-    /// below `floor`.
+    /// Starts the improvement of a chain with the slack `slack`, m, at the target `sigma`. Targets are in ln(SIR), and
+    /// never fall below `floor`.
     pub(crate) const fn new(distance_m: f32, sigma: f32, slack: f32, floor: f32) -> Self {
         Self {
             sigma,
@@ -131,9 +130,9 @@ impl Ascent {
         }
     }
 
-    /// Returns this state with another upper limit of the target, in ln(SIR).
+    /// Returns this state with another limit of the target, in ln(SIR).
     ///
-    /// When the target reaches the limit, the search checks if the chain reaches the upper bound of all chains.
+    /// At this target the chain is compared with the upper bound of all chains.
     pub(crate) const fn probed_at(self, limit: f32) -> Self {
         Self {
             limit,
@@ -163,8 +162,8 @@ impl Ascent {
         true
     }
 
-    /// Continues after the upper limit on the chain's slack was lowered; returns the next action. `slack` is the
-    /// chain's slack under the new limit, m.
+    /// Returns the next action after the upper limit on the chain's slack was lowered. `slack` is the chain's slack
+    /// under the new limit, m.
     pub(crate) const fn tightened(&mut self, slack: f32) -> AscentStep {
         self.slack = slack;
         self.trust = TRUST;
@@ -172,13 +171,14 @@ impl Ascent {
         AscentStep::Again
     }
 
-    /// Returns true if the target SIR has reached its limit. The target must then be compared with the upper bound for all chains.
+    /// Returns true if the target SIR has reached its limit. The chain must then be compared with the upper bound of
+    /// all chains.
     pub(crate) fn at_limit(&self) -> bool {
         self.slack >= 0.0 && self.sigma >= self.limit
     }
 
-    /// Raises the limit of the target SIR, because the chain meets it but misses the upper bound. Returns the next
-    /// action.
+    /// Raises the limit of the target SIR; returns the next action. The chain has met the limit, but not the upper
+    /// bound.
     pub(crate) fn probed(&mut self) -> AscentStep {
         self.limit += self.excess;
         self.excess *= 4.0;
@@ -190,15 +190,15 @@ impl Ascent {
         (self.slope, self.linear, self.square) = (0.0, 0.0, 0.0);
     }
 
-    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. The results are the expected gains of
-    /// slack by the relays' moves, and the change of slack with the target.
+    /// Adds the results of the backward pass for one segment (ten relays) to the sums over the chain. They are the gain
+    /// of slack expected from the relays' moves, and the change of slack with the target.
     pub(crate) fn add(&mut self, outlook: &Outlook) {
         self.slope += outlook.by_target;
         self.linear += outlook.linear;
         self.square += outlook.square;
     }
 
-    /// Returns the next action once the backward pass has computed the moves of all relays.
+    /// Returns the next action after the backward pass has computed the moves of all relays.
     pub(crate) fn weighed(&mut self) -> AscentStep {
         self.slope = self.slope.min(-LEAST_SLOPE * self.distance_m);
         self.share = 0;
@@ -212,15 +212,15 @@ impl Ascent {
         if self.is_within(SETTLED) {
             return AscentStep::Over;
         }
-        // Slack that can only be used by a higher target.
+        // The relays' moves gain little here: only a higher target can use the slack.
         if self.slack > 1e-4 * self.distance_m && self.linear + self.square < 0.1 * self.slack {
             return AscentStep::Raise;
         }
         self.attempt()
     }
 
-    /// Returns true if ln(target SIR) is expected to change by less than `by`. The expected change follows from the chain's slack and from
-    /// the gain of the relays' moves.
+    /// Returns true if ln(target SIR) is expected to change by less than `by`. The change follows from the slack and
+    /// the relays' moves.
     fn is_within(&self, by: f32) -> bool {
         let least = by * -self.slope;
         self.slack.abs() < least && (self.linear + self.square).abs() < least
@@ -232,12 +232,12 @@ impl Ascent {
     }
 
     /// Returns true if the chain falls short of Rx by less than a tenth of the distance from Tx to Rx. Only such a
-    /// chain is improved again, with a lower upper limit on its slack.
+    /// chain is improved again, with a lower limit on its slack.
     pub(crate) fn is_kept_up_with(&self) -> bool {
         self.slack > -ASTRAY_AT_END * self.distance_m
     }
 
-    /// Returns true if this chain's improvement is predicted to end no higher than `sigma`, in ln(SIR). Such a chain
+    /// Returns true if the improvement of this chain is predicted to end at or below `sigma`, in ln(SIR). Such a chain
     /// can be dropped. `turn` is the next action of the improvement. False if no prediction is possible.
     pub(crate) fn ends_below(&self, turn: AscentStep, sigma: f32) -> bool {
         let gain = (self.linear + self.square).max(0.0);
@@ -249,8 +249,8 @@ impl Ascent {
             && end < sigma + SETTLED
     }
 
-    /// Returns the target that the chain is expected to just meet, in ln(SIR). `share` is the fraction of their
-    /// computed moves that the relays make.
+    /// Returns the target that the chain is expected to just meet, in ln(SIR). The relays make the fraction `share` of
+    /// their computed moves.
     pub(crate) fn sigma_for(&self, share: f32) -> f32 {
         let gain = (self.linear + self.square * share) * share;
         let by = (self.slack + gain.max(0.0)) / -self.slope;
@@ -285,9 +285,8 @@ impl Ascent {
         by > 0.0 || (by >= -1e-7 && slack.abs() < self.slack.abs())
     }
 
-    /// Returns the next action after a trial that did not improve the chain. The next trial makes a smaller fraction of
-    /// the computed moves. After the smallest fraction the action is to compute new moves, with a lower maximum length
-    /// of each move.
+    /// Returns the next action after a trial that did not improve the chain. It is a trial with a smaller fraction of
+    /// the computed moves. After the smallest fraction, new moves are computed with a lower maximum length.
     pub(crate) fn failed(&mut self) -> AscentStep {
         self.share = self.share.saturating_add(1);
         let turn = self.attempt();
@@ -300,8 +299,8 @@ impl Ascent {
         turn
     }
 
-    /// Accepts the trial chain, in which the relays made the fraction `share` of their computed moves. Returns the next action. `slack` is
-    /// the chain's slack, m, for the target `sigma`, in ln(SIR).
+    /// Accepts the trial chain, and returns the next action. The relays made the fraction `share` of their computed
+    /// moves. `slack` is the chain's slack, m, at the target `sigma`, in ln(SIR).
     pub(crate) fn taken(&mut self, share: f32, sigma: f32, slack: f32) -> AscentStep {
         let before = self.merit(self.sigma, self.slack);
         (self.sigma, self.slack) = (sigma, slack);
@@ -320,8 +319,8 @@ impl Ascent {
         }
     }
 
-    /// Continues after the target of the unchanged chain was raised to `sigma`, in ln(SIR). Returns the next action. `slack` is the chain's
-    /// slack for this target, m.
+    /// Returns the next action after the target of the unchanged chain was raised to `sigma`, in ln(SIR). `slack` is
+    /// the chain's slack at this target, m.
     pub(crate) fn raised(&mut self, sigma: f32, slack: f32) -> AscentStep {
         let gained = sigma - self.sigma > 1e-5;
         (self.sigma, self.slack) = (sigma, slack);

@@ -1,7 +1,7 @@
-//! Chain for the passes: senders, fixed altitudes, ceilings of the first and the last hop.
+//! Chain that the joint method solves: senders, fixed altitudes, maximum SIRs of its end hops.
 //!
-//! Powers and rooms of the relays are given as [`Seat`]. A chain is stored in segments, with the value function at the end of
-//! each, and the policies of one.
+//! A [`Seat`] has the power of a relay and its allowed lateral offsets and altitudes. A chain is stored in segments:
+//! the value function at the end of each segment, and the policies of one.
 
 use crate::features::ALTITUDE;
 use crate::mission::{Interferer, Mission, Profile};
@@ -28,7 +28,7 @@ pub(super) struct Chain<'a, F> {
 }
 
 impl<'a, F: SeatOf> Chain<'a, F> {
-    /// Creates the chain of `mission`; `None` in an interference field.
+    /// Creates the chain of `mission`; `None` for a mission with an interference field.
     pub(super) fn new(mission: &'a Mission, seat_of: &'a F) -> Option<Self> {
         Some(Self {
             mission,
@@ -54,9 +54,9 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.seat(index).room
     }
 
-    /// Returns the largest x of a relay, m, at which the minimum separation of later relays is possible.
+    /// Returns the largest x of a relay, m, that leaves later relays room for their minimum separation.
     ///
-    /// `end_m` is the largest x of the previous relay, m. `step` is the minimum step in x from the previous relay, m.
+    /// `end_m` is the largest x of the previous relay, m, and `step` the minimum step in x from that relay, m.
     pub(super) fn end_after(&self, end_m: f32, step: f32) -> f32 {
         (end_m + step).min(self.distance_m())
     }
@@ -78,10 +78,11 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         }
     }
 
-    /// Returns c, the target SIR divided by the sender's gain, for the hop to relay `index`. The gain is the sender's
-    /// power divided by the interferer's power. c determines the hop's maximum length. With noise, c includes the
-    /// factor 1 + noise / interference at the sender's position `from`, because the position of relay `index` is not
-    /// chosen yet.
+    /// Returns c, the target SIR divided by the sender's gain, for the hop to relay `index`.
+    ///
+    /// The gain is the sender's power divided by the interferer's power. c determines the hop's maximum length. With
+    /// noise, c includes the factor 1 + noise / interference at the sender's position `from`, because the position of
+    /// relay `index` is not known yet.
     pub(super) fn loudness(&self, index: u16, from: Placement, target: f32) -> f32 {
         let m = self.interferer;
         let s = square(m.x_m - from.x_m) + square(m.y_m - from.y_m) + square(from.altitude_m);
@@ -89,8 +90,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         self.sender(index, from).gain.ratio(target) * (1.0 + noise * s)
     }
 
-    /// Returns the altitude at which relay `index` is held, m. `None` if the relay is free to choose its altitude, or
-    /// if the mission allows one altitude only.
+    /// Returns the fixed altitude of relay `index`, m. `None` if the relay is free to choose its altitude, or if the
+    /// mission allows one altitude only.
     pub(super) fn held_at(&self, index: u16) -> Option<f32> {
         let Room { band, .. } = self.room(index);
         let free = !self.mission.config().band.is_single();
@@ -101,9 +102,10 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (1..=self.relays()).any(|index| self.held_at(index).is_some())
     }
 
-    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude. If `level` is
-    /// true, the altitude is constant before the first and after the last of these relays. Otherwise it falls to the
-    /// band's lowest altitude at Tx and at Rx.
+    /// Returns the altitude of relay `index`, m, interpolated between the relays with a fixed altitude.
+    ///
+    /// Before the first and after the last of them the altitude is constant if `level` is true. Otherwise it falls to
+    /// the lowest permitted altitude at Tx and at Rx.
     pub(super) fn altitude_between(&self, index: u16, level: bool) -> f32 {
         let relays = self.relays();
         let held = |index: u16| Some((index, self.held_at(index)?));
@@ -119,16 +121,17 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         low + share * (high - low)
     }
 
-    /// Returns the input for the computation of relay `index`, which receives a sender at `from`. `room` has the
-    /// relay's permitted lateral offsets and altitudes.
+    /// Returns relay `index` as the receiver of a hop from `from`. `room` has the relay's permitted lateral offsets and
+    /// altitudes.
     pub(super) fn link(&self, index: u16, from: Placement, room: Room) -> Site<'a> {
         let sender = self.sender(index, from);
         Site::new(self.mission, self.interferer, sender, index <= 1, room)
     }
 
-    /// Returns the slack of the chain for `target`, m, and the derivatives of the slack. The slack is the maximum
-    /// length of the last hop for `target`, minus the length of this hop. The last relay is at `at`; the derivatives
-    /// are with respect to its coordinates.
+    /// Returns the slack of the chain for `target`, m, and its derivatives. They are by the position `at` of the last
+    /// relay.
+    ///
+    /// The slack is the maximum length of the last hop for `target`, minus the length of this hop.
     pub(super) fn tail(&self, target: f32, at: Placement) -> (f32, Outlook) {
         let Seat { room, power_w } = self.seat(self.relays());
         let most = site::last_most(self.mission, power_w, room);
@@ -140,8 +143,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         (slack, outlook)
     }
 
-    /// Returns an upper bound on the chain's SIR, as ln(SIR). The bound is the smaller of the maximum SIRs of the
-    /// first and the last hop.
+    /// Returns an upper bound on the chain's SIR, in ln(SIR). It is the smaller of the maximum SIRs of the first and
+    /// the last hop.
     pub(super) fn ceiling(&self) -> f32 {
         let Seat { room, power_w } = self.seat(self.relays());
         let first = self.room(1);
@@ -150,8 +153,8 @@ impl<'a, F: SeatOf> Chain<'a, F> {
         libm::logf(first.min(last).clamp(1e-30, 1e30))
     }
 
-    /// Returns the lowest target, as ln(SIR), for which every hop has a maximum length. It is just above the largest
-    /// gain of a hop. With a lower target, a hop beyond the interferer could have any length.
+    /// Returns the lowest target, in ln(SIR), that limits the length of every hop. It is just above the largest gain of
+    /// a hop. With a lower target, a hop beyond the interferer could have any length.
     pub(super) fn floor(&self) -> f32 {
         let own = (1..self.relays()).map(|index| self.seat(index).power_w);
         let relay = own.fold(0.0, f32::max);
@@ -227,7 +230,7 @@ impl Gains {
 }
 
 /// Returns the lateral offset and altitude at which a relay above or beside Rx receives Tx best. Candidates are the
-/// limits of the ranges in `room`, and the lateral offset 0.
+/// limits of `room`, and the lateral offset 0.
 pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSection {
     let tx = Sender::transmitter(chain.mission);
     let mut best = (0.0, CrossSection::default());
@@ -244,23 +247,21 @@ pub(super) fn far_off(chain: &Chain<'_, impl SeatOf>, room: Room) -> CrossSectio
 }
 
 pub(super) const SEGMENT: usize = 10;
-/// Number of relays whose computed moves are in memory at one time. This is one segment of the chain, or 0 without the
-/// feature `altitude`.
+/// Number of relays whose computed moves are in memory at one time. It is one segment, or 0 without the feature
+/// `altitude`.
 pub(super) const STAGES: usize = if ALTITUDE { SEGMENT } else { 0 };
 pub(super) const SEGMENT_RELAYS: u16 = 10;
 
-/// Stored state of the solver for one segment, which is ten consecutive relays of the chain. It has the x of the
-/// relay before the segment. It also has the derivatives of the chain's slack with respect to the position of the
-/// segment's last relay.
+/// Stored state of the solver for one segment, which is ten consecutive relays. It has the x of the relay before the
+/// segment, and the derivatives of the chain's slack by the position of the segment's last relay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mark {
     /// x of the relay before this segment, m.
     pub(super) x_m: f32,
-    /// First derivatives of the chain's slack, m/m. They are with respect to the x, y and h of the segment's last
-    /// relay.
+    /// First derivatives of the chain's slack by the x, y and h of the segment's last relay, m/m.
     pub(super) slope: Triple,
-    /// Second derivatives of the chain's slack, 1/m. They are with respect to the coordinates of the segment's last
-    /// relay. The order is xx, xy, xh, yy, yh, hh.
+    /// Second derivatives of the chain's slack by the coordinates of the segment's last relay, 1/m. The order is xx,
+    /// xy, xh, yy, yh, hh.
     pub(super) bend: [f32; 6],
 }
 
@@ -315,7 +316,7 @@ pub(super) fn relays_of(segment: u8, relays: u16) -> impl DoubleEndedIterator<It
         .filter(move |(_, index)| *index <= relays)
 }
 
-/// Profile of one relay for the joint method: power, allowed lateral offsets, allowed altitudes.
+/// Profile of one relay for the joint method: power, permitted lateral offsets and permitted altitudes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Seat {
@@ -334,8 +335,8 @@ impl Seat {
         }
     }
 
-    /// Returns the profile of a relay with the altitude and power `own`. If `holds` is true, the relay keeps this
-    /// altitude. If it is false, the relay is free to choose another altitude.
+    /// Returns the profile of a relay with the altitude and power `own`. The relay keeps this altitude if `holds` is
+    /// true; otherwise it is free to choose another.
     pub const fn of(mission: &Mission, own: Profile, holds: bool) -> Self {
         let room = Room::of(mission);
         Self {

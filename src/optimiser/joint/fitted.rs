@@ -6,13 +6,14 @@
 //! time = sum over hops of  1 / b(F) + r / b(B)
 //! ```
 //!
-//! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is concave there. So the
-//! best chain mostly has a few long hops, and the other relays gather at their minimum separation: a sum with many local optima
-//! across which no derivative leads. But each term depends on two neighbours only. So if every relay may stay or move by one or two
-//! widths along one coordinate, the best of all 5^N combinations follows from one pass over the relays (dynamic programming; Viterbi
-//! 1967). The method repeats such passes over x, y and altitude, halves the width when a round gains little, and begins with a
-//! width at which relays jump from one group to another. No step raises the time. It needs no derivatives, and the minimum separation
-//! is simply a condition of each hop.
+//! in units of 1 / bandwidth; the rate is its inverse. A hop's time rises steeply with its length from 0, and is
+//! concave there. So the best chain mostly has a few long hops, and the other relays gather at their minimum
+//! separation. The sum has many local optima, and derivatives do not lead from one to another. But each term depends on
+//! two neighbours only. So if every relay may stay or move by one or two widths along one coordinate, one pass over the
+//! relays finds the best of all 5^N combinations (dynamic programming; Viterbi 1967). The method repeats such passes
+//! over x, y and altitude, and halves the width when a round gains little. With the first width, relays jump from one
+//! group to another. No step raises the time. The method needs no derivatives, and the minimum separation is simply a
+//! condition of each hop.
 //!
 //! The initial chains are evenly spaced over the line and over its halves, and gathered at Tx, in the middle and at Rx. Lengths are in
 //! units of D, in which the widths are powers of two: the relays of a group keep their distances exactly.
@@ -26,32 +27,31 @@ use crate::sir::{in_noise, square};
 use core::f32::consts::LN_2;
 use core::task::Poll;
 
-/// Number of positions of each relay that a pass of the solver combines. These are the current position, and two
-/// positions on either side.
+/// Number of positions that a pass tries for each relay: the current one, and two in either direction.
 const STATES: usize = 5;
-/// Moves of a relay that a pass of the solver tries, in units of the current step width. Of equally good moves the
-/// first in this list is preferred.
+/// Moves of a relay that a pass tries, in units of the current step width. Of equally good moves the first in this list
+/// is preferred.
 const MOVES: [f32; STATES] = [0.0, -2.0, -1.0, 1.0, 2.0];
-/// Number of bits to store one choice among the five states of the previous relay.
+/// Number of bits that store the choice among the five states of the previous relay.
 const BITS: usize = 3;
 
 /// Step width at which the search from one initial chain ends, in units of D.
 const NARROWEST: f32 = 1.0 / 131_072.0;
-/// Relative gain of a round of passes below which the step width of the moves is halved.
+/// Relative gain of a round of passes below which the step width is halved.
 const LITTLE: f32 = 1e-3;
 /// Maximum number of rounds of passes over one initial chain.
 const ROUNDS: u8 = 200;
 
-/// Number of relays for which one call of the solver continues a pass.
+/// Number of relays per call in a pass of the solver.
 const AT_ONCE: u16 = 3;
-/// Number of relays that one call of the solver handles in all work but passes.
+/// Number of relays per call in all other work of the solver.
 const OTHERS_AT_ONCE: u16 = 10;
 
 /// Amount added to each squared hop length, in units of D^2, so that no hop time is 0.
 const SHORTEST: f32 = 1e-12;
 
 /// Initial chains: first and last x of the relays, and first step width of the moves, in units of D. If both x are
-/// equal, the relays start there, at their minimum separation.
+/// equal, the relays start there at their minimum separation.
 const STARTS: [[f32; 3]; 8] = [
     [0.5, 0.5, 0.125],
     [0.0, 1.0, 0.125],
@@ -62,17 +62,16 @@ const STARTS: [[f32; 3]; 8] = [
     [0.0, 0.0, 0.007_812_5],
     [1.0, 1.0, 0.007_812_5],
 ];
-/// Index, from 0, of the initial chain that starts from the best chain found along the line Tx to Rx. This initial
-/// chain is used only if relays are allowed to leave the common altitude or the line.
+/// Index, from 0, of the initial chain that starts from the best chain found along the line Tx to Rx. Used only if
+/// relays may leave the common altitude or the line.
 const BEST: u8 = 8;
 /// First step width of the moves from the best chain along the line, in units of D.
 const BEST_WIDTH: f32 = 1.0 / 16.0;
-/// Lateral offset and altitude of further initial chains, as two fractions. The first number is a fraction of the
-/// largest lateral offset away from the interferer. The second number is a fraction of the altitude range above the
-/// common altitude.
+/// Lateral offset and altitude of further initial chains, as fractions of two ranges. The first range is from 0 to the
+/// largest lateral offset away from the interferer, the second from the common altitude to the highest altitude.
 const ACROSS: [[f32; 2]; 2] = [[0.0, 0.5], [0.5, 0.0]];
 
-/// Fitted slots of the hops next to a relay: begin and end of each, as shares of the frame, 0 to 1.
+/// Fitted slots of the hops next to a relay: begin and end of each, as fractions of the frame, 0 to 1.
 ///
 /// The slots of the hops follow one another in this order: toward Rx from hop 1 (from Tx) to hop N + 1 (to Rx), then
 /// back from hop N + 1 to hop 1. A slot begins where the slot before it ends, to the bit. Tx and Rx compute nothing:
@@ -93,12 +92,11 @@ pub struct SlotShares {
     /// direction both are 1: the slot is empty.
     pub from_rx: [f32; 2],
     /// Data rate of the whole chain to Rx, divided by the bandwidth, bit/s/Hz. The data rate back to Tx is `reverse`
-    /// times this value.
+    /// times this.
     pub bits_per_hz: f32,
 }
 
-/// Position that is tried for a node, and the inverse interference at this position. The inverse interference is 1 at
-/// Tx and Rx.
+/// Position tried for a node, and the inverse interference there, which is 1 at Tx and Rx.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
     at: Triple,
@@ -128,8 +126,7 @@ impl State {
 struct Hop {
     gains: [f32; 2],
     reverse: f32,
-    /// Minimum squared distance of the two relays, in units of the squared distance Tx to Rx. `None` if an end is Tx
-    /// or Rx.
+    /// Minimum squared distance of the two relays, in units of D^2. `None` if an end of the hop is Tx or Rx.
     apart: Option<f32>,
 }
 
@@ -142,8 +139,8 @@ impl Hop {
         [there * to.quiet / l, back * from.quiet / l]
     }
 
-    /// Returns the times to send one bit toward Rx and r bits back. Both are infinite if two relays are too close or in
-    /// the wrong order.
+    /// Returns the times to send one bit toward Rx and r bits back. Both are infinite if two relays are too close or
+    /// out of order.
     #[inline(never)]
     fn times(&self, from: &Spot, to: &Spot) -> [f32; 2] {
         let [x, y, h] = minus(to.at, from.at);
@@ -167,15 +164,15 @@ impl Hop {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Sets the positions of an initial chain, some relays at a time. The field is the number of relays already set.
+    /// Choice of the positions of an initial chain, some relays at a time. The field is the number of relays done.
     Begin(u16),
     /// Forward pass of the dynamic programming, from Tx to Rx: finds the fastest combination of moves. The field is
     /// the next node to process: 1 for the first relay, N + 1 for Rx.
     Pass(u16),
-    /// Backward pass, from the last relay to the first. Moves each relay as the best combination of moves requires.
-    /// The fields are the next relay to move, and the index of its move in [`MOVES`].
+    /// Backward pass, from the last relay to the first: moves the relays as in the best combination. The fields are the
+    /// next relay to move, and the index of its move in [`MOVES`].
     Back(u16, u8),
-    /// Summation of the hop times of the best chain, and search for its worst SIR. The field is the next node.
+    /// Summation of the hop times of the best chain, and search for its lowest SIR. The field is the next node.
     Sum(u16),
 }
 
@@ -186,20 +183,20 @@ pub(super) struct Fitted<const RELAYS: usize> {
     gains: Gains,
     /// Positions of the relays in the current chain, in units of the distance from Tx to Rx.
     places: [Triple; RELAYS],
-    /// Positions of the best chain. At the end of the search the x and y of each relay are replaced by two sums of
-    /// hop times, from Tx up to this relay: toward Rx, and back.
+    /// Positions of the best chain. At the end of the search, two sums of hop times from Tx to the relay, toward Rx and
+    /// back, replace each relay's x and y.
     best_places: [Triple; RELAYS],
-    /// Best state of the previous relay for each of a relay's five states: three bits per state.
+    /// Best state of the previous relay for each of a relay's five states: three bits each.
     choices: [u16; RELAYS],
     front: [State; STATES],
     work: Work,
-    /// Number of the initial chain that is being improved, from 0.
+    /// Number of the current initial chain, from 0.
     number: u8,
     rounds: u8,
     /// Coordinate that the current pass changes: 0 for x, 1 for y, 2 for the altitude.
     axis: u8,
     width: f32,
-    /// Total hop time of the current chain, which is minimised; infinite if relays are too close.
+    /// Total hop time of the current chain, which is to be minimised. Infinite if relays are too close.
     time: f32,
     /// Total hop time of the chain before the current round of passes.
     before: f32,
@@ -266,9 +263,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         Poll::Pending
     }
 
-    /// Moves the next relays to their positions in the current initial chain. The first `done` relays are there
-    /// already, and one call moves at most [`OTHERS_AT_ONCE`]. After the last relay, the first pass over the chain is
-    /// due.
+    /// Moves relays to their positions in the current initial chain. They are up to [`OTHERS_AT_ONCE`] relays after the
+    /// first `done`. The first pass over the chain follows after the last relay.
     fn begin(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) {
         let config = chain.mission.config();
         let relays = chain.relays();
@@ -382,7 +378,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
             {
                 *kept = choices;
             } else {
-                // All states of Rx are one; their choice is the state of the last relay.
+                // Rx has a single state. Its choice is the state of the last relay.
                 let [rx, ..] = next;
                 self.conclude(chain, rx.time, (choices & 7) as u8);
                 return;
@@ -391,7 +387,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         self.work = Work::Pass(end);
     }
 
-    /// Continues after a pass. Its best combination of moves has the total hop time `time`, with the last relay in
+    /// Continues after a pass whose best combination of moves has the total hop time `time`. The last relay is in
     /// `state`.
     fn conclude(&mut self, chain: &Chain<'_, impl SeatOf>, time: f32, state: u8) {
         if time < self.time {
@@ -420,9 +416,9 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         }
     }
 
-    /// Selects the coordinate and the step width of the solver's next pass over the relays. A pass improves this one
-    /// coordinate of all relays. After the last pass from one initial chain, the function stores the chain if it is
-    /// the best so far, and goes on to the next initial chain.
+    /// Selects the coordinate and the step width of the next pass over the relays. A pass changes one coordinate of all
+    /// relays. After the last pass from an initial chain, the function stores the chain if it is the best so far, and
+    /// goes on to the next initial chain.
     fn next_pass(&mut self, chain: &Chain<'_, impl SeatOf>) {
         let config = chain.mission.config();
         self.axis += 1;
@@ -454,8 +450,7 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         };
     }
 
-    /// Returns the forward and backward time of the hop to node `index`. If the worse SIR of the hop is below `worst`,
-    /// it replaces `worst`.
+    /// Returns the forward and backward time of the hop to node `index`. Lowers `worst` to the lower SIR of the hop.
     fn hop_times(&mut self, chain: &Chain<'_, impl SeatOf>, index: u16) -> [f32; 2] {
         let hop = self.gains.hop(chain, index);
         let (from, to) = (
@@ -471,8 +466,8 @@ impl<const RELAYS: usize> Fitted<RELAYS> {
         hop.times(&from, &to)
     }
 
-    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are shares of the
-    /// frame, 0 to 1. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
+    /// Returns the end of the slot of hop `hop` toward Rx, and the begin of its slot back. Both are fractions of the
+    /// frame. `hop` is at most N + 1. Hop 0 stands for the limits of the frame: the result is 0 and 1.
     fn bounds(&self, relays: u16, hop: u16) -> [f32; 2] {
         let kept = self.best_places.get(usize::from(hop).wrapping_sub(1));
         let [there, back] = match (kept, hop) {

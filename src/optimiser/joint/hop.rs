@@ -42,9 +42,10 @@
 use crate::place::Placement;
 use crate::sir::square;
 
-/// Derivatives of the end of a hop that just meets its target SIR. The joint method computes the moves of relays with
-/// these derivatives. Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w,
-/// of the hop's start p, and of the target SIR.
+/// Derivatives of the end of a hop that just meets its target SIR.
+///
+/// Two coordinates w of the hop's end are free. The third, dependent coordinate is a function of w, of the hop's start
+/// p, and of the target SIR.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_field_names,
@@ -54,21 +55,20 @@ pub(super) struct Reach {
     pub(super) by_p: Triple,
     pub(super) by_w: [f32; 2],
     pub(super) by_pp: [Triple; 3],
-    /// Second derivatives of the dependent coordinate of the hop's end, with respect to w and p. w are the other two
-    /// coordinates of the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value
-    /// for each coordinate of p.
+    /// Second derivatives of the dependent coordinate of the hop's end by w and p. w are the other two coordinates of
+    /// the end, and p is the start of the hop. Row i is for coordinate i of w; each row has a value for each coordinate
+    /// of p.
     pub(super) by_wp: [Triple; 2],
-    /// Second derivatives of the dependent coordinate of the hop's end. They are with respect to the other two
-    /// coordinates w_1 and w_2 of the end. The order is w_1 w_1, w_1 w_2, w_2 w_2.
+    /// Second derivatives of the dependent coordinate of the hop's end. They are by the other two coordinates w_1 and
+    /// w_2 of the end, in the order w_1 w_1, w_1 w_2, w_2 w_2.
     pub(super) by_ww: [f32; 3],
-    /// Derivative of the dependent coordinate of the hop's end with respect to the target ln(SIR), m. The other two
-    /// coordinates of the end are constant.
+    /// Derivative of the dependent coordinate of the hop's end by ln(target SIR), m. The other two coordinates are
+    /// constant.
     pub(super) by_target: f32,
 }
 
 impl Reach {
-    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx, or at the hop's farthest
-    /// x.
+    /// Derivatives of a hop whose end is fixed: all are 0. The end is fixed at the x of Rx or at the hop's farthest x.
     pub(super) const FIXED: Self = Self {
         by_p: [0.0; 3],
         by_w: [0.0; 2],
@@ -131,9 +131,10 @@ impl Reach {
     }
 }
 
-/// Derivatives q'(s) and 2 q''(s) of q(s) = s / (1 + nu s). q is the inverse of interference plus noise, and has the
-/// unit of s. s is the squared distance from the interferer, m^2. nu is the noise divided by the interferer's power
-/// received at 1 m, 1/m^2.
+/// Derivatives q'(s) and 2 q''(s) of the inverse of interference plus noise, q(s) = s / (1 + nu s).
+///
+/// s is the squared distance from the interferer, m^2, and q has the same unit. nu is the noise divided by the
+/// interferer's power received at 1 m, 1/m^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend {
     pub(super) q: f32,
@@ -178,8 +179,8 @@ impl Coordinate {
         self.restored(at)
     }
 
-    /// Returns a symmetric 3 x 3 matrix with its rows and columns reordered: the coordinate `self` first. The other
-    /// two coordinates follow in the order x, y, h.
+    /// Returns a symmetric 3 x 3 matrix with reordered rows and columns. The coordinate `self` is first; the other two
+    /// follow in the order x, y, h.
     pub(crate) fn first_of(self, bend: [Triple; 3]) -> [Triple; 3] {
         self.ordered(bend).map(|row| self.first(row))
     }
@@ -215,17 +216,15 @@ pub(super) fn minus([a, b, c]: Triple, [x, y, z]: Triple) -> Triple {
 }
 
 /// Condition s + `spare` >= `c` l for a hop to meet its target SIR. s is the squared distance from the hop's receiver
-/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain. Noise makes
-/// `c` larger.
+/// to the interferer, m^2, and l the squared length of the hop, m^2. `c` is the target divided by the gain; noise makes
+/// it larger.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
     pub(super) c: f32,
     /// Difference `c` - 1, computed without cancellation. `c` is the target SIR divided by the gain, increased by
     /// noise.
     pub(super) e: f32,
-    /// Constant in the condition s + `spare` >= `c` l for a hop to meet its target, m^2; 0 without noise. s is the
-    /// squared distance from the hop's receiver to the interferer, and l the squared length of the hop. `c` is the
-    /// target SIR divided by the gain.
+    /// Constant in the condition s + `spare` >= `c` l of [`Tangent`], m^2; 0 without noise.
     pub(super) spare: f32,
 }
 

@@ -2,9 +2,9 @@
 //!
 //! It computes the x of all relays for one target, in portions.
 //!
-//! The pass to Rx computes the farthest x of each relay, exactly as the relays compute it from their messages. With data in one
-//! direction this is enough, unless a relay has to stay short of its farthest x. Otherwise the pass back to Tx computes the x that each
-//! relay has to take, and whether it can.
+//! The pass to Rx computes the farthest x of each relay, exactly as the relays compute it from their messages. With
+//! data in one direction this is enough, unless a relay has to stay short of its farthest x. Otherwise a pass back to
+//! Tx computes the x that each relay has to take, and checks that it can.
 
 use crate::optimiser::joint::chain::{Chain, SeatOf};
 use crate::optimiser::joint::outlook::Outlook;
@@ -15,7 +15,7 @@ use crate::place::{CrossSection, Station};
 use crate::root::sqrt;
 use core::task::Poll;
 
-/// Number of relays that one call computes: with data in one direction, and in both.
+/// Number of relays per call: with data in one direction, and in both.
 const AT_ONCE: [u16; 2] = [20, 2];
 
 /// Memory of a relay during Algorithm 1: its x, and the upper limit of its x, m.
@@ -32,7 +32,7 @@ impl Noted for [f32; 2] {
 /// Progress of Algorithm 1 for one target: a pass over the relays to Rx, then a pass back to Tx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx, and at the end of the pass
+    /// Index of the last relay that the pass has computed. It is 0 before the pass to Rx and at the end of the pass
     /// back.
     index: u16,
     /// True while the solver passes along the chain from Rx back to Tx.
@@ -56,7 +56,7 @@ impl Line {
     };
 
     /// Continues Algorithm 1 by some relays, for the target `sigma`, in ln(SIR). Ready with `None` if the target cannot
-    /// be met, otherwise with true if some relay has to stay short of its farthest x.
+    /// be met. Otherwise ready with true if some relay has to stay short of its farthest x, else false.
     ///
     /// `cells` has the lateral offsets and altitudes, and `notes` receives the x. Relay 1 stays at least the first of
     /// `closed` away from Rx, and the last relay at least the second away from Tx, as fractions of the distance from Tx to
@@ -179,8 +179,8 @@ fn hop<const RELAYS: usize>(
     .ending(end_m)
 }
 
-/// Returns the chain's slack, m, and the final x of the last relay, m. `reaches` are the farthest x of the last but one
-/// and of the last relay, m, and `end_m` is the upper limit of the last relay's x.
+/// Returns the chain's slack, m, and the final x of the last relay, m. `reaches` are the farthest x of the last two
+/// relays, m, and `end_m` is the upper limit of the last relay's x.
 fn ending<const RELAYS: usize>(
     chain: &Chain<'_, impl SeatOf>,
     cells: &Cells<RELAYS>,

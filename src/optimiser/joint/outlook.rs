@@ -1,8 +1,9 @@
-//! Value function: the slack of the rest of a chain. It is a quadratic in the position of the relay before that rest.
+//! Value function: the slack of the chain as a quadratic function of one relay's position.
 //!
 //! The slack is the length by which the chain overshoots Rx for a target; all relays maximise it. Its first and second
-//! derivatives by a relay's position are all that the relays before need to know of those after (Bellman's principle). With the
-//! second, this is differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa, Mansard and Todorov 2014).
+//! derivatives by a relay's position are all that the relays before need to know of those after (Bellman's principle).
+//! With the second derivatives this is differential dynamic programming (Jacobson and Mayne 1970; within a box: Tassa,
+//! Mansard and Todorov 2014).
 //!
 //! The [`Policy`] of a relay in one iteration of the joint method is its step, and its feedback on changes before it.
 
@@ -11,8 +12,8 @@ use crate::place::Placement;
 use crate::root::sqrt;
 use crate::sir::square;
 
-/// Value function of the joint method: the chain's slack as a function of one relay's position. The function is a quadratic model, and
-/// assumes that the relays toward Rx react optimally.
+/// Value function of the joint method: the chain's slack as a quadratic in one relay's position. It assumes that the
+/// relays toward Rx react optimally.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Outlook {
     /// First derivatives of the slack with respect to the relay's x, y and h, m per m.
@@ -21,8 +22,8 @@ pub(crate) struct Outlook {
     pub(crate) bend: [Triple; 3],
     /// Derivative of the slack with respect to the target ln(SIR), m.
     pub(crate) by_target: f32,
-    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f, 0 to 1, is the fraction of the
-    /// computed moves that this relay and the relays toward Rx really make.
+    /// Coefficient a of the slack gained by the relays' moves, a f + b f^2, m. f, 0 to 1, is the fraction of their
+    /// computed moves that this relay and the relays toward Rx make.
     pub(crate) linear: f32,
     /// Coefficient b of the slack gained by the relays' moves, a f + b f^2, m. f is the fraction of the moves, as for
     /// `linear`.
@@ -57,8 +58,8 @@ impl Outlook {
     }
 
     /// Subtracts the penalty `weight` `near`^2 / 2 for a relay too close to the interferer. `near` is the squared
-    /// distance that the relay lacks, m^2; `slope` and `by_target` are the derivatives of `near` with respect to the
-    /// position and to ln(target SIR).
+    /// distance that the relay lacks, m^2. `slope` and `by_target` are the derivatives of `near` by the position and by
+    /// ln(target SIR).
     pub(super) fn penalise(&mut self, weight: f32, near: f32, slope: Triple, by_target: f32) {
         self.by_target -= weight * near * by_target;
         for (total, part) in self.slope.iter_mut().zip(slope) {
@@ -72,9 +73,9 @@ impl Outlook {
         }
     }
 
-    /// Converts the value function (slack) of a hop's receiver to the value function of the hop's sender. Returns the
-    /// receiver's policy: its move in two coordinates, within [`low`, `high`], m, relative to its present position.
-    /// The third coordinate, `axis`, then follows from the hop's maximum length.
+    /// Replaces the value function of a hop's receiver by its sender's; returns the receiver's policy. The policy is a
+    /// move in two coordinates, within [`low`, `high`], m, relative to the present position. The third coordinate,
+    /// `axis`, follows from the hop's maximum length.
     pub(super) fn pass(
         &mut self,
         axis: Coordinate,
@@ -155,23 +156,22 @@ fn mix(a: [f32; 3], b: [f32; 3], f: f32, c: [f32; 3], g: f32) -> [f32; 3] {
 
 /// Policy of a relay in the joint method: its move in one iteration, in two of its coordinates.
 ///
-/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the
-/// move of the sending relay, the next relay toward Tx.
+/// The third coordinate follows from the maximum length of the hop to the relay. The move depends linearly on the move
+/// of the sender, the next node toward Tx.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Policy {
     pub(super) axis: Coordinate,
-    /// True to select the larger of two solutions for the relay's third coordinate. In both solutions the hop has its
-    /// maximum length.
+    /// True to select the larger of two solutions for the relay's third coordinate.
     pub(super) rising: bool,
     /// Move of the relay in its two free coordinates while the sending relay does not move, m.
     pub(super) step: [f32; 2],
-    /// Change of the relay's move in each of its free coordinates, per metre of the sender's move. The three numbers of a triple belong to
-    /// the sending relay's move along x, y and h.
+    /// Change of the relay's move in each free coordinate per metre of the sender's move. The three numbers of a triple
+    /// are for the sender's move along x, y and h.
     pub(super) follow: [Triple; 2],
 }
 
-/// Minimum curvature of the value function, divided by the function's largest curvature. A smaller curvature would be
-/// a rounding error.
+/// Minimum curvature of the value function, divided by its largest curvature. A smaller curvature would be a rounding
+/// error.
 const FLATTEST: f32 = 1e-6;
 
 impl Policy {

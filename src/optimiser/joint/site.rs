@@ -1,7 +1,7 @@
 //! Relay of a trial chain: its position, given the hop to it, and its backward pass.
 //!
-//! Positions across the line are stored in six bytes each, and are limited to the relay's room. The first and the last hop have a
-//! ceiling, and the last one a slack at Rx.
+//! A lateral offset and altitude are stored in six bytes, and are limited to the relay's room. The first and the last
+//! hop have a maximum SIR, and the last one a slack at Rx.
 //!
 //! The backward pass computes the derivatives of the slack by the position of the relay before it.
 
@@ -26,7 +26,7 @@ const TANGENTS: u8 = 3;
 /// Number of bisection steps of [`Site::halved`], which finds the farthest point that a hop reaches.
 const HALVINGS: u8 = 12;
 
-/// Relay whose position the joint method computes, with the sender of the hop to it.
+/// Relay to be placed by the joint method, with the sender of the hop to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Site<'a> {
     pub(super) interferer: &'a Interferer,
@@ -83,8 +83,8 @@ impl<'a> Site<'a> {
         place
     }
 
-    /// Returns the position of largest x at the lateral offset and altitude `at` that meets `target`. The sender is
-    /// at x = `from_m`. `None` if no x meets `target`.
+    /// Returns the position of largest x that meets `target` at the lateral offset and altitude `at`. `None` if there
+    /// is none. The sender is at x = `from_m`.
     fn stretched(&self, target: f32, from_m: f32, at: CrossSection) -> Option<Placement> {
         let hop = Hop::free(
             self.interferer,
@@ -98,11 +98,10 @@ impl<'a> Site<'a> {
 
     /// Returns the lateral offset and altitude closest to `wanted` that the hop reaches.
     ///
-    /// The x of the hop's end must not be smaller than the x of the sender. The search starts at the permitted
-    /// position closest to the middle of the reachable positions, and goes along the straight line to `wanted`.
-    /// `None` if no allowed position is reached. With the sender at p, the interferer at m and c = target / gain > 1
-    /// the reachable positions form a ball: its centre is p + (p - m) / (c - 1), its radius
-    /// sqrt(c) |p - m| / (c - 1).
+    /// The x of the hop's end must not be smaller than the x of the sender. The search goes along a straight line to
+    /// `wanted`. It starts at the permitted position closest to the middle of the reachable positions. `None` if no
+    /// permitted position is reached. With the sender at p, the interferer at m and c = target / gain > 1 the reachable
+    /// positions form a ball: its centre is p + (p - m) / (c - 1), its radius sqrt(c) |p - m| / (c - 1).
     fn within_reach(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<CrossSection> {
         let wanted = self.room.nearest(wanted);
         let Some((middle, rim)) = self.disk(target, from_m, from_m, wanted) else {
@@ -115,8 +114,8 @@ impl<'a> Site<'a> {
         toward(best, wanted, middle, rim).map(|at| self.room.nearest(at))
     }
 
-    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is the centre
-    /// and the squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
+    /// Returns the circle of lateral offsets and altitudes that the hop reaches at x >= `x_m`. The result is its centre
+    /// and squared radius, m^2. `None` if c = target / gain is at most 1: the reach then has no such limit.
     fn disk(
         &self,
         target: f32,
@@ -167,9 +166,8 @@ impl<'a> Site<'a> {
         Some((middle, rim))
     }
 
-    /// Returns the farthest position that the hop reaches on a straight path across the line Tx to Rx. The path leads
-    /// from the sender's lateral offset and altitude to `wanted`. The farthest position on the path is searched by
-    /// bisection.
+    /// Returns the farthest position that the hop reaches on the way to `wanted`, found by bisection. The way is
+    /// straight in lateral offset and altitude, and starts at those of the sender.
     fn halved(&self, target: f32, from_m: f32, wanted: CrossSection) -> Option<Placement> {
         let near = self.room.nearest(self.sender.cross_section);
         let way = |share: f32| CrossSection {
@@ -187,8 +185,8 @@ impl<'a> Site<'a> {
 
     /// Returns the relay's new lateral offset and altitude after a fraction of its computed move.
     ///
-    /// `policy` gives the move, and `share` the fraction of the move. The sender has already moved by `change` to
-    /// `from`. The relay itself is still at `nominal`. The hop has to meet `target`.
+    /// `policy` gives the move, and `share` the fraction. The sender has already moved by `change` to `from`, but the
+    /// relay is still at `nominal`. The hop has to meet `target`.
     pub(crate) fn wanted(
         &self,
         target: f32,
@@ -293,9 +291,9 @@ fn follows(
     Some(if rising { p + d } else { p - d })
 }
 
-/// Returns the point at which the line from `best` to `wanted` leaves a circle. The points are lateral offsets and
-/// altitudes. `middle` is the circle's centre, and `rim` its squared radius, m^2. `None` if `best` is outside of the
-/// circle.
+/// Returns the point at which the line from `best` to `wanted` leaves a circle. `None` if `best` is outside of the
+/// circle. The points are lateral offsets and altitudes. `middle` is the circle's centre, and `rim` its squared radius,
+/// m^2.
 fn toward(
     best: CrossSection,
     wanted: CrossSection,
@@ -413,7 +411,7 @@ impl Room {
         }
     }
 
-    /// Returns the largest lateral offset, m, on the side away from the interferer.
+    /// Returns the limit of the lateral offset, m, on the side of the line Tx to Rx without the interferer.
     pub(super) fn away_m(self, interferer: &Interferer) -> f32 {
         if interferer.y_m > 0.0 {
             self.lateral.least_m
@@ -432,8 +430,8 @@ impl Room {
     }
 }
 
-/// Factor that turns the maximum SIR of the first or last hop into the upper bound of the chain's SIR. The margin
-/// leaves the first and the last relay a choice of position.
+/// Factor from the maximum SIR of the first or last hop to the upper bound of the chain's SIR. The margin leaves the
+/// first and the last relay a choice of position.
 const LITTLE: f32 = 0.999_97;
 
 /// Number of bisection steps for the position with the largest SIR of a first hop with noise.
@@ -442,9 +440,9 @@ const END_HALVINGS: u8 = 24;
 /// Returns the maximum SIR of the first hop, less a margin that leaves the relay a choice of position. `room` has the
 /// allowed lateral offsets and altitudes.
 ///
-/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are
-/// the squared distances from Tx to the interferer along that line and across it; h is the altitude, and nu the
-/// noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
+/// The best position is opposite the interferer as seen from Tx, at t times the interferer's distance. U and B are the
+/// squared distances from Tx to the interferer along that direction and perpendicular to it; h is the altitude, and nu
+/// the noise. With s = B + (1 + t)^2 U + h^2 the slope of the SIR has the sign of h^2 - t (B + U) - t^2 U - nu t s^2,
 /// which falls with t. So with noise there is one optimum, closer to Tx.
 pub(super) fn first_most(mission: &Mission, interferer: &Interferer, room: Room) -> f32 {
     let m = interferer;
@@ -480,22 +478,23 @@ pub(super) fn last_most(mission: &Mission, power_w: f32, room: Room) -> f32 {
     LITTLE * mission.receiver_gain(power_w) / across
 }
 
-/// Weight of the penalty for a violated minimum separation. The unit is the distance from Tx to Rx. The weight is so large that no gain of
+/// Weight of the penalty for a violated minimum separation, in distances from Tx to Rx. It is so large that no gain of
 /// slack is worth a violation.
 const STIFFNESS: f32 = 100.0;
 
-/// Tolerance within which a relay counts as at a limit of its allowed range. It is a fraction of the distance from Tx
-/// to Rx.
+/// Distance from a limit of its range within which a relay counts as at the limit. The unit is the distance from Tx to
+/// Rx.
 const EDGE: f32 = 2e-6;
 
-/// Relative tolerance up to which the squared length of a hop counts as its maximum. The tolerance applies to hops that
-/// end at the x of Rx. With a larger difference the hop does not restrict the move of its receiver.
+/// Relative difference up to which the squared length of a hop counts as its maximum. It is for hops that end at the x
+/// of Rx. With a larger difference the hop does not restrict the move of its receiver.
 const TIGHT: f32 = 1e-3;
 
 impl Site<'_> {
-    /// Returns three numbers about a relay at `to` that can be too near the interferer. The first number is the squared
-    /// distance that the relay lacks, m^2; 0 if the relay is far enough away. The second number is the weight of the
-    /// penalty for this. The third number is the derivative of the first number with respect to ln(target SIR).
+    /// Returns the penalty terms of a relay at `to` that may be too near the interferer.
+    ///
+    /// The first number is the squared distance that the relay lacks, m^2; 0 if it is far enough away. The second is
+    /// the weight of the penalty. The third is the derivative of the first by ln(target SIR).
     ///
     /// `c` is the target SIR divided by the sender's gain. A hop of maximum length from p to p' that ends near the
     /// interferer at m is short. It violates the minimum separation d_min if |p' - p|^2 = q(|p' - m|^2) / c < d_min^2,
@@ -515,8 +514,8 @@ impl Site<'_> {
         ((least - squared).max(0.0), weight, least / left)
     }
 
-    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if its distance suffices. The penalty is subtracted from the
-    /// chain's slack.
+    /// Returns the penalty for a relay at `to` too near the interferer, m; 0 if it is far enough away. The chain's
+    /// slack is reduced by the penalty.
     pub(crate) fn penalty(&self, target: f32, to: Placement) -> f32 {
         let (near, weight, _) = self.near(self.sender.gain.ratio(target), to);
         0.5 * weight * square(near)
@@ -582,9 +581,9 @@ impl Site<'_> {
 
     /// Selects the coordinate of the hop's end that is computed from the other two.
     ///
-    /// The selected coordinate is not at a limit of its permitted range, `low` to `high`, and F changes most with it.
-    /// x is preferred. F is half the margin of the hop to its target: 0 for a hop of
-    /// maximum length (see `hop`). The second result is the derivative of F with respect to the selected coordinate.
+    /// It is not at a limit of its permitted range, `low` to `high`, and F changes most with it; x is preferred. F is
+    /// half the margin of the hop to its target: 0 for a hop of maximum length (see `hop`). The second result is the
+    /// derivative of F by the selected coordinate.
     fn axis(
         &self,
         c: f32,

@@ -1,7 +1,7 @@
 //! Initial chains of the ascents. They pass the interferer low, in an arch over it, on either side, or beyond it.
 //!
-//! A chain is a shortest path in a metric that weights a metre by its proximity to the interferer, so there is a local optimum on
-//! each side of the interferer. The best one depends on the room, the power and the number of relays; all are tried.
+//! A chain is a shortest path in a metric in which a metre weighs more near the interferer. So there is a local optimum
+//! on each side of the interferer. The best one depends on the room, the power and the number of relays; all are tried.
 //!
 //! An ascent starts at the highest target that its unchanged chain meets.
 
@@ -23,9 +23,9 @@ pub(super) enum Start {
     /// `aside` and `up` are the direction from the interferer to P. `far` is the distance of P from the interferer,
     /// divided by the geometric mean of the distances of Tx and Rx from the interferer.
     Around { aside: f32, up: f32, far: f32 },
-    /// Initial chain on a parabola as for `Arch`, but computed without a minimum separation. The solver then searches
-    /// the highest target of this chain. For the search it computes the hops exactly as the relays do in flight; a
-    /// relay is allowed to stay short of its farthest position.
+    /// Initial chain on a parabola as for `Arch`, but without a minimum separation. The solver then searches the
+    /// highest target of this chain. It computes the hops exactly as the relays do in flight, and a relay is allowed to
+    /// stay short of its farthest position.
     Through { aside: f32, up: f32 },
     /// Initial chain for a mission in which some relays have a fixed altitude. Seen from above, the chain is a
     /// parabola; `aside` is the lateral offset of its middle, in units of half the distance from Tx to Rx. The
@@ -34,9 +34,10 @@ pub(super) enum Start {
     /// If `level` is true, the altitude stays constant from the outermost fixed relay to Tx or Rx. If it is false,
     /// the altitude falls to the lowest permitted altitude at Tx and at Rx.
     FixedAltitudes { aside: f32, level: bool },
-    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation. The relays
-    /// alternate between a corner of the allowed lateral offsets and altitudes, and a position one separation beside
-    /// it. The corner is at the highest altitude, on the side away from the interferer.
+    /// Initial chain in a zigzag, for relays that do not fit one behind the other with their separation.
+    ///
+    /// The relays alternate between a corner of the permitted lateral offsets and altitudes, and a position one
+    /// separation beside it. The corner is at the highest altitude, on the side away from the interferer.
     Turns,
     /// Initial chain at the lowest altitude, for a target so high that no hop can pass the interferer.
     Near,
@@ -56,10 +57,10 @@ const ARCHES: [(f32, f32); 7] = [
     (0.25, 0.0),
 ];
 
-/// Number of first entries of [`ARCHES`] that are also tried without the minimum separation of relays.
+/// Number of entries of [`ARCHES`], from the first, that are also tried without a separation.
 const THROUGH: usize = 3;
 
-/// Initial chains for relays of which some have a fixed altitude, as in [`Start::FixedAltitudes`].
+/// Initial chains for relays with fixed altitudes among them; see [`Start::FixedAltitudes`].
 const HELD: [(f32, bool); 6] = [
     (0.0, true),
     (0.0, false),
@@ -82,11 +83,11 @@ const SPIRALS: [(f32, f32, f32); 9] = [
     (0.0, 1.0, 2.0),
 ];
 
-/// Spiral about the interferer. The logarithm of the distance from the interferer changes linearly with the angle.
+/// Spiral about the interferer: the logarithm of the distance from it changes linearly with the angle.
 struct Way {
     to: Triple,
     angle: f32,
-    /// Logarithm of the distance from the interferer at the spiral's end, minus the logarithm at its start.
+    /// Logarithm of the distance from the interferer at the spiral's end, minus that at its start.
     rise: f32,
     length: f32,
 }
@@ -135,9 +136,10 @@ fn length([x, y, z]: Triple) -> f32 {
 }
 
 impl Start {
-    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer. The sender of the hop to
-    /// this relay is at `from`. `c` is the target SIR divided by the sender's gain; it determines the length of the
-    /// hop. `room` has the permitted ranges.
+    /// Returns the lateral offset and altitude of a relay on a spiral about the interferer.
+    ///
+    /// The hop to this relay comes from `from`. `c` is the target SIR divided by the sender's gain; it determines the
+    /// length of the hop. `room` has the permitted ranges.
     pub(super) fn around(
         self,
         distance_m: f32,
@@ -270,8 +272,8 @@ pub(super) struct Seek {
 }
 
 impl Seek {
-    /// Creates a search downward from the target `sigma`, in ln(SIR), to the precision `width`. The first step has
-    /// the length `step`. Each further step is `growth` times as long as the previous step.
+    /// Creates a search downward from the target `sigma`, in ln(SIR), to the precision `width`. The first step is
+    /// `step`; each further step is `growth` times the previous one.
     pub(super) const fn down(sigma: f32, step: f32, growth: f32, width: f32) -> Self {
         Self {
             low: None,
@@ -284,8 +286,8 @@ impl Seek {
     }
 
     /// Creates a search upward from the feasible target `sigma`, in ln(SIR), to the precision `width`. The first step
-    /// has the length `step`. Each further step is three times as long as the previous step. `holds_back` is true if
-    /// some relays have to stay short of their farthest position to meet `sigma`.
+    /// is `step`; each further step is three times the previous one. `holds_back` is true if some relays have to stay
+    /// short of their farthest position to meet `sigma`.
     pub(super) const fn up(sigma: f32, holds_back: bool, step: f32, width: f32) -> Self {
         Self {
             low: Some((sigma, holds_back)),

@@ -19,7 +19,7 @@ pub struct Hello {
     pub mission: u16,
     /// Identifier of the latest view known to the sender.
     pub latest_view: ViewId,
-    /// Node number of the sender's neighbour on the side to which this message is sent; 0 for none.
+    /// Node number of the sender's neighbour on the destination's side of the sender; 0 for none.
     pub neighbour: u16,
     /// True if the sender requests a hello in return.
     pub requests_reply: bool,
@@ -27,16 +27,18 @@ pub struct Hello {
     pub requests_view: bool,
     /// True if the sender has restarted and has not taken part in any pass or view yet.
     pub fresh: bool,
-    /// True if the sender could be inserted between the destination and the destination's neighbour. This is the
-    /// neighbour that the destination has selected on the sender's side. If the sender is outside of the chain: true if
-    /// it would join the chain when it is called. If the destination is outside of the chain: true if the destination
-    /// is called.
+    /// Readiness of the sender or of the destination.
+    ///
+    /// - If both nodes are in the chain: true if the sender could be inserted between the destination and the neighbour
+    ///   that the destination has selected on the sender's side.
+    /// - If the sender is outside of the chain: true if it would join the chain when it is called.
+    /// - If the destination is outside of the chain: true if the destination is called to join.
     pub ready: bool,
-    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. These are
-    /// the connected relays from the sender to the end of the chain away from the destination.
+    /// Number of relays that the destination reaches through the sender, including the sender: 1 to 1000. They are the
+    /// connected relays from the sender to the end of the chain beyond it.
     pub behind: u16,
-    /// Nodes that the sender receives, on the side to which this message is sent. Bit i, 0 to 3, stands for the node
-    /// whose number differs from the sender's by i + 1.
+    /// Nodes that the sender receives on the destination's side. Bit i, 0 to 3, stands for the node whose number
+    /// differs from the sender's by i + 1.
     pub hears: u8,
     /// Identifier of the newest mission that the sender has, loaded or uploaded.
     pub latest_mission: MissionId,
@@ -44,12 +46,13 @@ pub struct Hello {
     pub active: bool,
     /// True if all relays of the sender's view use `latest_mission`, a mission uploaded in flight.
     pub active_in_view: bool,
-    /// True if the mission `latest_mission` is refused. Either the sender refuses it, or a relay farther from the
-    /// destination.
+    /// True if the sender, or a relay farther from the destination, refuses the mission `latest_mission`.
     pub refused: bool,
-    /// Flag for a node outside of the chain. If `fresh` is true: the sender is outside of the chain, and no relay
-    /// selects it. If `fresh` is false: the destination is outside of the chain; a view without the destination is
-    /// agreed on, and the relays of this view are in place.
+    /// Flag for a node outside of the chain.
+    ///
+    /// - With `fresh`, the sender is outside of the chain, and no relay selects it.
+    /// - Without `fresh`, the destination is outside of the chain. The chain has agreed on a view without it, and the
+    ///   relays of this view are in place.
     pub outside: bool,
     /// Nonce that a mission offer in reply to this hello must repeat. 0 if the sender accepts no offer.
     pub offer_number: u16,
@@ -127,20 +130,20 @@ impl Hello {
     }
 }
 
-/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions, so
-/// that two nodes with the same number detect each other.
+/// Claim of a node to its node number, or the echo of another node's claim. Claims are sent in both directions along
+/// the chain, so that two nodes with the same number detect each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Claim {
-    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim number wins. A node
-    /// draws the number at its start, and raises it at most once while it is active.
+    /// Random claim number of the claiming node. Of two nodes with one node number, the node with the larger claim
+    /// number wins. A node draws it at its start, and raises it at most once while it is active.
     pub number: u32,
     /// Last claim number received from another node with the claiming node's node number; 0 for none.
     pub other_number: u32,
     /// True if the claiming node is passive because another node uses its node number.
     pub passive: bool,
-    /// True for an echo: the sender returns a claim of a node that has the destination's node number. If two nodes have
-    /// this node number, both receive the echo. So each of them receives the claim of the other node.
+    /// True for an echo: the sender returns a claim to the destination's node number. If two nodes have this number,
+    /// both receive the echo. So each of them learns of the other's claim.
     pub echo: bool,
 }
 

@@ -1,9 +1,9 @@
 //! Messages between neighbours; `FORMAT.md` has the byte tables.
 //!
-//! Each kind of message has its type, its encoder and its decoder beside each other: in `round` those of passes, in `view` those of view
-//! changes and leases, in `link` those between two neighbours, in `offer` uploads, in `report` telemetry. A decoder checks all ranges: a decoded message has no
-//! invalid number. A body is a byte, the tag, and postcard of a tuple, whose order is the format. `parts` has the tags and
-//! shared parts.
+//! Each kind of message has its type, its encoder and its decoder beside each other: in `round` the messages of passes,
+//! in `view` those of view changes and leases, in `link` those between two neighbours, in `offer` uploads, in `report`
+//! telemetry. A decoder checks all ranges: a decoded message has no invalid number. A body is a byte, the tag, and a
+//! tuple encoded by postcard; the order of its fields is the format. `parts` has the tags and shared parts.
 
 mod link;
 #[cfg(feature = "upload")]
@@ -32,8 +32,8 @@ const SWEEP: usize = 88;
 /// Maximum length of a message body other than a mission offer, bytes.
 const LONG: usize = if SENSING { round::HEARD } else { SWEEP };
 
-/// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it
-/// is the collection of measurements, or a sweep.
+/// Maximum length of a message body, bytes. The longest message is a mission offer; without the feature `upload` it is
+/// a sensing message (with measurements) or a sweep.
 pub const MAX_BODY: usize = if Upload::OFFER > LONG {
     Upload::OFFER
 } else {
@@ -54,15 +54,17 @@ impl Upload {
     }
 }
 
-/// Message between neighbours. A *pass* is a message that travels along the chain once; its result travels back.
-/// *Onward* is its direction: toward Rx, or toward Tx if the mission has an interference field.
+/// Message between neighbours.
+///
+/// A *pass* is a message that travels along the chain once; its result travels back. *Onward* is the direction of a
+/// pass: toward Rx, or toward Tx if the mission has an interference field.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Message {
     /// Message to the next relay: target SIRs, and the farthest x at which the sender meets each target.
     Sweep(Sweep),
-    /// Reply to a sweep of target SIRs: its verdict, the result for each target.
+    /// Reply to a sweep of target SIRs: the result for each target.
     Verdict(SweepVerdict),
-    /// Reply to a duplicate of a pass message or view proposal that has no result yet.
+    /// Reply to a duplicate pass message or view proposal: there is no result yet.
     Busy {
         /// Number of the pass in progress; for a view proposal, a 16-bit hash of the proposed view.
         number: u16,
@@ -100,10 +102,10 @@ pub enum Message {
     Decision(Decision),
     /// Either direction: limit of x (fence) that keeps two neighbouring relays apart.
     Fence {
-        /// Digest by which two neighbours check that they have the same x axis. It covers the mission loaded before
-        /// flight, and the Tx and Rx positions of an uploaded mission.
+        /// Digest that shows two neighbours if they have the same x axis. It covers the mission loaded before flight,
+        /// and the Tx and Rx positions of an uploaded mission.
         line_digest: u16,
-        /// Content of the message: the sender's limit of x, its agreed position, and flags.
+        /// Content of the message: the sender's limit of x, the x of its agreed position, and flags.
         fence: Fence,
     },
     /// Either direction, also from the ground: a mission that is newer than the destination's.
@@ -134,8 +136,8 @@ pub enum Message {
 }
 
 impl Message {
-    /// Returns the digest in the message; `None` for a message without one. The receiver uses it to check that both
-    /// nodes have the same mission, view or x axis.
+    /// Returns the digest in the message; `None` for a message without one. It shows the receiver if both nodes have
+    /// the same mission, view or x axis.
     pub fn digest(&self) -> Option<u16> {
         match self {
             Self::Sweep(sweep) => Some(sweep.view_digest),
@@ -185,8 +187,8 @@ impl Message {
         matches!(self, Self::Proposal(_) | Self::Decision(_))
     }
 
-    /// Returns true for messages that relays forward in the direction of a pass (onward). These are messages of
-    /// passes, proposals and lease renewals, but not the replies.
+    /// Returns true for messages that relays forward in the direction of a pass. They are passes, proposals and lease
+    /// renewals, but not the replies.
     pub const fn is_onward(&self) -> bool {
         matches!(
             self,

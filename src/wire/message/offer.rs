@@ -47,8 +47,8 @@ impl Upload {
     }
 }
 
-/// Uploaded mission on the wire. The struct is packed, so its size in memory is the length on the wire, from which
-/// [`Upload::LENGTH`] is computed.
+/// Uploaded mission on the wire. The struct is packed: its size in memory is the length on the wire, see
+/// [`Upload::LENGTH`].
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[repr(C, packed)]
 struct OfferBody {
@@ -59,7 +59,7 @@ struct OfferBody {
     factors: [f64; 3],
     bands: [f32; 4],
     noise_w: f32,
-    /// Required SIR from Rx to Tx divided by the SIR required from Tx to Rx, and transmit power of Rx, W.
+    /// Required ratio of the SIR from Rx to Tx to the SIR from Tx to Rx, and transmit power of Rx, W.
     back: [f32; 2],
     /// SNR gap of fitted time slots, each as long as its hop needs; 0 for equal slots.
     fitted_gap: f32,

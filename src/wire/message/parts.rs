@@ -77,8 +77,8 @@ pub(super) fn read<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Message
 }
 
 /// Decodes a list of one number per target SIR; returns the list and the remaining bytes. The count before the list
-/// must be encoded in its shortest form. Postcard also accepts longer forms, up to a limit that depends on the width
-/// of `usize`, so nodes could differ in the lists that they accept.
+/// must be encoded in its shortest form: postcard accepts longer forms up to a limit that depends on the width of
+/// `usize`, so nodes could differ in the lists that they accept.
 #[inline(never)]
 pub(super) fn take_targets(bytes: &[u8]) -> Result<(PerTarget, &[u8]), MessageError> {
     let (numbers, rest): (PerTarget, _) = take(bytes)?;

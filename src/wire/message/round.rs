@@ -1,4 +1,4 @@
-//! Messages of a round: sweeps and verdicts, profiles, tokens of Algorithm 2, measurements.
+//! Messages of passes along the chain: sweeps, verdicts, profiles, tokens of Algorithm 2, measurements.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -18,8 +18,10 @@ use crate::wire::message::parts::{
     require, tag, take, take_targets, write,
 };
 
-/// Sweep message of a pass along the chain: target SIRs, and the sender's farthest x for each target. The sender
-/// meets the target at this x, and at no x farther away. "Farthest" means in the direction of the pass.
+/// Sweep message: target SIRs, and the farthest x at which the sender meets each target.
+///
+/// The message travels along the chain in a pass. "Farthest" means in the direction of the pass; at no x farther away
+/// is the target met.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sweep {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -33,10 +35,10 @@ pub struct Sweep {
     /// True if relays use the lateral offsets and altitudes of the joint method. False if they use the configured
     /// values.
     pub chosen: bool,
-    /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if
-    /// receivers must use the field, the mission's known distribution of interference along x.
+    /// Measured mean of 1 / I (Upsilon) at the sender's position, in 1/W; I is the interference power. `None` if the
+    /// receiver must use the mission's interference field.
     pub measured_per_w: Option<f32>,
-    /// Farthest x in the direction of the pass at which the sender meets each target SIR, m. The list begins with the
+    /// Farthest x, in the direction of the pass, at which the sender meets each target SIR, m. The list begins with the
     /// lowest target, and ends before the first target that cannot be met.
     pub reaches: PerTarget,
 }
@@ -139,11 +141,11 @@ pub struct SweepVerdict {
     pub view_digest: u16,
     /// Verdict of the sweep: the chain's slack for each target, and the committed target, if any.
     pub verdict: Verdict,
-    /// x that the destination must take if a target is committed, m. `None` if the destination must take the farthest
-    /// x that it has reported for this target.
+    /// x that the destination must take if a target is committed, m. `None` for the farthest x that the destination has
+    /// reported for this target.
     pub required_x_m: Option<f32>,
-    /// True if the power or the fixed altitude of some relay differs from the mission's common profile. This relay is
-    /// the sender or a later relay of the pass.
+    /// True if the power or fixed altitude of some relay differs from the mission's common profile. This relay is the
+    /// sender or a later relay of the pass.
     pub own: bool,
 }
 
@@ -196,8 +198,8 @@ pub struct OwnSeat {
 /// List of relay profiles (altitude and power), by rising index of the relays.
 pub type OwnSeats = Vec<OwnSeat, MOST_NAMED>;
 
-/// Message that collects relay profiles, altitude and power. In a pass it has the profiles of the relays up to the
-/// sender, in the reply the profiles of the whole chain.
+/// Message that collects relay profiles (altitude and power). In a pass it has those of the relays up to the sender, in
+/// the reply those of the whole chain.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Roster {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -254,7 +256,7 @@ impl Roster {
     }
 }
 
-/// Token message of Algorithm 2, in which one relay after the other improves its own position.
+/// Token message of Algorithm 2, in which relays improve their positions one after the other.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Token {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -265,7 +267,7 @@ pub struct Token {
     pub place: Placement,
     /// Transmit power of the sender, W.
     pub power_w: f32,
-    /// Action that each relay performs when it receives the token in this pass.
+    /// Action of each relay that receives the token in this pass.
     pub turn: AdjustStep,
     /// SIR of the chain's worst hop before this pass, linear; 0 if unknown.
     pub sir: f32,
@@ -306,7 +308,7 @@ pub enum AdjustStep {
     Move {
         /// Maximum change of the relay's altitude in this move, m: the paper's `epsilon_h`.
         explore_m: f32,
-        /// Method by which the relay searches for a better position.
+        /// Search method for a better position.
         local: Local,
     },
     /// The relay no longer moves, because Algorithm 2 has ended.
@@ -413,12 +415,12 @@ fn is_sir(sir: f32) -> bool {
     (0.0..=f32::MAX).contains(&sir)
 }
 
-/// Length of a sensing message's body, bytes: the sum of the lengths of its fields. The fields are the tag, the pass,
-/// the estimate, the sums, the interference level at Rx, and the excluded node.
+/// Length of a sensing message's body, bytes. It has the tag, the pass, the estimate, the sums, the interference level
+/// at Rx, and the excluded node.
 pub(super) const HEARD: usize = 1 + 4 + 19 + 4 * SUMS + 8 + 2;
 
-/// Sensing message: interference estimate, and sums of measurements. In a pass the sums are over the relays up to the
-/// sender, in the reply over the sender and all later relays.
+/// Sensing message: interference estimate, and sums of measurements. In a pass the sums cover the relays up to the
+/// sender, in the reply the sender and all later relays.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Heard {
     /// Number of the pass along the chain, which rises from pass to pass and wraps.
@@ -431,8 +433,8 @@ pub struct Heard {
     pub sums: Sums,
     /// Interference level measured at the ground receiver Rx.
     pub receiver: Level,
-    /// Node number of a relay whose measurements contradict the measurements of the other relays. 0 for none. The
-    /// measurements of that relay are left out of `sums`. Set in replies only.
+    /// Node number of a relay whose measurements contradict those of the other relays; 0 for none. Its measurements are
+    /// left out of `sums`. Set in replies only.
     pub excluded: u16,
 }
 

@@ -27,20 +27,20 @@ pub struct Proposal {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Poll {
-    /// Newest view (membership) that any polled relay knows to be agreed on. Only its members have a vote.
+    /// Newest view (membership) that a polled relay knows to be agreed on. Only its members have a vote.
     pub agreed: View,
     /// Number of votes: polled relays that are members of the view `agreed`, 0 to 1000.
     pub votes: u16,
-    /// True if the proposer of the view `agreed` was polled. For the initial view the leader takes the place of the
-    /// proposer. The votes of exactly half of the view's members are then enough for a quorum.
+    /// True if the proposer of the view `agreed` was polled. For the initial view the leader counts as the proposer.
+    /// With the proposer, exactly half of the members' votes are enough for a quorum.
     pub proposer: bool,
     /// Upper bound of the leases of members of `agreed` that were not polled, in tenths of a second.
     pub lease_left: u16,
-    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Relays
-    /// must not use positions of the new view before.
+    /// Time until leases of earlier views than `agreed` have expired, in tenths of a second. 65535 if unknown. Until
+    /// then relays must not use positions of the new view.
     pub earlier_lease_left: u16,
-    /// Latest view after `agreed` that a polled member has accepted. Possibly this view is already agreed on. `None`
-    /// without such a view.
+    /// Latest view after `agreed` that a polled member has accepted; `None` without such a view. It may be agreed on
+    /// already.
     pub successor: Option<Successor>,
 }
 
@@ -58,7 +58,7 @@ impl Poll {
     }
 }
 
-/// View that a polled relay has accepted in an earlier decision, and that is possibly agreed on.
+/// View that a polled relay has accepted in an earlier decision. It may be agreed on already.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Successor {
@@ -82,8 +82,8 @@ pub struct Decision {
     pub reached: u16,
     /// Newest view that any polled relay knows to be agreed on. The decided view replaces it.
     pub base: View,
-    /// View to accept: the proposed view, or an earlier view that was found to be decided already. `None` without a
-    /// quorum.
+    /// View to accept; `None` without a quorum. It is the proposed view, or an earlier view that was found to be
+    /// decided already.
     pub accepted: Option<View>,
     /// Time until relays are allowed to use positions of the accepted view, in tenths of a second. Until then, members
     /// of the previous view that were not polled can still have a lease.
@@ -276,7 +276,7 @@ pub struct Pulse {
     pub orders: Orders,
 }
 
-/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Part of each lease renewal.
+/// Orders of the leader to a relay that is allowed to leave and to a relay that joins. Each lease renewal has them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Orders {
@@ -284,7 +284,7 @@ pub struct Orders {
     pub leaver: u16,
     /// Node outside of the chain that is called to join it, 0 for none.
     pub joiner: u16,
-    /// True if all relays of the view were in place when the previous renewal completed.
+    /// True if all relays of the view were at their positions when the previous renewal completed.
     pub in_place: bool,
 }
 
@@ -296,8 +296,7 @@ impl Orders {
     };
 }
 
-/// Requests to the leader by relays that need to leave or would join. The requests come from the relays between the
-/// last relay and the sender, including both.
+/// Requests to the leader by relays that need to leave or would join. They are those from the last relay to the sender.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Requests {
@@ -307,7 +306,7 @@ pub struct Requests {
     pub endurance_s: u16,
     /// Node outside of the chain that would join it, 0 for none.
     pub spare: u16,
-    /// True if all relays from the last relay to the sender are in place.
+    /// True if all relays from the last relay to the sender are at their positions.
     pub in_place: bool,
 }
 
@@ -319,8 +318,8 @@ impl Requests {
         in_place: false,
     };
 
-    /// Merges the requests of two parts of the chain. If both parts have a departure, the more urgent one counts. If
-    /// both have a spare, the spare with the lower number counts.
+    /// Merges the requests of two parts of the chain. Of two departures the more urgent one counts, of two spares the
+    /// one with the lower number.
     pub(crate) fn merge(self, other: Self) -> Self {
         let urgency = |part: &Self| (part.leaver == 0, part.endurance_s, part.leaver);
         let urgent = if urgency(&other) < urgency(&self) {

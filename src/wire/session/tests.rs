@@ -63,8 +63,8 @@ fn check_at(session: &mut Session, seconds: u64, plain: &[u8]) -> Checked {
     session.check(now, opened.header.sender, &opened)
 }
 
-/// Lets two nodes exchange handshakes until none is pending; returns the number of handshakes. `ends` are each node's
-/// session and node number, `counters` their frame counters.
+/// Lets two nodes exchange handshakes until none is pending; returns the number of handshakes. `ends` are the nodes'
+/// sessions and node numbers, `counters` their frame counters.
 fn meet(ends: [(&mut Session, u16); 2], counters: &mut [u32; 2]) -> u32 {
     let [(one, a), (other, b)] = ends;
     let mut said = 0;

@@ -83,13 +83,13 @@ fn run(options: &Options) -> Result<(), Failure> {
     }
     report.rotation = run.rotation(&outcome)?;
     if report.rotation.is_some() {
-        // The availability counts drones on the ground as missing.
+        // The availability would count drones on the ground as missing, so it is left out.
         report.watched = uav_relay_sim::report::chain::AvailabilityReport::default();
     }
     show(options, &report)
 }
 
-/// Starts the screen that the options ask for, if any, and prints its address.
+/// Starts the screen that the options request, if any, and prints its address.
 fn screen(options: &Options) -> Result<Option<Screen>, Failure> {
     let Some(address) = options.web.address else {
         return Ok(None);
@@ -170,10 +170,10 @@ fn show(options: &Options, report: &ChainReport) -> Result<(), Failure> {
     }
 }
 
-/// Duration of a run before its progress line is shown. Short runs show no progress line.
+/// Duration of a run from which on its progress line is shown. Shorter runs show none.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// Least time between two updates of the progress line.
+/// Minimum time between two updates of the progress line.
 const EVERY: Duration = Duration::from_millis(100);
 
 const ERASE: &str = "\r\u{1b}[K";
@@ -250,7 +250,7 @@ impl AirCapture {
         })
     }
 
-    /// Writes to the capture file the frames whose transmission has ended, or all frames if `to_the_end`.
+    /// Writes the frames whose transmission has ended to the capture file. With `to_the_end` it writes all frames.
     fn follow(&mut self, chain: &mut Chain, to_the_end: bool) -> Result<(), Failure> {
         let until = if to_the_end {
             uav_relay::Instant::from_micros(u64::MAX)

@@ -143,7 +143,8 @@ impl<'a> Prepared<'a> {
         })
     }
 
-    /// Runs the simulation of `setup` and returns the chain at its end. The function `watch` runs a chain until no relay moves any more.
+    /// Runs the simulation of `setup` and returns the chain at its end. `watch` runs a chain until its relays no longer
+    /// move.
     ///
     /// With `--closed-loop`, the relays then measure the interference and agree on positions again, the requested number of times.
     ///
@@ -203,7 +204,7 @@ impl<'a> Prepared<'a> {
         report
     }
 
-    /// Returns the data traffic of a run. `None` if none is requested, or if the relays never agreed.
+    /// Returns the data traffic of a run. `None` if none is requested, or if the relays have never agreed on positions.
     ///
     /// # Errors
     /// More traffic than can be simulated.

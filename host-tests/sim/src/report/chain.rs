@@ -41,7 +41,7 @@ pub struct FaultReport {
 pub struct ChainReport {
     /// Planning method, as on the command line.
     pub method: String,
-    /// Number of relays for which the run was requested.
+    /// Number of relays that the run was requested for.
     pub uavs: u16,
     /// Version of the mission that the chain flies at the end; 0 for the mission loaded before the start.
     ///
@@ -114,11 +114,10 @@ pub struct ChainReport {
     /// Counters of the shared radio channel; absent for separate links and for an ideal channel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub air: Option<AirReport>,
-    /// Availability of the chain: fraction of the run in which the chain had the best positions. Also further
-    /// statistics.
+    /// Availability of the chain, and further statistics. It is the fraction of the time with the best positions.
     #[serde(flatten)]
     pub watched: AvailabilityReport,
-    /// Replacement of tired drones; absent without `--fleet`.
+    /// Replacement of drones with tired batteries; absent without `--fleet`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation: Option<RotationReport>,
     /// Estimate of the interferer and its quality; absent unless the relays locate it by measurements.
@@ -188,7 +187,7 @@ impl ChainReport {
         let rx_sir = sirs.last().copied();
         let injected = outcome.injected;
         let target = chain.first().and_then(|(_, head)| head.target);
-        // True if no chain can exceed the target, within the tolerance.
+        // True if no chain can exceed the target by more than the tolerance.
         let bound = outcome.relays.iter().find_map(|relay| relay.bound);
         let promised = match (mission.interference(), target, bound) {
             (Interference::Field(_), Some(target), Some(bound)) => {
@@ -375,8 +374,8 @@ impl ChainReport {
 /// Returns the relays of the chain at the end of a run, with their numbers from 1, in order from Tx.
 ///
 /// The chain is the largest view that all its relays have accepted. Without such a view, all relays that are on are
-/// returned. If every hop has a link of its own and a relay failed, all relays are returned. If no part of the chain
-/// has a quorum, the list is empty.
+/// returned. On separate links all relays are returned if one has failed. If no part of the chain has a quorum, the
+/// list is empty.
 pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
     let all: Vec<(u16, &RelayEnd)> = (1..).zip(&outcome.relays).collect();
     match outcome.ending {
@@ -399,8 +398,7 @@ pub(super) fn left(outcome: &Outcome) -> Vec<(u16, &RelayEnd)> {
         .map_or(living.clone(), |(_, part)| part)
 }
 
-/// Returns true if `part` has all relays of their view, in the order of their indices. A view is a membership of the
-/// chain.
+/// Returns true if `part` has all relays of their view, in the order of their indices.
 fn is_counted(part: &[(u16, &RelayEnd)]) -> bool {
     (1..)
         .zip(part)

@@ -9,8 +9,8 @@ pub use uav_relay_screen::hops::{db, hop_sirs, hop_sirs_back};
 
 /// Returns the position of relay `index` for the target SIR `target`, linear.
 ///
-/// A relay stays short of the farthest x that meets the target if that lets other relays meet it. `None` if the chain
-/// cannot meet the target. `profile_of` returns the profile of relay 1..=N.
+/// A relay stays short of its farthest x if other relays can then meet the target. `None` if the chain cannot meet it.
+/// `profile_of` returns the profile of relay 1..=N.
 pub fn place(
     mission: &Mission,
     target: f32,
@@ -19,7 +19,7 @@ pub fn place(
 ) -> Option<Placement> {
     [false, true].into_iter().find_map(|plain| {
         let chain = Walk::new(mission, target, plain, &profile_of);
-        // Every relay must have a position, not only those on the way back to this one.
+        // Every relay must have a position, not only the relays between this one and the end of the pass.
         chain.place(0)?;
         let x_m = chain.place(index)?;
         Some(profile_of(index).on_line().cross_section.at(x_m))

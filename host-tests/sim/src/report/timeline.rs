@@ -145,7 +145,7 @@ pub fn line(moment: &Moment) -> String {
         sample,
     }
     .line();
-    // The other lines about agreements do not name the relay.
+    // The other log lines of these events do not name the relay.
     match moment.what {
         TimelineEvent::ViewAccepted { .. }
         | TimelineEvent::Converged

@@ -44,8 +44,8 @@ pub struct TrafficDetails {
     pub until_s: f64,
     /// Traffic in each direction: to Rx and, if data goes both ways, back to Tx.
     pub flows: Vec<FlowReport>,
-    /// Periods in which the chain's view, its state and the promised data rates did not change. The promised rates
-    /// come from the planner's formula.
+    /// Periods in which the chain's view, its state and the promised data rates are constant. The promised rates come
+    /// from the planner's formula.
     pub periods: Vec<PeriodReport>,
     /// Text about how the hops share frequencies and time.
     #[serde(skip)]

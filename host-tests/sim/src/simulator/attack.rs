@@ -184,7 +184,7 @@ pub(super) struct ForgedRoute {
     pub(super) to: u16,
 }
 
-/// Returns a frame forged by a random method. `heard` is a recorded frame, if there is one.
+/// Returns a frame forged by a random method. `heard` is a recorded frame, if any.
 ///
 /// Methods: untagged false message, false message with a guessed tag, recorded frame with one changed byte and a
 /// valid CRC, handshake with a guessed tag, handshake of a relay with another key.
@@ -226,7 +226,7 @@ fn with_altered_byte(mut plain: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
 
 /// Returns a false message, well-formed and without a tag.
 ///
-/// It is a changed copy of the recorded frame `heard` if that is suitable, and otherwise made up.
+/// It is a changed copy of the recorded frame `heard` if that is suitable; otherwise it is made up.
 fn false_message(
     mission: &Mission,
     way: ForgedRoute,

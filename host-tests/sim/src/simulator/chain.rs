@@ -34,7 +34,7 @@ use ground::{Station, stations};
 use judge::ChangedRelays;
 pub use live::LiveRelay;
 
-/// Largest number of events in a run. The limit ends runs that never settle, after some minutes of computing.
+/// Largest number of events in a run. It ends runs in which the relays never settle, after some minutes of computing.
 const MAX_EVENTS: u64 = 400_000_000;
 
 impl Chain {
@@ -275,8 +275,7 @@ impl Chain {
         self.drain(index);
     }
 
-    /// Handles all outputs of relay `index` (from 0). It sends frames, logs events, and schedules the relay's next
-    /// timer.
+    /// Handles all outputs of relay `index` (from 0): frames, events, and the time of the next timer.
     fn drain(&mut self, index: usize) {
         let now = self.now;
         let mut frame = [0; MAX_FRAME];
@@ -342,11 +341,10 @@ struct Member {
     stored: Option<Upload>,
     /// Stored record of the relay's votes on views, which survives a reboot; `None` before its first vote.
     record: Option<ViewRecord>,
-    /// Last setpoint that [`Chain::check`] found within the limits. It is stored so that the same setpoint is not
-    /// checked again.
+    /// Last setpoint that [`Chain::check`] found within the limits, so that it is not checked again.
     safe: Option<Placement>,
-    /// Smallest and largest coordinates of all setpoints since the relay's first setpoint. They start anew when the
-    /// relay loses its setpoint. With a guard, a setpoint may be outside the geofence only within this range.
+    /// Smallest and largest coordinates of all setpoints since the relay last got its first one. With a guard, a
+    /// setpoint may be outside of the geofence only within this range.
     setpoint_bounds: Option<[Placement; 2]>,
     /// Position at which the relay last measured the interference.
     measured: Option<Placement>,
@@ -370,7 +368,7 @@ pub struct Chain {
     accepted_positions: usize,
     /// Number of planned events in the queue, such as failures, reboots, uploads and attacker frames.
     ///
-    /// The run does not settle before all of them have happened.
+    /// The run does not end by itself before all of them have happened.
     pending_planned: usize,
     stations: Vec<Station>,
     attacker: Option<Attacker>,
@@ -452,8 +450,7 @@ fn switched_on(
 impl Chain {
     /// Creates the chain of `setup` and switches all relays on at time 0.
     ///
-    /// `run` simulates a chain without faults. The statistics compare the relays' positions with the positions of that
-    /// chain.
+    /// `run` simulates a chain without faults, whose positions are the reference for the statistics.
     fn begin(setup: Setup, run: Run) -> Result<Self, SetupError> {
         let mut rng = ChaCha8Rng::seed_from_u64(setup.seed);
         let members = members(&setup, &mut rng)?;
@@ -556,7 +553,7 @@ impl Chain {
     }
 }
 
-/// Queues the events by which relays get the remaining endurance of their drones.
+/// Queues the events that give relays the remaining endurance of their drones.
 fn put_endurances(setup: &Setup, queue: &mut Queue) {
     for &(index, at, left_s) in &setup.endurances {
         let event = QueuedEvent::Endurance(left_s);

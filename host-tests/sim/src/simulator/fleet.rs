@@ -97,7 +97,7 @@ const RESUMES: Duration = Duration::from_millis(1_200);
 /// Time that the restart of an autopilot takes. The autopilot is silent meanwhile.
 const AWAY: Duration = Duration::from_millis(3_000);
 
-/// Time within which a relay learns of a new flight mode or state of its autopilot.
+/// Maximum time after which a relay knows a new flight mode or state of its autopilot.
 ///
 /// The autopilot reports both once a second.
 const MODE_KNOWN_WITHIN: Duration = Duration::from_millis(1_500);

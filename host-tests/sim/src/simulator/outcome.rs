@@ -134,7 +134,7 @@ pub enum Ending {
 pub struct RelayEnd {
     /// Setpoint of the relay; `None` if it never had one.
     pub setpoint: Option<Placement>,
-    /// Linear target SIR for which the setpoint was agreed on; `None` without a target.
+    /// Linear target SIR of the setpoint; `None` without a target.
     pub target: Option<f32>,
     /// Upper bound, linear, on the SIR of the worst hop that any chain at the relays' altitudes can reach. `None`
     /// except at the leader.
@@ -220,8 +220,7 @@ pub struct Outcome {
     /// Closest approach of two drones with autopilots, in flight and without a pilot's control. `None` if there were
     /// never two such drones at the same time.
     pub nearest_lent: Option<Nearest>,
-    /// Smallest margin during the run, m. The margin is the distance of two drones minus the distance that they have
-    /// to keep.
+    /// Smallest margin during the run, m: the distance of two drones minus the required distance.
     ///
     /// Only drones in flight that no pilot controls count. The distance to keep is the mission's separation, or the
     /// distance at which the pilots last handed both drones over, if that is smaller. Infinite if no pair counted.
@@ -231,9 +230,9 @@ pub struct Outcome {
     /// Recorded for drones without autopilots if [`Setup::track`](super::setup::Setup::track) is set. These are the living relays with a
     /// setpoint, without spares and relays that may leave.
     pub serving: Vec<(Instant, Vec<(u16, Point)>)>,
-    /// Two drones, their distance and the time at which the smallest margin, `margin_m`, occurred.
+    /// Two drones, their distance, and the time of the smallest margin, `margin_m`.
     pub margin_at: Option<Nearest>,
-    /// Number of position targets that relays sent while the autopilot accepts none, such as on the ground.
+    /// Number of position targets that relays sent while the autopilot accepted none, as on the ground.
     ///
     /// Targets up to 1.5 s after the change of the state do not count. Nonzero is a bug.
     pub stray_targets: u64,
@@ -284,7 +283,7 @@ impl Outcome {
 /// State of a relay after a change, for the animation of a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
-    /// Time of the change of the relay's state.
+    /// Time at which the relay's state changed.
     pub at: Instant,
     /// Number of the relay whose state changed, from 1.
     pub relay: u16,

@@ -11,9 +11,9 @@
 //!
 //! A frame has one slot for each hop, in the order of the hops, so a packet can pass the whole chain in one frame. With equal slots
 //! a slot is the time of one packet on the worst hop, and with fitted slots the time of one packet on its own hop. With a frequency
-//! for each hop all hops send all the time. If data goes both ways, the first half of each frame is for the way to Rx and the
-//! second half for the way back; the slots are then as long as the faster direction needs for one packet. Fitted slots of a chain
-//! that is planned for both directions have the time of one packet on the way to Rx, and of r packets on the way back.
+//! for each hop all hops send all the time. If data goes both ways, the first half of each frame is for data to Rx, and
+//! the second half for data back to Tx. The slots are then as long as the faster direction needs for one packet. In a
+//! chain planned for both directions, a fitted slot has the time of one packet to Rx, or of r packets back to Tx.
 //!
 //! Times are whole picoseconds since the start of the run, so slots do not drift.
 
@@ -41,13 +41,13 @@ pub const SECOND: f64 = 1e12;
 /// Longest time that a hop may take for one packet, ps: 1000 s. A slower hop counts as broken.
 const SLOWEST: f64 = 1e15;
 
-/// Distance, m, by which a drone must have moved before its new position is recorded.
+/// Distance, m, that a drone must have moved before its new position is recorded.
 const MOVED_M: f64 = 0.1;
 
-/// Distance of a drone from its agreed position, m, below which it has arrived.
+/// Distance, m, within which a drone has arrived at its agreed position.
 const THERE_M: f64 = 5.0;
 
-/// Time for which the positions of moving interferers are taken as constant, ps: 1 s.
+/// Duration of the periods in which moving interferers count as fixed, ps: 1 s.
 const FIXED: Ps = 1_000_000 * MICRO;
 
 /// Converts a virtual time to picoseconds since the start of the run.
@@ -477,7 +477,7 @@ impl DataLink {
         let longest = packets.iter().filter_map(slowest).max().unwrap_or(1);
         // Of two directions the faster one sends one packet in a slot, so bursts stay short.
         let slot = packets.iter().filter_map(slowest).min().unwrap_or(1);
-        // A hop that carries nothing has a slot like that of the worst hop.
+        // A hop that carries nothing has a slot as long as that of the worst hop.
         let own = |packet: &Option<Ps>| packet.unwrap_or(longest);
         let half = |packets: &Vec<Option<Ps>>| match self.radio.link.access {
             Access::Slots => slot * packets.len() as Ps,
@@ -488,7 +488,8 @@ impl DataLink {
         let span = |(direction, packets): (usize, &Vec<Option<Ps>>)| match direction {
             _ if !self.is_fitted_to_both() => shortest,
             0 => half(packets),
-            // Rounded up, and the slots down: neither direction gets more than it is promised.
+            // This time is rounded up, and the slots are rounded down, so neither direction gets more than it is
+            // promised.
             _ => part(half(packets), self.reverse) + 1,
         };
         let spans: Vec<Ps> = packets.iter().enumerate().map(span).collect();

@@ -94,7 +94,7 @@ pub struct Setup {
     pub leaves: Vec<(u16, Instant, Option<u16>)>,
     /// Relays that cancel their departure: number from 1 and time.
     pub stays: Vec<(u16, Instant)>,
-    /// Reserve of endurance with which relays leave by themselves; `None` if they do not.
+    /// Reserve of endurance at which relays request to leave by themselves; `None` if they do not.
     pub reserve: Option<Duration>,
     /// Values of a drone's remaining endurance beyond the way home, as given to its relay.
     ///

@@ -13,7 +13,7 @@
 //! Every packet that arrives at a relay in time for its slot is sent in that slot. Headers, guard times, acknowledgements and
 //! transmission errors are not modelled: a hop carries its rate. Nothing is random.
 //!
-//! Data of a period may include packets that waited in queues before it, so that it can be more than the promised rate of that period.
+//! A period may deliver more than its promised rate, because packets from before it may have waited in queues.
 //!
 //! Work: one event for each packet and hop, at most [`MOST_SENT`].
 
@@ -187,7 +187,7 @@ pub fn traffic(
         None => promised.collect(),
     };
     let packets = |rate_bps: f64| rate_bps / spec.link.packet_bits;
-    // Whole frames: the promised rate is the mean over a frame.
+    // Whole frames only: the promised rate is the mean over a frame.
     let last = route.stages.last().and_then(|stage| {
         let mut hops = stage.hops.iter().flatten();
         hops.next().map(|hop| hop.window)
@@ -254,16 +254,15 @@ struct Queue {
     since: Ps,
     /// Number of the node's present transmission. Scheduled ends with other numbers are out of date, and ignored.
     number: u32,
-    /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean length of the queue from
-    /// it.
+    /// Integral of the queue's length over time until `counted`, in packets times ps. The report computes the mean
+    /// length from it.
     sum: u128,
     counted: Ps,
     most: usize,
 }
 
 impl Queue {
-    /// Adds the queue's length, which was constant since the last call, to its statistics. Must be called before each
-    /// change of the length.
+    /// Updates the statistics of the queue's length. Must be called before each change of the length.
     fn count(&mut self, now: Ps) {
         self.sum += self.packets.len() as u128 * u128::from(now.saturating_sub(self.counted));
         self.counted = now;
@@ -336,7 +335,7 @@ impl<'a> Running<'a> {
             direction,
             queues: vec![queue; nodes],
             ends: BinaryHeap::new(),
-            // Not longer than a frame at the promised rate: each packet is there before its slot.
+            // At most a frame at the promised rate, so that each packet is there before its slot.
             interval: (interval_s <= LATEST_S).then(|| time(interval_s).max(1)),
             next: from,
             period: 0,

@@ -7,7 +7,7 @@ use uav_relay::sensing::estimate::NumberedEstimate;
 use uav_relay::{Duration, Instant, Placement, Sample};
 use uav_relay_scenario::scene::{Place, Scene};
 
-/// True interferers of a run, and parameters of the measurements by which relays locate them.
+/// True interferers of a run, and parameters of the measurements that locate them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueInterference {
     /// Relays, channel and true interferers, with the interferers' positions at time 0.
@@ -111,7 +111,7 @@ impl TrueInterference {
 
     /// Draws the power, W, that `node` reports if the true interference is `true_w`, W.
     ///
-    /// It includes the noise, the random error of the mean of the samples, and the error of a broken receiver.
+    /// It includes the noise, the random error of the samples' mean, and the error of a broken receiver.
     fn reported_w(
         &self,
         scene: &Scene,
@@ -176,7 +176,7 @@ fn decibel(db: f64) -> f64 {
 /// Snapshot of the relays' positions and estimate at the time of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
-    /// Time of the snapshot of the interference.
+    /// Time of the measurement.
     pub at: Instant,
     /// Numbers of the relays that are on, from 1.
     pub nodes: Vec<u16>,

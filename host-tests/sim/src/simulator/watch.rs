@@ -31,7 +31,7 @@ pub struct Watch {
 impl Watch {
     /// Starts the statistics of a run with the relays' states `seen`.
     ///
-    /// `run` simulates a chain without faults, to compute the positions with which this chain is compared.
+    /// `run` simulates a chain without faults, whose positions are the reference.
     pub fn new(seen: Vec<ObservedState>, run: Run) -> Self {
         Self {
             last_setpoints: vec![None; seen.len()],
@@ -48,8 +48,7 @@ impl Watch {
         }
     }
 
-    /// Counts the time since the last call as available or as outage. The caller makes sure that no state changed in
-    /// that time.
+    /// Counts the time since the last call as available or as outage. No state must have changed in that time.
     pub fn count_time(&mut self, now: Instant) {
         let span = now.since(self.until);
         self.until = now;
@@ -95,8 +94,8 @@ impl Watch {
         }
     }
 
-    /// Updates the number of groups that fly by separate agreements, and the time of the first agreement. The caller
-    /// has recorded all changes of states at `now`.
+    /// Updates the number of groups that fly by separate agreements, and the time of the first agreement. All changes
+    /// of states at `now` must be recorded before.
     pub fn count_groups(&mut self, now: Instant) {
         self.most_flying = self.most_flying.max(groups(&self.states));
         if self.first.is_none() && has_agreed(&self.states) {
@@ -104,7 +103,7 @@ impl Watch {
         }
     }
 
-    /// Sets whether the chain counts as available from now on.
+    /// Records `is_right`: true if the chain counts as available from now on.
     ///
     /// It is available while the longest chain that the living relays can form has the same positions as in a run
     /// without faults.

@@ -135,10 +135,10 @@ const SIZE: f64 = 10.0;
 /// An interferer farther away is an arrow at the edge.
 const FARTHEST: f64 = 2.0;
 
-/// Lateral extent of the view from above, on the side of an interferer that is too far away to show.
+/// Lateral extent of the view from above toward an interferer that is too far away to show.
 ///
-/// It is a fraction of the distance from Tx to Rx, and leaves space for an arrow toward the interferer. It applies if
-/// relays must stay on the line, so that they have no lateral limits to show.
+/// It is a fraction of the distance from Tx to Rx, and leaves space for an arrow. It applies if relays must stay on the
+/// line, because there are no lateral limits to show then.
 const TOWARD_FAR: f64 = 0.4;
 
 /// Draws the view from above. `side` has the scale along the line; `view` has the relays' lateral offsets.

@@ -120,12 +120,12 @@ const GAP: f64 = 4.6;
 /// Points of a hop beside which the text with its SIR may be drawn. Each is a fraction of the hop's length, and the
 /// first point where the text has enough space is used.
 const SHARES: [f64; 3] = [0.5, 0.35, 0.65];
-/// Distances, in picture units, by which the text with a hop's SIR may be moved away from the hop.
+/// Distances that the text with a hop's SIR may be moved away from the hop, in picture units.
 ///
-/// The sign is the side of the hop: positive for above, negative (also -0.0) for below.
+/// Positive is above the hop, negative (also -0.0) below.
 const SIDES: [f64; 3] = [0.0, 11.0, -0.0];
 
-/// Largest number of hops for which each SIR is written beside its hop. For more hops, the SIRs are in one row.
+/// Largest number of hops for which the SIRs are beside the hops. For more hops, the SIRs are in one row.
 const FEW: usize = 21;
 
 pub(super) struct Hop {

@@ -70,7 +70,7 @@ impl OtherInterferers {
         }
     }
 
-    /// Returns the beginning of the tooltip of the interferer's symbol.
+    /// Returns the beginning of the tooltip for the interferer's symbol.
     pub(super) const fn tip(self) -> &'static str {
         match self {
             Self::Before => "interferer of the previous mission",

@@ -159,7 +159,7 @@ fn a_chain_without_agreement_gives_status_1_and_a_reason_in_json() {
         "{report}"
     );
 
-    // Without a scenario the option is wrong; the JSON has the same message.
+    // The scenario cannot be changed here, so the error names the option; the JSON has the same message.
     let output = chain("--json --uavs 1000");
     assert_eq!(output.status.code(), Some(2));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -108,7 +108,7 @@ fn a_flight_goes_on_after_the_drones_hover_until_it_is_ended() {
         first["frame"]["azimuth_deg"].as_f64().unwrap().round(),
         90.0
     );
-    // Much later than the end of the same run without a screen.
+    // This time is much later than the end of the same run without a screen.
     let last = snapshot(300.0);
     let mut alarms = last["alarms"].as_array().unwrap().iter();
     assert!(alarms.any(|alarm| alarm["text"] == "relay 2 lost: reported by relays 1 and 3"));

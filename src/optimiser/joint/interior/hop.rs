@@ -14,8 +14,9 @@
 //! -ln l:  -2 v / l,    -(2 / l) I + (4 / l^2) v v'        ln q:  2 q1 w,    2 q1 I + 4 q2 w w'
 //! ```
 //!
-//! The first has a convex direction, along the hop, and the second all across the direction to the interferer. In *convex* mode
-//! those are left out, so that the matrix of [`newton`](super::newton) is positive definite.
+//! The first has a convex direction, along the hop; the second is convex in all directions perpendicular to that of the
+//! interferer. In *convex* mode those are left out, so that the matrix of [`newton`](super::newton) is positive
+//! definite.
 
 use super::super::chain::{Chain, Gains, SeatOf};
 use super::super::hop::{Triple, minus};
@@ -129,9 +130,9 @@ impl LogGains {
         [there - length, back - length]
     }
 
-    /// Returns the derivatives of hop `k`'s [levels](Levels). They are with respect to the positions of its ends
-    /// `from` and `to`. The second derivatives are added up, with the `weights` of both levels. If `convex` is true,
-    /// terms that would make this sum indefinite are left out.
+    /// Returns the derivatives of hop `k`'s [levels](Levels) by the positions of its ends `from` and `to`. The second
+    /// derivatives of both levels are added up with the `weights`. If `convex` is true, terms that would make this sum
+    /// indefinite are left out.
     pub(super) fn derivatives(
         &self,
         k: u16,

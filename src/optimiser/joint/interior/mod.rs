@@ -1,8 +1,10 @@
 //! Interior-point method for the positions that maximise the worst SIR of both directions.
 //!
-//! Differential dynamic programming follows one reach per hop. With a way back a hop has two, and in a sixth of the chains some
-//! hop is limited by both at once, where neither has a derivative. So all positions move together here. With the levels
-//! c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the method maximises
+//! With data in both directions a hop has two reaches, and in a sixth of the chains some hop is limited by both at
+//! once, where neither has a derivative. So differential dynamic programming, which follows one reach per hop, is not
+//! used: all positions move together. With the levels c_i = ln F_k and ln (B_k / r) of the N + 1 hops (see `hop`), the
+//! method maximises
+//! `hop`), the method maximises
 //!
 //! ```text
 //! merit = T + mu (sum of ln(c_i - T) + sum of ln(distances to the box)),    sum of mu / (c_i - T) = 1
@@ -21,9 +23,9 @@
 //! T is the *target* and mu the *barrier weight*, which the constants give for all levels together. The lambda_i are the Lagrange
 //! multipliers; mu / (c_i - T) are their values at the optimum. The positions have *settled* once the merit gains little.
 //!
-//! This file has the state and one portion of the work. Lengths are in units of D; across the line the positions are stored as
-//! those of the other solver, six bytes each. The memory of a segment of ten relays has its front during the elimination, and
-//! then its steps.
+//! This file has the state and one portion of the work. Lengths are in units of D. A lateral offset and altitude are
+//! stored in six bytes, as in the other solver. The memory of a segment of ten relays has its front during the
+//! elimination, and then its steps.
 
 mod hop;
 mod newton;
@@ -49,23 +51,22 @@ const LAST_MU: f32 = 1e-4;
 /// Factor by which the barrier weight falls once a Newton step gains little.
 const LESS: f32 = 0.3;
 
-/// Gain below which the positions count as settled after more than half of a Newton step. The gain is the increase of
-/// the merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
+/// Gain below which the positions are near enough to the optimum after more than half of a Newton step. The gain is the
+/// increase of the merit (the maximised function) divided by the barrier weight.
 const SETTLED: f32 = 0.1;
-/// Gain below which the positions count as settled after a Newton step of any length. The gain is the increase of the
-/// merit divided by the barrier weight. The merit is the function that the interior-point method maximises.
+/// Gain below which the positions are near enough to the optimum after a Newton step of any length. The gain is the
+/// increase of the merit (the maximised function) divided by the barrier weight.
 const STUCK: f32 = 1e-3;
 
 const ITERATIONS: u8 = 60;
 
 /// Maximum step of a coordinate toward its limit, as a fraction of its distance from the limit.
 const NEAR_BOX: f32 = 0.98;
-/// Factor by which a Newton step is shortened if it lowers the merit, the function that is maximised.
+/// Factor by which a Newton step is shortened if it lowers the merit (the maximised function).
 const SHORTER: f32 = 0.4;
 const TRIES: u8 = 6;
 
-/// Maximum factor between a Lagrange multiplier and its value at the optimum. A multiplier outside this range is set
-/// to the limit.
+/// Maximum factor between a Lagrange multiplier and its value at the optimum. Multipliers are limited to this range.
 const APART: f32 = 5.0;
 
 /// Number of Newton steps for the target that one call makes.
@@ -82,8 +83,8 @@ const FIRST: usize = 6;
 const SECOND: usize = 4;
 const FIRST_RELAYS: u16 = 6;
 
-/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers `lambda`. Each multiplier is stored as the upper
-/// half of an f32.
+/// Levels of a hop (see [`Levels`]), and their Lagrange multipliers. Each multiplier is stored as the upper half of an
+/// f32.
 #[derive(Clone, Copy, Debug)]
 struct Hop {
     level: Levels,
@@ -104,7 +105,7 @@ pub(super) struct Node {
     hop: Hop,
 }
 
-/// Memory of Algorithm 1 in place of the levels, which the interior-point method computes later.
+/// Algorithm 1 uses the memory of the levels, which the interior-point method computes later.
 impl Noted for Node {
     fn lengths_m(&mut self) -> &mut [f32; 2] {
         &mut self.hop.level
@@ -150,7 +151,7 @@ impl Spot {
     }
 
     /// Moves each coordinate at least `margin` inside its limits. `margin` is a fraction of the distance between the
-    /// two limits.
+    /// limits.
     fn enclose(&mut self, margin: f32) {
         let limits = self.low.iter().zip(&self.high);
         for (cell, (low, high)) in self.at.iter_mut().zip(limits) {
@@ -172,21 +173,19 @@ enum Work {
     Accept(u16),
     /// Elimination of all relays from the Newton system; the field is the next segment of the chain.
     Eliminate(u16),
-    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and a flag: `true` for
-    /// the second half of the segment. The second half is computed before the first half.
+    /// Computation of the relays' Newton steps. The fields are the next segment of the chain, and a flag: true for the
+    /// segment's second half, which is computed before its first half.
     Substitute(u16, bool),
 }
 
-/// State of the interior-point method: all positions and the Newton step. It maximises the worst SIR of both
-/// directions.
+/// Interior-point method for the worst SIR of both directions: all positions and the Newton step.
 #[derive(Clone, Debug)]
 pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     gains: LogGains,
     /// Lateral offsets and altitudes of the relays.
     pub(super) cells: Cells<RELAYS>,
-    /// Two parts of the line Tx-Rx where one relay must not be. Relay 1 must not be in the part next to Rx, the last
-    /// relay not in the part next to Tx. The values are the lengths of the parts, divided by the distance from Tx to
-    /// Rx.
+    /// Parts of the line Tx-Rx in which one relay must not be, as fractions of the distance from Tx to Rx. Relay 1 must
+    /// not be in the part next to Rx, the last relay not in the part next to Tx.
     pub(super) closed: [f32; 2],
     pub(super) nodes: [Node; RELAYS],
     last: Hop,
@@ -199,10 +198,9 @@ pub(super) struct Interior<const RELAYS: usize, const SEGMENTS: usize> {
     mu: f32,
     target: f32,
     least: f32,
-    /// Merit, the function that is maximised, at the stored positions. The current step is accepted if it does not
-    /// lower the merit.
+    /// Merit (the maximised function) at the stored positions. A step is accepted if it does not lower the merit.
     merit: f32,
-    /// Sum of the barrier's logarithms for the hops handled so far, at the positions that are tried.
+    /// Sum of the barrier's logarithms at the tried positions, for the hops handled so far.
     sum: f32,
     /// Fraction of the Newton step that is tried; 0 to evaluate the stored positions only.
     share: f32,
@@ -243,8 +241,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         iterations: 0,
     };
 
-    /// Starts the interior-point method from the positions that [`Interior::put`] has set. `is_close` is true if
-    /// these positions are close to the result. The first barrier weight is then smaller.
+    /// Starts the interior-point method from the positions that [`Interior::put`] has set. If `is_close` is true, they
+    /// are close to the result, and the first barrier weight is smaller.
     pub(super) fn start(&mut self, chain: &Chain<'_, impl SeatOf>, is_close: bool) {
         self.gains = LogGains::new(chain);
         self.mu = if is_close { CLOSE_MU } else { FIRST_MU } / levels(chain);
@@ -254,7 +252,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Sets relay `index` to `place`, but at least `margin` inside the limits of its coordinates. `margin` is a
-    /// fraction of the distance between a coordinate's lower and upper limit.
+    /// fraction of the distance between the limits.
     pub(super) fn put(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -340,8 +338,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         spot
     }
 
-    /// Returns the stored levels and Lagrange multipliers of hop `k`. This hop leads to relay `k`, or to Rx if `k` is
-    /// N + 1.
+    /// Returns the stored levels and Lagrange multipliers of hop `k`. It leads to relay `k`, or to Rx if `k` is N + 1.
     #[inline(never)]
     fn hop(&mut self, relays: u16, k: u16) -> &mut Hop {
         match self.nodes.get_mut(usize::from(k).wrapping_sub(1)) {
@@ -413,8 +410,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Computes the [levels](Levels) of ten hops, from hop `k` on. For the coordinates of the hops' ends it adds
-    /// ln(distance to a limit) to the barrier.
+    /// Computes the [levels](Levels) of ten hops, from hop `k` on. Adds ln(distance to a limit) to the barrier for the
+    /// coordinates of the hops' ends.
     fn levels(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         let end = k.saturating_add(AT_ONCE).min(relays + 2);
@@ -482,7 +479,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
     }
 
     /// Accepts the tried step if it does not lower the merit; otherwise shortens the step. After the last attempt the
-    /// step is computed again without negative curvature, and after that the barrier weight falls.
+    /// step is computed again without negative curvature. If that fails too, the barrier weight falls.
     fn judge(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         if !(self.share > 0.0) || self.summed() >= self.merit {
             self.work = Work::Accept(1);
@@ -508,8 +505,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         self.target + self.mu * self.sum
     }
 
-    /// Stores the new position of relay `k`, and limits the Lagrange multipliers of the hop to relay `k`. The multipliers stay within the
-    /// factor [`APART`] of their optimal values.
+    /// Stores the new position of relay `k`. Limits the Lagrange multipliers of the hop to relay `k` to the factor
+    /// [`APART`] of their values at the optimum.
     fn accept(&mut self, chain: &Chain<'_, impl SeatOf>, k: u16) {
         let relays = chain.relays();
         if self.share > 0.0 && k <= relays {
@@ -528,8 +525,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. The result is `Ready`
-    /// after the maximum number of steps, with the target, in ln(SIR).
+    /// Starts the next Newton step from the accepted positions, or lowers the barrier weight. `Ready` with the target,
+    /// in ln(SIR), after the maximum number of steps.
     fn continue_with(&mut self, chain: &Chain<'_, impl SeatOf>) -> Poll<f32> {
         let merit = self.summed();
         let gain = (merit - self.merit) / (self.mu * levels(chain));
@@ -548,8 +545,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Lowers the barrier weight and continues. After the last weight the result is `Ready` with the target, in
-    /// ln(SIR). `resets` is true to replace the Lagrange multipliers, because no step with them has raised the merit.
+    /// Lowers the barrier weight and continues; `Ready` with the target, in ln(SIR), after the last weight. `resets` is
+    /// true to replace the Lagrange multipliers, because no step with them has raised the merit.
     fn lower(&mut self, chain: &Chain<'_, impl SeatOf>, resets: bool) -> Poll<f32> {
         let whole = self.mu * levels(chain);
         if whole <= 1.001 * LAST_MU {
@@ -595,7 +592,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Interior<RELAYS, SEGMENTS> {
             at = spot.at;
             let (convex, sums) = (self.convex, &mut self.sums);
             let factor = front.pass(index > 0, &hop, &weights, &spot, convex, sums)?;
-            // Tx has no factors, which are kept nowhere.
+            // Tx has no factors to store.
             let k = usize::from(index.wrapping_sub(first + 1)) % FIRST;
             if let Some(kept) = factors.get_mut(k) {
                 *kept = factor;

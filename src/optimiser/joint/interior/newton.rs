@@ -40,26 +40,26 @@ pub(super) struct Front {
     bend: Symmetric,
     slope: Triple,
     column: Triple,
-    /// Amount that the elimination of earlier relays has subtracted from the diagonal of `bend`.
+    /// Amount that the elimination of earlier relays subtracted from the diagonal of `bend`.
     taken: Triple,
 }
 
-/// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the
-/// next relay's steps in x, y and h. The last two values are the right side: its constant part, and its part per unit
-/// of the target's change.
+/// Equation of an eliminated relay after forward substitution. The first three values are the coefficients of the next
+/// relay's steps in x, y and h. The last two are the right side: its constant part, and its part per unit of the
+/// target's change.
 type Row = [f32; 5];
 
-/// Equations of one relay after its elimination, from which its Newton step follows.
+/// Equations of an eliminated relay, for the computation of its Newton step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Factor {
-    /// Cholesky factor of the relay's 3 x 3 matrix: its elements 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal
-    /// elements are stored as inverses, because they are divisors.
+    /// Cholesky factor of the relay's 3 x 3 matrix: 1 / xx, yx, hx, 1 / yy, hy, 1 / hh. The diagonal is stored as
+    /// inverses, because it is a divisor.
     lower: [f32; 6],
     /// Linear equations for the relay's steps in x, y and h, one row each.
     rows: [Row; 3],
 }
 
-/// Sums over all hops and relays from which the Newton step of the target follows.
+/// Sums over all hops and relays, for the Newton step of the target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sums {
     sigma: f32,
@@ -82,8 +82,8 @@ impl Weights {
         [a / s, b / t]
     }
 
-    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is mu, the barrier
-    /// weight, divided by the slack.
+    /// Returns the Lagrange multipliers at the optimum, one for each direction of the hop. Each is the barrier weight
+    /// mu divided by the slack.
     pub(super) fn central(&self) -> [f32; 2] {
         self.slack.map(|slack| self.mu / slack)
     }
@@ -103,8 +103,8 @@ impl Front {
         taken: [0.0; 3],
     };
 
-    /// Eliminates the relay before `hop` from the Newton system. `self` first has the rows of this relay; on return
-    /// `self` has the rows of the node at `spot`, where `hop` ends.
+    /// Eliminates the relay before `hop` from the Newton system. On entry `self` has the rows of this relay, on return
+    /// the rows of the node at `spot`, where `hop` ends.
     ///
     /// If `hop` begins at Tx, `is_relay` is false, and the returned factor is 0. `None` if a pivot is not positive.
     /// If the system is `convex`, a pivot can only be too small by rounding, and is raised instead.
@@ -191,8 +191,7 @@ impl Front {
         Some(Factor { lower, rows })
     }
 
-    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds this
-    /// contribution to `sums`.
+    /// Subtracts the contribution of the eliminated previous relay, `factor`, from these equations. Adds it to `sums`.
     fn reduce(&mut self, factor: &Factor, sums: &mut Sums) {
         let before = self.bend;
         for &[x, y, h, slope, column] in &factor.rows {
@@ -224,9 +223,8 @@ impl Front {
     }
 }
 
-/// Adds the derivatives of one coordinate's barrier to `slope` and `bend`. The barrier is mu (ln a + ln b); its
-/// second derivative is negated before it is added. a and b are the distances to the lower and the upper limit, mu is
-/// the barrier weight.
+/// Adds the derivatives of one coordinate's barrier, mu (ln a + ln b), to `slope` and `bend`. The second derivative is
+/// negated before. a and b are the distances to the lower and the upper limit, and mu is the barrier weight.
 #[inline(never)]
 fn barrier(mu: f32, a: f32, b: f32, slope: &mut f32, bend: &mut f32) {
     if a > 0.0 && b > 0.0 {

@@ -1,16 +1,16 @@
 //! Joint method for both directions: initial chains, interior-point method, and Algorithm 1 at the end.
 //!
-//! From a cross-section of each relay Algorithm 1 finds the best x of all relays for both directions, which is a global optimum
-//! along the line. The interior-point method ([`interior`](crate::optimiser::joint::interior)) then moves all coordinates to the
-//! nearest local optimum, and Algorithm 1 at the new cross-sections gives the target that the relays will agree on, with their
-//! separation. The best chain is kept.
+//! For given lateral offsets and altitudes, Algorithm 1 finds the best x of all relays for both directions, which is a
+//! global optimum along the line. The interior-point method ([`interior`](crate::optimiser::joint::interior)) then
+//! moves all coordinates to the nearest local optimum. Algorithm 1 at the new lateral offsets and altitudes gives the
+//! target that the relays will agree on, with their separation. The best chain is the result.
 //!
-//! The first chain is that of the common altitude, which is compared only: the result is not below that of Algorithm 1. The next
-//! five were chosen from 216 one after another, by the number of 3 840 random scenes in which the best result so far misses the
-//! optimum. They are given from the end with more power on, whose signal may pass the interferer in one hop; relays away from the
-//! interferer or high are mostly better than relays close to it, since the method finds its way down but not around. The
-//! last one keeps relay 1 from the x beyond the interferer, which are another local optimum for it. From the other chains the method
-//! mostly finds that one, as the x of Algorithm 1 are the farthest.
+//! The first chain, at the common altitude, is only compared: so the result is not below that of Algorithm 1. The next
+//! five were chosen from 216, one after another, by the number of 3 840 random scenes in which the best result so far
+//! misses the optimum. They are described from the end with more power, whose signal may pass the interferer in one
+//! hop. Relays away from the interferer or high are mostly better than relays close to it, since the method finds its
+//! way down but not around. The last chain keeps relay 1 from the x beyond the interferer. These x are another local
+//! optimum for it. From the other chains the method mostly finds that one, as the x of Algorithm 1 are the farthest.
 
 use super::judge::JUDGED;
 use crate::optimiser::joint::chain::{Chain, SeatOf};
@@ -27,15 +27,15 @@ use core::task::Poll;
 /// Number of relays that get their initial positions in one call of the solver.
 const PUT: u16 = 20;
 
-/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays
-/// at the same x. The first value is for the first run of this method, the second value for repetitions.
+/// Fraction by which relays move toward even spacing before the interior-point method starts. This separates relays at
+/// the same x. The first value is for the first run of this method, the second for repetitions.
 const OFF: [f32; 2] = [0.02, 0.002];
 
 /// Description of an initial chain, from the end with more power (Tx or Rx) to the other end.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Start {
-    /// Lateral offsets away from the interferer, as fractions of the largest permitted offset. The values are for the
-    /// first, the middle and the last relay.
+    /// Lateral offsets of the first, the middle and the last relay, away from the interferer. They are fractions of the
+    /// largest permitted offset.
     aside: [f32; 3],
     /// Altitudes of the first and the last relay: 0 is the lowest permitted altitude, 1 the highest.
     up: [f32; 2],
@@ -47,11 +47,11 @@ struct Start {
 enum Along {
     /// x from Algorithm 1, for the relays' lateral offsets and altitudes.
     Line,
-    /// First and last x of evenly spaced relays, as fractions of the distance from Tx to Rx. They are counted from
-    /// the end with more power.
+    /// First and last x of evenly spaced relays, counted from the end with more power. They are fractions of the
+    /// distance from Tx to Rx.
     Even([f32; 2]),
-    /// x from Algorithm 1, without the x that the function `close_beyond` excludes. Lateral offsets and altitudes
-    /// follow part of an ellipse down to the end with less power.
+    /// x from Algorithm 1, without the x that `close_beyond` excludes. Lateral offsets and altitudes follow part of an
+    /// ellipse down to the end with less power.
     Arc,
 }
 
@@ -101,26 +101,24 @@ impl Start {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// The search finds the highest target that an initial chain meets.
+    /// Search for the highest target that an initial chain meets.
     Start,
-    /// The search finds the highest target at the interior-point method's lateral offsets and altitudes.
+    /// Search for the highest target at the interior-point method's lateral offsets and altitudes.
     Result,
-    /// The search finds the best chain's highest target more exactly, at the end of the whole solution.
+    /// Finer search for the best chain's highest target, at the end of the whole solution.
     Last,
 }
 
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays done so
-    /// far.
+    /// Choice of the lateral offsets and altitudes of an initial chain. The field is the number of relays done.
     Begin(u16),
     /// Search for the highest target that Algorithm 1 meets at the current lateral offsets and altitudes.
     Seek(Seek, Purpose),
     /// Computation of the x of all relays by Algorithm 1 for this target, in ln(SIR).
     Settle(f32),
-    /// Choice of the positions at which the interior-point method starts. The field is the number of relays done so
-    /// far.
+    /// Choice of the positions at which the interior-point method starts. The field is the number of relays done.
     Put(u16),
     Interior,
 }
@@ -137,7 +135,7 @@ pub(super) struct Both<const RELAYS: usize, const SEGMENTS: usize> {
     line: Line,
     /// Target that the last run of the interior-point method has reached, in ln(SIR).
     reached: f32,
-    /// Number of repeated runs, so far, of the interior-point method for the current initial chain.
+    /// Number of repeated runs of the interior-point method for the current initial chain.
     again: u8,
     /// Number of the current initial chain. In chain 0 all relays are at the common altitude.
     number: u8,
@@ -221,8 +219,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Chooses lateral offsets and altitudes of the current initial chain; returns the next work. The first `done`
-    /// relays already have their offsets and altitudes. After the last initial chain, the next work is the final
-    /// search for the best chain's target.
+    /// relays have theirs already. After the last initial chain, the next work is the final search for the best chain's
+    /// target.
     fn begin_start(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let Some(start) = self.start() else {
             self.interior.cells = self.best_cells;
@@ -251,14 +249,14 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         } else if let Along::Even(_) = start.along {
             Work::Put(0)
         } else {
-            // The common altitude is compared, so its target is as exact as those of results.
+            // Results are compared with the chain at the common altitude, so its target is as exact as theirs.
             let width = if self.number > 0 { 0.02 } else { JUDGED };
             Work::Seek(Seek::down(chain.ceiling(), 0.5, 1.5, width), Purpose::Start)
         }
     }
 
-    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. At these x the
-    /// SIR of this relay rises with its distance from that end.
+    /// Excludes the x beyond the interferer for the relay next to the end (Tx or Rx) with more power. There the SIR of
+    /// this relay rises with its distance from that end.
     ///
     /// With the relay at x from that end, the interferer at X and the distance a from the line, the SIR is
     /// proportional to ((x - X)^2 + a^2) / (x^2 + a^2), which is smallest at x (x - X) = a^2. The distance of the
@@ -283,16 +281,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 
     /// Returns the description of the current initial chain; `None` after the last one. Chain 0, at the common
-    /// altitude, has the description of chain 1. Chain 0 uses only `along` of this description: the x come from
-    /// Algorithm 1.
+    /// altitude, uses only `along` of chain 1: its x come from Algorithm 1.
     fn start(&self) -> Option<Start> {
         let at = usize::from(self.number).saturating_sub(1);
         STARTS.get(at).copied()
     }
 
-    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best target so far. Returns the next work. If
-    /// Algorithm 1 has found positions worth an improvement, the next work leads to another run of the interior-point
-    /// method. Otherwise the next work begins the next initial chain.
+    /// Stores the current chain if its target `sigma`, in ln(SIR), is the best so far. Returns the next work: a run of
+    /// the interior-point method if Algorithm 1 has found positions worth an improvement, otherwise the next initial
+    /// chain.
     fn found(&mut self, sigma: f32, purpose: Purpose) -> Work {
         if self.best.is_none_or(|best| sigma > best) {
             self.best = Some(sigma);
@@ -311,9 +308,9 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Chooses the positions at which the interior-point method starts, and starts it. The lateral offsets and
-    /// altitudes are the stored values. The x come from Algorithm 1, or are evenly spaced. The first `done` relays have
-    /// their positions already.
+    /// Chooses the positions at which the interior-point method starts, and starts it. The first `done` relays have
+    /// theirs already. Lateral offsets and altitudes are the stored values. The x come from Algorithm 1, or are evenly
+    /// spaced.
     fn begin_interior(&mut self, chain: &Chain<'_, impl SeatOf>, done: u16) -> Work {
         let distance_m = chain.distance_m();
         let relays = chain.relays();
@@ -362,9 +359,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Both<RELAYS, SEGMENTS> {
     }
 }
 
-/// Returns true if the initial chains are described from Rx. This is so if Rx has more power than Tx. With equal
-/// powers it is so if less SIR is required on the way back, because Rx on the ground receives less interference than
-/// relay 1.
+/// Returns true if the initial chains are described from Rx. This is so if Rx has more power than Tx. With equal powers
+/// it is so if less SIR is required backward, because Rx on the ground receives less interference than relay 1.
 fn is_turned(chain: &Chain<'_, impl SeatOf>) -> bool {
     let config = chain.mission.config();
     let (tx_w, rx_w) = (config.tx_power_w, config.rx_power_w);
@@ -387,12 +383,12 @@ fn quarter(part: u16, whole: u16) -> [f32; 2] {
     [a / radius, b / radius]
 }
 
-/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is a difference: the target that
-/// Algorithm 1 meets at the last run's lateral offsets and altitudes, minus the target of the last run.
+/// Minimum gain for another run of the interior-point method, in ln(SIR). The gain is the target that Algorithm 1 meets
+/// at the last run's lateral offsets and altitudes, minus the target of that run.
 const NEW: f32 = 3e-4;
 /// Maximum number of interior-point runs per initial chain that start from a result of Algorithm 1.
 const AGAIN: u8 = 4;
 
-/// Difference of the first target to try and the result of the interior-point method, in ln(SIR). The first target is
-/// higher by this difference, which is the possible error of this method.
+/// Difference in ln(SIR) of the first target to try and the result of the interior-point method. It is the possible
+/// error of this method.
 const ABOVE: f32 = 1e-4;

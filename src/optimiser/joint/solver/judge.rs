@@ -1,7 +1,7 @@
 //! Search for the highest feasible target of a chain, and the steps that follow it.
 //!
-//! After a target the next start follows, with its initial shape. After the last start the polish follows: each relay in turn
-//! tries another position, where the derivatives show no gain.
+//! After the target of a chain is found, the next initial chain follows. After the last one the polish follows: single
+//! relays try other positions, because the derivatives do not show every gain.
 
 use super::{OneWay, Purpose, Work};
 use crate::mission::Mission;
@@ -16,13 +16,13 @@ use core::task::Poll;
 /// Precision in ln(SIR) of the search for the highest target that an improved chain meets.
 pub(super) const JUDGED: f32 = 4e-6;
 
-/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). If a chain is
-/// within this tolerance of the bound, the search for better chains ends.
+/// Tolerance of the upper bound that the first and the last hop set on the chain's SIR, in ln(SIR). If a chain reaches
+/// the bound within this tolerance, the search for better chains ends.
 pub(super) const CEILING: f32 = 5e-5;
 
 /// Margin in ln(SIR) above the upper bound of all chains at which a rising target first stops.
 ///
-/// At this target the search checks if the chain already reaches the bound; if so, the search ends.
+/// The search then checks if the chain reaches the bound; if so, the search ends.
 const PROBED: f32 = 3e-4;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -92,7 +92,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
                 (Some((sigma, _)), Purpose::Last) => {
                     if self.best.is_none_or(|(best, _)| sigma > best) {
                         self.best = Some((sigma, self.number));
-                        // No pass with the sweep's rules has changed the cells.
+                        // Searches with the hops exactly as in flight do not change the cells.
                         self.best_cells = self.cells;
                         self.best_judged = self.judged_at;
                         // A diverged ascent has not reached its target.
@@ -155,11 +155,12 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns the work that searches for the highest target that the current chain meets. The hops are computed
-    /// exactly as the relays compute them from their messages.
+    /// Returns the work that searches for the highest target of the current chain, after an ascent. An ascent is an
+    /// improvement in steps.
     ///
-    /// The chain is the result of an ascent (improvement in steps) that ended at the target `sigma`. `ceiling` is the
-    /// upper bound of all chains. Both are in ln(SIR). Relays are allowed to stay short of their farthest position.
+    /// Hops are computed exactly as the relays compute them from their messages. Relays are allowed to stay short of
+    /// their farthest position. The ascent ended at the target `sigma`, and `ceiling` is the upper bound of all chains,
+    /// both in ln(SIR).
     pub(super) fn judged(&self, sigma: f32, ceiling: f32) -> Work {
         let sigma = sigma.min(ceiling + CEILING);
         let seek = if self.again {
@@ -176,8 +177,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.again || (higher() && self.ascent.is_kept_up_with())
     }
 
-    /// Returns true if the current chain can no longer become the best chain. The improvement of such a chain stops.
-    /// `turn` is the next action of the improvement.
+    /// Returns true if the current chain can no longer become the best chain, and its improvement stops. `turn` is the
+    /// next action of the improvement.
     pub(super) fn is_dropped(&self, turn: AscentStep) -> bool {
         let other = !self.again && self.best.is_some();
         other && (self.ascent.is_astray() || self.ascent.ends_below(turn, self.highest))
@@ -212,22 +213,22 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Maximum number of relays for which the last phase tries moves of single relays. If some relays have a fixed
-/// altitude, the phase always tries such moves, because the chain's path then has kinks.
+/// Maximum number of relays for which single relays are moved in the last phase. If some relays have a fixed altitude,
+/// they are always moved, because the chain's path then has kinks.
 const POLISHED: u16 = 5;
 
-/// Number of times that the trial moves of single relays are halved, in the last phase of the solution.
+/// Number of times that the trial moves of single relays are halved in the last phase.
 const HALVINGS: u16 = 12;
-/// First trial move of a relay in the last phase of the solution, as a fraction of its allowed range.
+/// First trial move of a relay in the last phase, as a fraction of its allowed range.
 const FIRST_MOVE: f32 = 0.25;
 
 /// Minimum gain of the target for which a trial move of a relay is accepted, in ln(SIR).
 pub(super) const GAIN: f32 = 2e-5;
-/// Maximum number of accepted trial moves of single relays, after which the solution ends.
+/// Maximum number of accepted trial moves, after which the solution ends.
 const MOVES: u8 = 200;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
-    /// Returns the current trial move: the relay's index, the kind of move, and how often it was halved. Kinds 0 to 3
+    /// Returns the current trial move: the relay's index, the kind of move, and the number of halvings. Kinds 0 to 3
     /// move the relay down, up, left or right. Kinds 4 and 5 copy the lateral offset and altitude of the relay two
     /// places toward Rx or toward Tx.
     pub(super) fn move_of(&self, mission: &Mission) -> (u16, u16, u16) {
@@ -239,8 +240,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 
     /// Tries the next move of one relay in a chain that meets the target `sigma`, in ln(SIR).
     ///
-    /// The relay moves by a fraction of its allowed range, which is halved from round to round, or takes another
-    /// relay's lateral offset and altitude. The moves find gains that the derivatives do not show, because another
+    /// The relay moves by a fraction of its allowed range, which is halved from round to round. Or it takes another
+    /// relay's lateral offset and altitude. These moves find gains that the derivatives do not show, because another
     /// constraint is active.
     pub(super) fn polish(
         &mut self,

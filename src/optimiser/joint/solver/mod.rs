@@ -1,17 +1,17 @@
 //! Solver of a whole chain by the joint method, from the mission alone and without messages.
 //!
-//! Differential dynamic programming stores a policy for every relay between the backward and the forward pass. To need only six
-//! bytes per relay, the chain is cut into segments: only the value function at the end of each is stored, and the policies of a
-//! segment are computed again in the forward pass.
+//! Differential dynamic programming stores a policy for every relay between the backward and the forward pass. To need
+//! only six bytes per relay, the chain is cut into segments. Only the value function at the end of each segment is
+//! stored, and the policies of a segment are computed again in the forward pass.
 //!
-//! A start is dropped as soon as it will end no higher than the best one, or has diverged. The remaining starts are skipped once
-//! a chain meets the ceiling of its first or last hop.
+//! An initial chain is dropped as soon as it will end no higher than the best one, or has diverged. The remaining
+//! initial chains are skipped once a chain meets the maximum SIR of its first or last hop.
 //!
 //! | file | content |
 //! | --- | --- |
 //! | `passes` | the backward and the forward pass of an ascent, and a pass without changes |
-//! | `line` | the sweep's rules: Algorithm 1 for the stored lateral offsets and altitudes |
-//! | `judge` | the steps after a target is found: the next start, or the polish |
+//! | `line` | Algorithm 1 for the stored lateral offsets and altitudes, exactly as the relays compute it in flight |
+//! | `judge` | the steps after a target is found: the next initial chain, or the polish |
 //! | `both` | the solver for both directions |
 //!
 //! This file has the states of the solvers, the current work for one direction and its purpose, and one portion of the work.
@@ -36,11 +36,11 @@ use both::Both;
 
 #[derive(Clone, Copy, Debug)]
 struct ForwardPass {
-    /// Number of relays that the forward pass has completed. The forward pass moves the relays.
+    /// Number of relays that the forward pass has moved.
     done: u16,
-    /// Position to which the forward pass has moved the last relay that it has completed.
+    /// Position of the last moved relay after its move.
     from: Placement,
-    /// Position of the last completed relay before the forward pass moved it.
+    /// Position of the last moved relay before its move.
     old: Placement,
     penalty: f32,
 }
@@ -57,43 +57,43 @@ impl ForwardPass {
 #[repr(u8)] // so that the bytes of `Begin` are 0
 #[derive(Clone, Copy, Debug)]
 enum Work {
-    /// Begin the next initial chain, from which the search for the best chain continues.
+    /// Begin the next initial chain.
     Begin,
     /// Search for the highest target SIR that the chain meets without moves of its relays.
     Seek(Seek, Purpose),
     /// Compute the chain for one target, as ln(SIR), and store it.
     Settle(f32, Purpose),
-    /// Try the next move of one relay. The field is the target that the chain meets, as ln(SIR).
+    /// Try the next move of one relay. The field is the target that the chain meets now, in ln(SIR).
     Polish(f32),
     /// Run the backward pass, which computes the relays' moves, for the segment with this number.
     Back(u8),
-    /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target as
-    /// ln(SIR), and true to store the chain, false for a trial.
+    /// Run the forward pass, which moves the relays. The fields are the fraction of the computed moves, the target in
+    /// ln(SIR), and a flag: true to store the chain, false for a trial.
     Forward(f32, f32, bool),
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Purpose {
-    /// The search finds the highest target that an initial chain meets.
+    /// Search for the highest target that an initial chain meets.
     Start,
-    /// The search raises the target as far as the current chain meets it without moves of its relays.
+    /// Search for the highest target that the current chain meets without moves of its relays.
     Raise,
-    /// The chain's slack is computed again, after the upper limit on the slack was lowered.
+    /// Computation of the chain's slack after the upper limit on the slack was lowered.
     Tighten,
-    /// The search finds the highest target of an improved chain, with the improvement's margins.
+    /// Search for the highest target of an improved chain, with the margins of the improvement.
     Judge,
-    /// The search finds the highest target of an improved chain by the sweep's rules.
+    /// Search for the highest target of an improved chain, with the hops exactly as in flight.
     Last,
-    /// The search checks if the chain meets the upper bound of all chains by the sweep's rules.
+    /// Check if the chain meets the upper bound of all chains, with the hops exactly as in flight.
     Probe,
-    /// The search checks a trial move of one relay by the sweep's rules.
+    /// Check of a trial move of one relay, with the hops exactly as in flight.
     Move,
 }
 
 impl Purpose {
-    /// Returns true for the sweep's rules: hops are computed as the relays compute them from messages.
+    /// Returns true if hops are computed exactly as the relays compute them in flight, from messages.
     ///
-    /// By these rules a relay is allowed to stay short of its farthest position.
+    /// A relay is then allowed to stay short of its farthest position.
     const fn is_sweep(self) -> bool {
         matches!(self, Self::Last | Self::Probe | Self::Move)
     }
@@ -110,36 +110,32 @@ struct OneWay<const RELAYS: usize, const SEGMENTS: usize> {
     start: Start,
     /// Best target SIR found, in ln(SIR), and the number of the initial chain that led to it.
     best: Option<(f32, u8)>,
-    /// Highest target reached by the improvement of a chain, ln(SIR). The improvement of a chain stops if it is
-    /// predicted to end below this target.
+    /// Highest target that the improvement of any chain has reached, ln(SIR). A chain that is predicted to end below it
+    /// is dropped.
     highest: f32,
-    /// Stored lateral offsets and altitudes of the relays in the best chain.
     best_cells: Cells<RELAYS>,
-    /// Target at which the improvement of the best chain ended, in ln(SIR). The last search starts there, and need
-    /// not improve the chain again.
+    /// Target at which the improvement of the best chain ended, in ln(SIR). The last search starts there.
     best_judged: Option<f32>,
-    /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, and if
-    /// it was stopped early.
+    /// Target at which the current chain's improvement ended, in ln(SIR). `None` while the improvement runs, or if it
+    /// was stopped early.
     judged_at: Option<f32>,
-    /// True if the current chain's improvement has not been stopped early. It is stopped if the chain would not become
-    /// the best chain.
+    /// True if the current chain's improvement has not been stopped early.
     is_whole: bool,
-    /// True in the last phase. It searches the best chain's target more finely, and moves single relays.
+    /// True in the last phase, which searches the best chain's target more finely and moves single relays.
     again: bool,
     ascent: Ascent,
     work: Work,
     pass: ForwardPass,
     line: Line,
-    /// x of each relay and its upper limit, m, during a search by the sweep's rules.
+    /// x of each relay and its upper limit, m, during a search with the hops exactly as in flight.
     notes: [[f32; 2]; RELAYS],
     /// True if some relays have to stay short of their farthest position to meet the target found.
     holds_back: bool,
     /// True if the minimum separation of relays has restricted the improvement of any chain.
     walled: bool,
-    /// Index of the current trial move of a single relay, in the last phase of the solution. It counts the kinds of
-    /// move fastest, then the relays, then the halvings of the moves.
+    /// Number of the next trial move of a single relay in the last phase; see [`OneWay::move_of`].
     moving: u16,
-    /// Number of trial moves of single relays that were accepted in the last phase of the solution.
+    /// Number of accepted trial moves in the last phase.
     moved: u8,
     /// Lateral offset and altitude of a relay before its current trial move.
     kept: Cell,
@@ -202,8 +198,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.pass = ForwardPass::NONE;
     }
 
-    /// Stores the lateral offset and altitude `cell` of relay `index`. If relay `index` is the first relay of a
-    /// segment, the function also stores `x_m`, the x of the previous relay, m.
+    /// Stores the lateral offset and altitude `cell` of relay `index`. For the first relay of a segment it also stores
+    /// `x_m`, the x of the previous relay, m.
     #[inline(never)] // called from several places
     fn keep(&mut self, index: u16, x_m: f32, cell: Cell) {
         if let Some(mark) = self.mark(index) {
@@ -212,8 +208,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.set(index, cell);
     }
 
-    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins at this
-    /// relay.
+    /// Returns the stored state of the segment whose first relay is `index`. `None` if no segment begins there.
     fn mark(&mut self, index: u16) -> Option<&mut Mark> {
         let at = usize::from(index).wrapping_sub(1);
         self.marks
@@ -225,8 +220,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
 /// Number of solvers for both directions: 1 with the features `altitude` and `reverse`, else 0.
 const BOTH: usize = (ALTITUDE && REVERSE) as usize;
 
-/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is a time slot as long as
-/// its hop needs.
+/// Number of solvers for fitted slots: 1 with the feature `altitude`, else 0. A fitted slot is as long as its hop
+/// needs.
 const FITTED: usize = ALTITUDE as usize;
 
 /// Joint solver of a chain: the solver for one direction, for both directions, or for fitted slots.
@@ -257,15 +252,15 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     /// Initial state of the solver, before [`Solver::begin`] prepares it for a mission.
     pub(crate) const NEW: Self = Self(Way::OneWay(OneWay::NEW));
 
-    /// Creates a joint solver. `None` in an interference field, for more than `RELAYS` relays, or without the feature
+    /// Creates a joint solver. `None` for an interference field, for more than `RELAYS` relays, or without the feature
     /// `altitude`.
     pub fn new(mission: &Mission) -> Option<Self> {
         let mut solver = Self::NEW;
         solver.begin(mission).then_some(solver)
     }
 
-    /// Prepares the solver for the directions of `mission`; returns false if it cannot solve the chain. It cannot
-    /// solve a chain in an interference field, or a chain with too many relays.
+    /// Prepares the solver for the directions of `mission`. Returns false for an interference field, or for too many
+    /// relays.
     #[inline(never)] // it may build the state on the stack first
     pub(crate) fn begin(&mut self, mission: &Mission) -> bool {
         if mission.fitted_gap() > 0.0 {
@@ -310,8 +305,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Continues to solve the chain by one bounded step. For one direction a step takes ten relays of a pass that
-    /// moves them, or twenty of another pass. For both directions it takes at least two relays.
+    /// Continues to solve the chain by one bounded step. For one direction a step handles ten relays of a pass that
+    /// moves them, or twenty of another pass. For both directions it handles at least two relays.
     ///
     /// Ready with the target SIR, linear, once the chain is solved. `seat_of` returns the profile of relay 1..=N, and
     /// must always return the same.
@@ -350,7 +345,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> Solver<RELAYS, SEGMENTS> {
     }
 }
 
-/// Checks that storing the best chain gives the same result as computing it a second time.
+/// Checks that the stored best chain equals the best chain computed a second time.
 #[cfg(all(test, feature = "altitude"))]
 #[expect(
     clippy::indexing_slicing,

@@ -1,6 +1,6 @@
 //! Backward pass, which computes the policies, and forward pass, which tries them.
 //!
-//! A plain pass changes nothing, or gives a chain its initial shape.
+//! A plain pass changes nothing, or gives an initial chain its shape.
 
 use super::{ForwardPass, OneWay, Purpose, Work};
 use crate::mission::Mission;
@@ -91,7 +91,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         };
     }
 
-    /// Returns the position in the current chain of the relay before `segment`.
+    /// Returns the position of the relay before `segment` in the current chain.
     pub(super) fn nominal_before(&self, chain: &Chain<'_, impl SeatOf>, segment: u8) -> Placement {
         let index = u16::from(segment) * SEGMENT_RELAYS;
         if index == 0 {
@@ -105,7 +105,7 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         self.cells.get(index).place(room).at(x_m)
     }
 
-    /// Runs the forward pass through one more segment, or first computes the moves of its relays. The pass tries the
+    /// Continues the forward pass by one segment, or first computes the moves of its relays. The pass tries the
     /// fraction `share` of the moves with the target `sigma`, in ln(SIR). It stores the chain if `kept` is true.
     pub(super) fn forward(
         &mut self,
@@ -147,8 +147,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         }
     }
 
-    /// Moves the relays of `segment` by the fraction `share` of their computed moves. If `kept` is true, it stores
-    /// their new lateral offsets and altitudes. `None` if a hop cannot meet `target`.
+    /// Moves the relays of `segment` by the fraction `share` of their computed moves. Stores their new lateral offsets
+    /// and altitudes if `kept` is true. `None` if a hop cannot meet `target`.
     pub(super) fn follow(
         &mut self,
         chain: &Chain<'_, impl SeatOf>,
@@ -182,11 +182,11 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
     }
 }
 
-/// Number of relays that one call handles in a pass that computes only their x.
+/// Number of relays per call in a pass that computes only their x.
 const PLAIN: u16 = 20;
 
-/// Maximum penalty at which an improved chain counts as feasible. The penalty is for relays too near the interferer;
-/// the unit is the distance from Tx to Rx.
+/// Maximum penalty for relays too near the interferer at which an improved chain counts as feasible. The unit is the
+/// distance from Tx to Rx.
 const FORGIVEN: f32 = 5e-5;
 
 impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
@@ -229,8 +229,8 @@ impl<const RELAYS: usize, const SEGMENTS: usize> OneWay<RELAYS, SEGMENTS> {
         Poll::Pending
     }
 
-    /// Returns relay `index` with its hop from a relay at `from`. In initial chains of the kind [`Start::Through`] no
-    /// minimum separation is required.
+    /// Returns relay `index` with its hop from a relay at `from`. Initial chains of the kind [`Start::Through`] have no
+    /// minimum separation.
     pub(super) fn link<'a>(
         &self,
         chain: &Chain<'a, impl SeatOf>,

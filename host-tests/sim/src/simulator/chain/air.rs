@@ -178,7 +178,7 @@ impl Chain {
     fn deliver(&mut self, sent: &Sent) {
         let relays = self.members.len();
         let arrives = self.now + self.setup.link.latency;
-        // A frame that some receiver missed would be no replay when sent again.
+        // A frame that was not received by all cannot be replayed: for some receivers it would be new.
         if sent.missed == 0 {
             self.overhear(&sent.frame, Port::Shared, arrives);
         }

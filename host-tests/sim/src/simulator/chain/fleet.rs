@@ -96,7 +96,7 @@ impl Chain {
         }
     }
 
-    /// Sets for each drone whether its pilot sees traffic: another moving drone that is near.
+    /// Updates the flag of each drone: true if its pilot sees traffic, another moving drone that is near.
     fn update_traffic(&mut self) {
         let separation_m = f64::from(self.setup.mission.config().min_separation_m);
         let seen: Vec<(Point, bool)> = self
@@ -165,8 +165,7 @@ impl Chain {
     /// Simulates an operator who confirms to a relay that the drones of lost neighbours have landed.
     ///
     /// The relay then no longer keeps away from these drones. The operator waits until two relays have controlled their
-    /// drones for [`LANDS_AFTER`]: this relay, and the nearest relay beyond the lost neighbours whose drone still
-    /// flies.
+    /// drones for [`LANDS_AFTER`]: this relay, and the next relay beyond the lost neighbours with a flying drone.
     fn clear_lost_neighbours(&mut self) {
         for index in 0..self.members.len() {
             if !self.is_long_under_relay_control(index) {

@@ -36,8 +36,7 @@ impl ChangedRelays {
 impl Chain {
     /// Starts the statistics of the run.
     ///
-    /// `run` simulates a chain without faults. The statistics compare the relays' positions with the positions of that
-    /// chain.
+    /// `run` simulates a chain without faults, whose positions are the reference for the statistics.
     pub(super) fn begin_watch(&mut self, run: Run) {
         let seen = self.members.iter().map(observed_state).collect();
         self.watch = Some(Watch::new(seen, run));
@@ -106,8 +105,8 @@ impl Chain {
 
     /// Returns true if the chain is available: it has the positions that it would reach without faults.
     ///
-    /// This is checked for the longest chains that the living relays can form; one such chain at its positions
-    /// suffices. If these chains are too small for a quorum, their relays have no positions, and the result is false.
+    /// At least one of the longest chains that the living relays can form must be at its positions. If these chains are
+    /// too small for a quorum, their relays have no positions, and the result is false.
     fn is_right(&self, watch: &mut Watch) -> bool {
         let on = |at: &usize| self.members.get(*at).is_some_and(|it| it.killed.is_none());
         let on: Vec<usize> = (0..self.members.len()).filter(on).collect();
@@ -248,8 +247,7 @@ impl Chain {
     }
 }
 
-/// Returns true if `part` has all relays of their view, in the order of their indices. A view is a membership of the
-/// chain.
+/// Returns true if `part` has all relays of their view, in the order of their indices.
 fn is_counted(part: &[&Member]) -> bool {
     part.iter().zip(1_u16..).all(|(member, index)| {
         member.relay.index() == index && usize::from(member.relay.mission().relays()) == part.len()
@@ -318,8 +316,8 @@ impl Chain {
             let chosen = (0.0..=end).contains(&place.x_m)
                 && aside
                 && (chosen || place.altitude_m.to_bits() == altitude.to_bits());
-            // With a guard, a drone may come from anywhere and be halted anywhere on its path: its setpoint may not leave the box
-            // by more than it has since the drone was engaged.
+            // With a guard, a drone may come from anywhere and be halted anywhere on its path. Its setpoint may leave
+            // the box no farther than since the drone was engaged.
             let [low, high] = member.setpoint_bounds.unwrap_or([place; 2]);
             let guard = self.setup.settings.guard;
             let inside = guard.map_or(chosen, |guard| {
