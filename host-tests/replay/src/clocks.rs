@@ -147,6 +147,15 @@ pub fn merge(mut files: Vec<Recording>) -> Result<Merged, String> {
             one_chain(first, other)?;
         }
     }
+    // Its acts of the operator would count twice.
+    for (index, file) in files.iter().enumerate() {
+        if let Some(before) = files.iter().take(index).find(|it| is_copy(it, file)) {
+            return Err(format!(
+                "{}: is the same capture as {}, or a part of it: give the longer one only",
+                file.name, before.name
+            ));
+        }
+    }
     if let Some(first) = files.first_mut()
         && let Some(steps) = without_steps(&mut first.frames)
     {
@@ -264,6 +273,14 @@ fn one_chain(first: &Recording, other: &Recording) -> Result<(), String> {
         }
         _ => Ok(()),
     }
+}
+
+/// Returns true if the shorter recording is the beginning of the other one.
+fn is_copy(one: &Recording, other: &Recording) -> bool {
+    one.frames
+        .iter()
+        .zip(&other.frames)
+        .all(|(a, b)| (a.at, a.direction, &a.wire) == (b.at, b.direction, &b.wire))
 }
 
 /// Checks by its clock that a file without common frames is of the same flight.

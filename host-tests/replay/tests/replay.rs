@@ -280,6 +280,7 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
     let flown = fly(3, false, 40, None);
     let files = captures(&flown, folder.path(), 3, f64::INFINITY);
     let whole = std::fs::read(&files[1]).unwrap();
+    let first = std::fs::read(&files[0]).unwrap();
     let write = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
@@ -340,6 +341,11 @@ fn files_that_are_no_captures_of_one_flight_are_refused_by_name() {
             "cannot be read: No such file or directory",
         ),
         (other[2].clone(), "the files are of different chains"),
+        (write("again.pcapng", &first), "is the same capture as"),
+        (
+            write("part.pcapng", &first[..first.len() / 2]),
+            "is the same capture as",
+        ),
         (
             next_day,
             "24.0 h apart from them by its clock: not of the same flight",
