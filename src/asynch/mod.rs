@@ -25,9 +25,9 @@
 //! # Cancellation
 //! `run` may be dropped at any `await`, and called again with the same links.
 //! - *Received bytes*: none are lost in `run`, because the relay gets them before the next `await`. A dropped `read`
-//! loses bytes with some readers, but not with Embassy's buffered UARTs.
-//! - *Frames*: the frame being written is lost, and the next one starts with a delimiter, so that no receiver joins the two.
-//! Queued frames are still sent. The relay retransmits what matters.
+//!   loses bytes with some readers, but not with Embassy's buffered UARTs.
+//! - *Frames*: the frame being written is lost, and the next one starts with a delimiter, so that no receiver joins the
+//!   two. Queued frames are still sent. The relay retransmits what matters.
 //! - *Pin*: it keeps its level until the next `run` sets it.
 //!
 //! A failed write is retried in the same way: a delimiter, and the whole frame.

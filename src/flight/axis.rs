@@ -173,7 +173,6 @@ impl Axis {
         Self::try_new(sites.tx, sites.rx)
     }
 
-    /// Returns the positions of transmitter and receiver, the ends of the line.
     pub(super) const fn sites(&self) -> Sites {
         self.sites
     }

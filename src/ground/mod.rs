@@ -770,8 +770,8 @@ pub enum Progress {
         /// Node number of the relay that flies the mission.
         by: u16,
     },
-    /// All relays of a view (list of the chain's members) fly the mission. Relays outside this view take no part until
-    /// they fly the mission, too.
+    /// Complete: all relays of a view (list of the chain's members) fly the mission. Relays outside this view take no
+    /// part until they fly the mission, too.
     Flown {
         /// Node number of the relay that reports that all relays of its view fly the mission.
         by: u16,

@@ -8,7 +8,7 @@ use crate::time::Duration;
 /// Default of [`GuardConfig::lag`]: the stopping time at the autopilot link's default speed limit.
 const LAG: Duration = Duration::from_millis(9_800);
 
-/// Maximum distance of a start from the geofence, m in each coordinate.
+/// Maximum distance from the geofence at which a relay may start, m in each coordinate.
 pub const BEGIN_WITHIN_M: f32 = 5_000.0;
 
 /// Geofence: box in which all setpoints must be. The x axis is the line from Tx to Rx.

@@ -73,17 +73,17 @@
 //!
 //! # Limitations
 //!
-//! - A deviation of up to [`GuardConfig::hover_m`] from the reported position reduces the separation by as much at either relay.
-//! It does so again each time that one is rebooted before a fence has restored the shortfall. Deviations of the
-//! cross-section count if the two are within the separation along x.
+//! - A deviation of up to [`GuardConfig::hover_m`] from the reported position reduces the separation by as much at
+//!   either relay. It does so again each time that one is rebooted before a fence has restored the shortfall.
+//!   Deviations of the cross-section count if the two are within the separation along x.
 //! - A relay sends nothing before it has both an agreed position and a report; until then no neighbour moves toward it.
-//! - The pilot is responsible for a drone in manual control. Its neighbours only come no nearer to the last position received,
-//! which is sent every second while it changes and otherwise every four seconds. Other relays do not know it, and may
-//! fly past it. A drone that is flown again at a wrong position stays there, and the chain halts around it. For a drone
-//! that is just flying past this takes some seconds. A drone that is flown again in motion overshoots by its
-//! autopilot's stopping distance.
-//! - A relay may start, or be flown again, beside one that is not flown and has not been received. It then holds its position until that
-//! one is flown or is replaced as a neighbour.
+//! - The pilot is responsible for a drone in manual control. Its neighbours only come no nearer to the last position
+//!   received, which is sent every second while it changes and otherwise every four seconds. Other relays do not know
+//!   it, and may fly past it. A drone that is flown again at a wrong position stays there, and the chain halts around
+//!   it. For a drone that is just flying past this takes some seconds. A drone that is flown again in motion overshoots
+//!   by its autopilot's stopping distance.
+//! - A relay may start, or be flown again, beside one that is not flown and has not been received. It then holds its
+//!   position until that one is flown or is replaced as a neighbour.
 //! - A rebooted relay does not know its earlier neighbours: it has to start with those of the mission, and silent ones have to be
 //!   replaced by `set_neighbour`, so that rule 9 applies.
 //! - The numbers of the associations are random: `seed` has to differ from one start to the next.
@@ -199,8 +199,8 @@ impl Guard {
         }
     }
 
-    /// Records if the relay flies to its setpoints from `now` on (`flown`). Returns true if this is a change. Initially
-    /// true.
+    /// Records whether the relay flies to its setpoints from `now` on (`flown`). Returns true if this is a change.
+    /// Initially true.
     ///
     /// While it is false there is no setpoint, and both neighbours are informed that the relay may be anywhere. When it
     /// becomes true again, the relay begins as after a start, with the next reported position.

@@ -223,7 +223,7 @@ impl Own {
         self.reminders >= MAX_REMINDERS_STILL && moves
     }
 
-    /// Returns true if the relay has moved since its last message without setpoints.
+    /// Returns true if the relay has moved away from `sent_place`, the position in its last message.
     pub(super) fn has_moved(&self) -> bool {
         self.reported.is_some_and(|place| {
             !self.is_near(place.cross_section(), self.sent_place.cross_section())

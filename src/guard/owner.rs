@@ -296,8 +296,8 @@ impl FenceOwner {
 
     /// Returns the smallest permitted distance along x between this relay and its downstream neighbour, m.
     ///
-    /// It is usually the minimum separation. It is less if the agreed positions of the two relays are closer along x,
-    /// and both have arrived at their agreed lateral offsets and altitudes. These then keep the relays apart.
+    /// It is usually the minimum separation. It is less if the agreed positions of the two relays are closer along x.
+    /// Both must have arrived at their agreed lateral offsets and altitudes, which then keep the relays apart.
     fn best_step(&self, own: &Own) -> f32 {
         let separation_m = own.config.separation_m;
         let step_m = self.target_m - own.target_m();
@@ -313,7 +313,7 @@ impl FenceOwner {
         step_m.max(least_m).min(separation_m)
     }
 
-    /// Returns the next fence for the downstream neighbour: its x, m, a distance, m, and a flag. `None` if the
+    /// Returns the next fence for the downstream neighbour: its x (m), a distance (m) and a flag. `None` if the
     /// neighbour is not known to be beyond this relay.
     ///
     /// The neighbour stays beyond the fence, and this relay stays the distance before it. The flag is true if the x is

@@ -3,7 +3,7 @@
 //! View proposals, lease renewals and the messages of an agreement on positions all travel this way. The initiator
 //! sends a message to its neighbour, and every relay forwards it. The last relay knows the result, and a reply with the
 //! result goes back through all of them. One [`Circulation`] is the state of one relay for one such message. The
-//! calling layer stores the payload. It also decides if a received message is new, a duplicate or stale.
+//! calling layer stores the payload. It also classifies received messages as new, duplicate or stale.
 //!
 //! | stage | event | action | next stage |
 //! | --- | --- | --- | --- |
@@ -28,8 +28,9 @@
 //! the whole round trip once, and not at every hop of a long chain. A random eighth is added to each wait, so that
 //! relays on a shared channel do not retransmit at the same time.
 //!
-//! Replies are not acknowledged. On a lossy channel a reply is sent again without a request, as many times as its
-//! number of hops has binary digits. Without these repetitions the previous relay would have to wait for its timer.
+//! Replies are not acknowledged. On a lossy channel a reply is sent again without a request. The number of repetitions
+//! is that of the binary digits of its number of hops. Without them the previous relay would have to wait for its
+//! timer.
 
 use crate::time::{Duration, Instant, Jitter};
 
@@ -52,7 +53,7 @@ const MEMORY: u8 = 8;
 /// State of one relay for a message that travels along the chain and back.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Stage {
-    /// There is no message.
+    /// No message is known.
     Idle,
     /// The message must be forwarded or has been forwarded, and the reply has not arrived yet.
     Outstanding,

@@ -71,7 +71,7 @@ pub(crate) struct Context<'a> {
     pub(crate) member: &'a Member,
     /// Identifier of the newest mission that this relay has stored. It can be newer than the active mission.
     pub(crate) latest: MissionId,
-    /// True if this relay is the last of its chain, the one farthest from the leader.
+    /// True if this relay has no neighbour on the side away from the leader, so that it is the last one.
     pub(crate) end: bool,
     /// Remaining lease times of other relays. The positions of a new view must not be used before these leases have
     /// ended.
@@ -97,8 +97,8 @@ impl<'a> Context<'a> {
 
     /// Returns true if every relay itself computes the positions of the whole chain (joint method).
     ///
-    /// This is so if the settings select the joint method, and the mission leaves the lateral offset or the altitude
-    /// free, or has fitted slots. Fitted slots are time slots that are as long as each hop needs.
+    /// The settings must select the joint method. The mission must leave the lateral offset or the altitude free, or
+    /// have fitted slots. Fitted slots are time slots that are as long as each hop needs.
     pub(crate) fn joins(&self) -> bool {
         let config = self.mission().config();
         let is_line = config.band.is_single() && config.lateral.is_single();
@@ -119,7 +119,6 @@ impl<'a> Context<'a> {
         self.mission().after(self.index()).is_none()
     }
 
-    /// Returns the path from this relay to the last relay of the view.
     pub(crate) fn path_to_last(&self) -> Path {
         let mission = self.mission();
         self.path(match mission.heading() {
@@ -128,7 +127,6 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Returns the path from this relay to the leader.
     pub(crate) fn path_to_leader(&self) -> Path {
         let relays = self.mission().relays();
         self.path(
@@ -241,13 +239,13 @@ pub(crate) enum Peer {
 /// Result of one protocol layer that is handled as an event.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum LayerEvent {
-    /// All relays of the chain have agreed on their positions.
+    /// The relays of the chain have all agreed on their positions.
     Converged,
     /// The leader has found no feasible target SIR.
     Infeasible,
     /// The lease has expired, so a later view may already have other positions.
     Lapsed,
-    /// This relay must send the neighbour toward the leader a hello that requests a new view.
+    /// A hello to the neighbour toward the leader must request a new view.
     RequestView,
     /// A view proposal has been decided.
     ProposalDecided(ProposalOutcome),
@@ -342,7 +340,6 @@ pub(crate) const PAUSE: Duration = Duration::from_micros(250);
 /// Maximum duration of a lease, in units of `dead_after`.
 const MAX_LEASE: u32 = 8;
 
-/// Returns the maximum duration of a lease.
 pub(crate) const fn longest_lease(settings: &Settings) -> Duration {
     settings.dead_after.times(MAX_LEASE)
 }

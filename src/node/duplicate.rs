@@ -1,8 +1,8 @@
 //! Duplicate index: another node uses this relay's node number. At most one of the two may have a setpoint.
 //!
 //! Each start has a 30-bit *claim number*, drawn from the seed of `Relay::new`. Two nodes with one number compare their
-//! claims. The larger epoch makes the larger claim; with equal epochs it is the larger claim number. A relay is
-//! *active* or *passive*. A passive relay has no setpoint, takes part in no agreement, and sends only claims.
+//! claims. The larger epoch makes the larger claim. With equal epochs it is the larger claim number. A relay is
+//! *active* or *passive*. A passive relay has no setpoint, takes no part in the protocol, and sends only claims.
 //!
 //! Without a key the claim number is sent in a Claim message to a neighbour. The other node with this index receives
 //! the claim directly, or as the neighbour's echo. A claim also contains the claim number that its sender has received
@@ -55,7 +55,7 @@ use crate::wire::session::{RAISED, Rival, Sender};
 
 /// Wait before the first claim that this relay sends without a request. The intervals between later claims double.
 ///
-/// By claims two nodes with one node number detect each other.
+/// Claims let two nodes with one node number detect each other.
 const FIRST_CLAIM: Duration = Duration::from_millis(250);
 
 /// Time added before the first claim without a request, after a start or after the relay was passive. A hundred relays
@@ -110,7 +110,7 @@ pub(crate) struct IndexClaims {
     next_claim: Option<Instant>,
     /// Interval between the next claim without a request and the claim after it.
     interval: Duration,
-    /// Number of claims still to be sent in answer to another node's claim. The interval between them is
+    /// Number of claims still to be sent to defend this relay's node number. The interval between them is
     /// [`least_interval`].
     defences: u8,
     /// Earliest time at which another claim may be scheduled. This limits the rate of Claim messages.

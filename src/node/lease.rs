@@ -148,7 +148,6 @@ impl Lease {
         }
     }
 
-    /// Returns the leader's last orders in this view.
     pub(crate) const fn orders(&self) -> Orders {
         self.orders
     }
@@ -340,8 +339,8 @@ impl Lease {
         effects
     }
 
-    /// Extends this relay's lease after the renewal `pulse`, in which all members took part. The lease ends when the
-    /// duration in `pulse` has passed since this relay forwarded the renewal.
+    /// Extends this relay's lease after the renewal `pulse`. The lease ends when the duration in `pulse` has passed
+    /// since this relay forwarded the renewal. All members took part in the renewal.
     ///
     /// The first lease in a view is not granted if `next` is more than twice the duration in `pulse`. It would expire
     /// before the next renewal, with the duration `next`, completes.

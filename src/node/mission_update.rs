@@ -42,7 +42,6 @@ use crate::wire::upload::{Upload, UploadError, check_line};
 /// Random number (nonce) in this relay's hellos, with the times of its first and last use. 0: no nonce.
 ///
 /// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
-/// A mission offer must repeat the nonce, which proves that the offer is not an old recording.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     number: u16,
@@ -221,7 +220,6 @@ impl MissionUpdate {
         }
     }
 
-    /// Schedules an offer of the newest mission to the neighbour at `side`.
     pub(crate) fn schedule_offer(&mut self, side: Side) {
         if let Some(offering) = self.offering(side) {
             offering.is_due = true;

@@ -35,21 +35,22 @@ use crate::wire::upload::{Upload, UploadError};
 /// - *Inputs*: [`handle_bytes`](Self::handle_bytes) and [`handle_timeout`](Self::handle_timeout) accept anything, never fail
 ///   and do a bounded amount of work; [`stats`](Self::stats) counts invalid input.
 /// - *Time* is an argument; the relay never reads a clock. Use a monotonic clock. After a backward step, timers and the
-/// - *Time* is an argument; the relay never reads a clock. Use a monotonic clock. After a backward step, timers and the
-/// lease continue as if no time had passed between the two calls; after a forward step they expire. While a part of the
-/// chain is out of reach, the other relays wait until the leases of that part have expired. A forward step ends this
-/// wait early. Two parts of the chain can then fly to positions of different agreements until the leases have expired.
+///   lease continue as if no time had passed between the two calls; after a forward step they expire. While a part of
+///   the chain is out of reach, the other relays wait until the leases of that part have expired. A forward step ends
+///   this wait early. Until the leases have expired, two parts of the chain can then fly to positions of different
+///   agreements.
+/// - *Getters* take constant time and return values of the last agreement. Positions are in metres in the frame of
 ///   [`MissionConfig`](crate::MissionConfig).
 /// - *Outputs* are built from the state on request, so no queue can overflow. After every input, store the record that
 ///   [`unpersisted`](Self::unpersisted) returns, call [`poll_transmit`](Self::poll_transmit) until it returns `None`,
 ///   then [`poll_event`](Self::poll_event) until it returns `None`, then sleep until
 ///   [`poll_timeout`](Self::poll_timeout) or the next byte.
 /// - After that, `poll_timeout` is `None` or later than `now`: the loop cannot spin.
-/// - *Setpoints* are finite, with x from 0 to the distance Tx-Rx, at the relay's altitude or at an altitude in the mission's
-/// band. They are at least the mission's separation from the neighbours' setpoints of the same agreement. There is no
-/// setpoint before the first agreement. Only a new agreement or the relay's move in Algorithm 2 changes the setpoint.
-/// After a new mission the setpoint stays until the chain has agreed in that mission, even outside of the new limits.
-/// If Tx or Rx have moved, there is no setpoint until then.
+/// - *Setpoints* are finite. Their x is from 0 to the distance Tx-Rx, their altitude is the relay's altitude or in the
+///   mission's band. They are at least the mission's separation from the neighbours' setpoints of the same agreement.
+///   There is no setpoint before the first agreement. Only a new agreement or the relay's move in Algorithm 2 changes
+///   the setpoint. After a new mission the setpoint stays until the chain has agreed in that mission, even outside of
+///   the new limits. If Tx or Rx have moved, there is no setpoint until then.
 ///
 /// ```
 /// use uav_relay::{Band, Channel, Identity, Instant, Interference, Interferer, Mission, MissionConfig, Profile, Relay, Settings};
@@ -253,6 +254,7 @@ impl Relay {
     }
 
     /// Writes the next frame to send into `frame`, and returns its port and length. Call it until it returns `None`.
+    ///
     /// Returns `None` while a [`ViewRecord`] is [not stored](Self::unpersisted). The pending frames follow once it is
     /// stored.
     ///
@@ -385,7 +387,7 @@ impl Relay {
     /// Call it right after the relay was created; only `Relay::resume` is allowed before. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission, and
+    /// Returns [`RecordError::Base`] if the record is of a relay with another loaded mission. Returns
     /// [`RecordError::Begun`] if the relay has already sent, received or computed something. The relay is then
     /// unchanged.
     pub fn resume_view(&mut self, now: Instant, record: &ViewRecord) -> Result<(), RecordError> {
@@ -402,8 +404,8 @@ impl Relay {
     /// was loaded before flight. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Base`] if the upload replaces another loaded mission, [`UploadError::Line`] if it does
-    /// not fit the positions of Tx and Rx or the geofence, and [`UploadError::Begun`] if the relay has already
+    /// Returns [`UploadError::Base`] if the upload replaces another loaded mission. Returns [`UploadError::Line`] if it
+    /// does not fit the positions of Tx and Rx or the geofence. Returns [`UploadError::Begun`] if the relay has already
     /// started. The relay is then unchanged.
     pub fn resume(&mut self, upload: &Upload) -> Result<(), UploadError> {
         self.node.resume(upload)
@@ -413,9 +415,9 @@ impl Relay {
     /// adopts it like any other upload. Takes constant time.
     ///
     /// # Errors
-    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, [`UploadError::Base`] if the upload replaces another
-    /// loaded mission, [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the geofence, and
-    /// [`UploadError::Old`] if the relay has already stored this mission or a newer one.
+    /// Returns [`UploadError::Unsigned`] without `Settings::auth`, and [`UploadError::Base`] if the upload replaces
+    /// another loaded mission. Returns [`UploadError::Line`] if it does not fit the positions of Tx and Rx or the
+    /// geofence. Returns [`UploadError::Old`] if the relay has already stored this mission or a newer one.
     pub fn handle_upload(&mut self, now: Instant, upload: &Upload) -> Result<(), UploadError> {
         self.node.handle_upload(self.clock.advance(now), upload)
     }
@@ -505,7 +507,6 @@ impl Relay {
     /// The slots of all hops fill the frame. They change when the result of an agreement reaches this relay: from the
     /// last relay to the leader, hop by hop. Until it has passed all relays, some have the new slots, and the others
     /// the old ones or none. [`Event::Converged`] reports that this relay has agreed.
-    /// others the old ones or none. [`Event::Converged`] reports that this relay has agreed.
     pub fn slot_shares(&self) -> Option<SlotShares> {
         self.node.slot_shares()
     }
@@ -689,7 +690,7 @@ impl Relay {
             .handle_position(now, place, self.clock.internal(measured_at));
     }
 
-    /// Records that the drone flies to the setpoints from now on (`flown`) or not; initially true. Takes constant time.
+    /// Records whether the drone flies to the setpoints from now on (`flown`); initially true. Takes constant time.
     ///
     /// Pass false while a pilot controls the drone or it is on the ground. With `Settings::guard`, the relay then has
     /// no setpoint. Its neighbours are informed that the drone can be anywhere, and come no nearer to it. Once `flown`
@@ -710,7 +711,7 @@ impl Relay {
         self.control(now, flown);
     }
 
-    /// Records if the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
+    /// Records whether the drone flies to the setpoints (`flown`). See [`handle_control`](Self::handle_control).
     ///
     /// Returns true if this changes the state of the guard (collision avoidance).
     pub(crate) fn control(&mut self, now: Instant, flown: bool) -> bool {

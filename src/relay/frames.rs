@@ -12,7 +12,7 @@ use crate::wire::session::{Checked, Rival, Sender, Session};
 
 /// Number of unanswered heartbeat requests to a neighbour after which a handshake requests a reply.
 ///
-/// The reply shows if the neighbour takes another node with this relay's number for this relay.
+/// The reply shows whether the neighbour takes another node with this relay's number for this relay.
 const QUESTIONS: u16 = 4;
 
 /// Handles an intact frame of this relay's network, received at `port`.

@@ -274,7 +274,7 @@ pub struct SerialStats {
     pub noise: u32,
     /// Number of reads from the serial port that failed for another reason.
     pub other: u32,
-    /// Number of failed writes, which are repeated, and of failed queries if all bytes have left the port.
+    /// Number of failed writes, and of failed queries whether all bytes have left the port. Failed writes are repeated.
     pub write: u32,
     /// Number of failed attempts to set the driver-enable pin. Each attempt is repeated.
     pub pin: u32,

@@ -5,7 +5,7 @@
 //! Near the end the deceleration falls, because a PX4 overshoots a target that stops with a constant deceleration.
 //!
 //! An autopilot that lags behind its target catches up. It flies faster than the target by its lag times its gain,
-//! which is about 1 /s, and even faster while it accelerates. The carrot is slower than the speed limit by this
+//! which is about 1 /s. While it accelerates, it flies even faster. The carrot is slower than the speed limit by this
 //! difference, so that the drone stays within the limit.
 
 use crate::flight::autopilot::state::Kind;
@@ -37,7 +37,7 @@ const CARROT_PART: f32 = 0.96;
 /// The target approaches its maximum speed smoothly, because a drone does not stop accelerating at once.
 const TOP_PER_S: f32 = 0.5;
 
-/// Minimum speed of the moving target when it waits for a drone that lags behind. As a fraction of the speed limit.
+/// Minimum speed of the moving target as a fraction of the speed limit, while the drone lags behind.
 const LEAST_PART: f32 = 0.1;
 
 /// Factor on the acceleration limit for velocity that does not lead toward a new setpoint.
@@ -179,7 +179,6 @@ impl Carrot {
         }
     }
 
-    /// Returns true if the target does not move.
     pub(super) const fn is_standing(&self) -> bool {
         self.is_standing
     }
@@ -495,7 +494,7 @@ mod tests {
         }
         let fastest = way.iter().map(|(_, speed)| *speed).fold(0.0, f32::max);
         assert!(fastest > 4.4, "51 m are enough to reach 5 m/s: {fastest}");
-        // 51 m take 5 s of acceleration, 5 s at full speed, 3 s of braking to 2 m/s, and 7 s more from there.
+        // 51 m take 5 s of acceleration, 5 s at full speed, and 3 s of braking to 2 m/s. The rest takes 7 s.
         assert!((170..210).contains(&way.len()), "{}", way.len());
         let last_moving = way[way.len() - 2].1;
         assert!(last_moving < 0.25, "{last_moving}");

@@ -1,15 +1,15 @@
-//! Command of the operator that lost relays have landed: COMMAND_LONG 31010, answered by COMMAND_ACK.
+//! Operator's command that reports lost relays as landed: COMMAND_LONG 31010, answered by COMMAND_ACK.
 //!
 //! The guard keeps clear of a silent relay, because its drone may still hover. Only a person can know that it has
 //! landed. The guard clears all relays of one side at once, so a command must contain the number of every lost relay of
 //! that side.
 //!
 //! | command to this system and component | result |
+//! | --- | --- |
 //! | its seven parameters are, apart from zeros, exactly the numbers of the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
-//! | its seven parameters name, apart from zeros, exactly the lost relays of one side | accepted: [`AutopilotEvent::LostCleared`] |
 //! | the same command, marked as a repetition | accepted, without an effect |
+//! | any other numbers | denied: [`AutopilotEvent::ClearRefused`] |
 //! | any, while the last command's answer, event or side has not been polled | ignored: an operator's station repeats it |
-//! | any, while the last one's answer, event or side has not been polled | ignored: an operator's station repeats it |
 
 use heapless::Vec;
 
@@ -34,7 +34,7 @@ struct LostSide {
     is_full: bool,
 }
 
-/// Lost relays on both sides, and the operator's command that they have landed.
+/// Lost relays on both sides, and the operator's command that reports them as landed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clearance {
     upstream: LostSide,
@@ -72,8 +72,8 @@ impl Clearance {
         }
     }
 
-    /// Processes the operator's command that lost relays have landed. Returns the event for the firmware. `from` is the
-    /// sender, and `parameters` are the numbers of the relays.
+    /// Processes the operator's command that reports lost relays as landed. Returns the event for the firmware. `from`
+    /// is the sender, and `parameters` are the numbers of the relays.
     pub(super) fn command(
         &mut self,
         from: Address,

@@ -47,12 +47,12 @@ const LONG_RECOVERY: Duration = Duration::from_millis(10_000);
 /// Maximum time between two losses of the position for which [`LONG_RECOVERY`] applies.
 const SHORT_TIME: Duration = Duration::from_millis(60_000);
 
-/// Maximum time from an ArduCopter's mode change to its report of the fence breach that caused it.
+/// Maximum time from an ArduCopter's mode change to its report of the geofence breach that caused it.
 const FENCE_SHOWN: Duration = Duration::from_millis(1_300);
 
-/// Time for which a reason that prevents control of the drone must last before it is reported.
+/// Time for which a reason against control of the drone must last before it is reported.
 const SETTLED: Duration = Duration::from_millis(1_000);
-/// Minimum time between two reports of such reasons to the operator.
+/// Minimum time between two reports of reasons against control of the drone.
 const NEXT_REASON: Duration = Duration::from_millis(5_000);
 
 /// Time for which the guard must hold the drone back before the reason is reported to the operator.
@@ -92,7 +92,8 @@ pub struct Autopilot {
     located_at: Option<Instant>,
     /// Time of regular positions before the present state [`State::Blind`] ends.
     recovery: Duration,
-    /// Loss of the relay's control that must still be reported, and the time of the report. `None` if there is none.
+    /// Loss of control over the drone that is still to be reported, and the time of the report. `None` if there is
+    /// none.
     release: Option<(Release, Instant)>,
     /// Reason why the pilot cannot give the relay control of the drone, and its start. `None` if the pilot can.
     wait: (Option<WaitReason>, Instant),
@@ -287,8 +288,8 @@ impl Autopilot {
         }
     }
 
-    /// Sets the position to fly to, from `Relay::setpoint`. The drone holds its position at `None`, and at a setpoint
-    /// that is not finite or too far from the line Tx to Rx.
+    /// Sets the position to fly to, from `Relay::setpoint`. The drone holds its position without a setpoint. It also
+    /// does so at a setpoint that is not finite or too far from the line Tx to Rx.
     pub fn handle_setpoint(&mut self, now: Instant, setpoint: Option<Placement>) {
         let now = self.clock.advance(now);
         let setpoint = setpoint.filter(|place| self.axis.is_around(*place));
@@ -336,8 +337,8 @@ impl Autopilot {
         self.report.values(self.clock.advance(now), sir_db, place);
     }
 
-    /// Records if the relay is ready to control the drone; initially true. While it is not, a PX4 in [`State::Standby`]
-    /// receives no targets, so that it refuses OFFBOARD.
+    /// Records whether the relay is ready to control the drone; initially true. While it is not, a PX4 in
+    /// [`State::Standby`] receives no targets, so that it refuses OFFBOARD.
     ///
     /// Nothing else changes: a drone that the relay controls stays under control, and an ArduCopter accepts GUIDED in
     /// any case.
@@ -345,8 +346,8 @@ impl Autopilot {
         let now = self.clock.advance(now);
         let before = core::mem::replace(&mut self.ready, ready);
         if before != ready && self.state == State::Standby {
-            // Targets are sent anew, if at all. To a PX4 only after another heartbeat: a PX4 that entered OFFBOARD
-            // without targets is in its failsafe.
+            // Targets start anew, if at all. A PX4 gets them only after another heartbeat, because a PX4 that entered
+            // OFFBOARD without targets is in its failsafe.
             self.target = None;
             if self.vehicle.kind() == Some(Kind::Px4) {
                 self.vehicle.unchoose();
@@ -388,9 +389,8 @@ impl Autopilot {
 
     /// Processes an event of the relay, and sends the operator a text about events that matter in flight.
     ///
-    /// After a new view (list of relays) the operator is informed once its positions are agreed on, if the relay
-    /// controls the drone and the guard does not hold it back. [`handle_hold`](Self::handle_hold) reports why a drone
-    /// is held back.
+    /// A new view (list of relays) is such an event once its positions are agreed on. The relay must control the drone
+    /// then, and the guard must not hold it back. [`handle_hold`](Self::handle_hold) reports why a drone is held back.
     pub fn handle_event(&mut self, event: Event) {
         self.clearance.handle_event(event);
         match event {
@@ -466,7 +466,7 @@ impl Autopilot {
         self.report.queue_line(Line::info(Topic::Control, line));
     }
 
-    /// Reports the loss of the relay's control of the drone, once its cause is known.
+    /// Reports that the relay has lost control of the drone, once the cause is known.
     fn review_release(&mut self, now: Instant) {
         let Some((mut release, until)) = self.release else {
             return;
@@ -567,7 +567,7 @@ impl Autopilot {
         self.report.queue_line(line);
     }
 
-    /// Returns the time at which the reason why the relay cannot control the drone must be reported. `None` once it has
+    /// Returns the time at which the present reason against control of the drone must be reported. `None` once it has
     /// been.
     fn wait_report_due(&self) -> Option<Instant> {
         let (reason, since) = self.wait;
@@ -742,10 +742,10 @@ impl Autopilot {
         OffLine::new(at, &self.axis)
     }
 
-    /// Returns the noise measured by a SiK radio (RADIO_STATUS), and the drone's position. It is for
-    /// `Relay::handle_sample`, and the newest measurement taken in the air.
+    /// Returns the newest noise measured in the air by a SiK radio, and the drone's position.
     ///
-    /// `None` if there is no new one since the last call, or without the feature `sensing`.
+    /// The noise is from RADIO_STATUS. The caller passes both to `Relay::handle_sample`. `None` if there is no new
+    /// measurement since the last call, or without the feature `sensing`.
     pub fn poll_sample(&mut self) -> Option<Sample> {
         self.noise.take()
     }

@@ -7,7 +7,7 @@
 //! | `vehicle` | the autopilot: its kind and its reports; delay and clock of the link; a drone far from the line Tx to Rx |
 //! | [`carrot`] | motion of the target to the setpoint, and its repetition |
 //! | `streams` | requests for messages of the autopilot |
-//! | `clearance` | the operator's command that lost relays have landed |
+//! | `clearance` | the operator's command that reports lost relays as landed |
 //! | `report` | texts and numbers for the operator, events for the firmware |
 //! | [`trust`] | signatures |
 //!

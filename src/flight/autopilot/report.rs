@@ -49,9 +49,9 @@ pub(super) enum Topic {
     Downstream,
     /// Event of the relay that the operator must see, such as a lost neighbour.
     Relay,
-    /// Breach of the fence in the autopilot.
+    /// Breach of the autopilot's geofence.
     Fence,
-    /// Command of the operator that lost relays have landed.
+    /// Command of the operator that reports lost relays as landed.
     Clearance,
     /// Order to the pilot to fly home.
     Leave,
@@ -325,8 +325,8 @@ pub enum AutopilotEvent {
     Restarted,
     /// Change of the control state of the drone: see [`State`].
     State(State),
-    /// Loss of the relay's control of the drone. Comes together with [`State::Standby`], or up to 1.3 s later if the
-    /// cause is possibly a fence.
+    /// The relay has lost control of the drone. Comes together with [`State::Standby`], or up to 1.3 s later if the
+    /// cause is possibly a geofence.
     Released(Release),
     /// Reason why the relay cannot control the drone now.
     ///
@@ -337,16 +337,16 @@ pub enum AutopilotEvent {
     Ready,
     /// The autopilot refuses the target: for 3 s it has reported a target other than the sent one.
     ///
-    /// The sent position is outside the autopilot's fence, or another companion sends targets to the same autopilot.
+    /// The sent position is outside the autopilot's geofence, or another companion sends targets to the same autopilot.
     Refused,
-    /// The autopilot reports that the drone is outside of its fence.
+    /// The autopilot reports that the drone is outside of the autopilot's geofence.
     FenceBreached,
     /// The drone is so far from the line Tx to Rx that it has no position in the mission's coordinates.
     ///
     /// Check that the configured positions of Tx and Rx belong to this flight. Reported once on the ground, and at most
     /// once in 10 s in the air.
     OffLine(OffLine),
-    /// The link accepted an operator's command that the lost relays of one side have landed.
+    /// The link accepted an operator's command that reports the lost relays of one side as landed.
     ///
     /// The command came over MAVLink. [`Autopilot::poll_cleared`](super::Autopilot::poll_cleared) returns the side for
     /// the relay.
@@ -358,7 +358,7 @@ pub enum AutopilotEvent {
         /// MAVLink address of the command's sender.
         from: Address,
     },
-    /// The link denied an operator's command that lost relays have landed.
+    /// The link denied an operator's command that reports lost relays as landed.
     ///
     /// Its numbers are not exactly those of all lost relays of one side.
     ClearRefused {

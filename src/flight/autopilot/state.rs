@@ -19,7 +19,8 @@
 //! choose another mode first, and the operator is informed of this. Only the pilot's choice of a mode ends a PX4's
 //! failsafe. Nothing else changes a state: no setpoint, and no message of a neighbour.
 
-/// Control state of the drone. It determines if the relay controls it, and which targets the autopilot gets.
+/// Control state of the drone. It shows whether the relay controls the drone, and determines which targets the
+/// autopilot gets.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum State {
     /// No autopilot is received on the link.
@@ -53,7 +54,7 @@ pub(super) struct Observed {
 }
 
 impl State {
-    /// Returns the control state after this state, for the observations `observed`.
+    /// Returns the next control state. It follows from this state and the observations `observed`.
     pub(super) const fn next(self, observed: Observed) -> Self {
         let Observed {
             is_received: there,
@@ -157,14 +158,14 @@ pub enum ReleaseCause {
     Chosen,
     /// The autopilot entered its failsafe.
     Failsafe,
-    /// The autopilot's fence was breached.
+    /// The drone left the autopilot's geofence.
     Fence,
     /// The link to the autopilot was interrupted or late. A PX4 is then possibly in its failsafe, which targets would
     /// end.
     Link,
 }
 
-/// Loss of the relay's control of the drone.
+/// Loss of control over the drone: its cause, and the mode of the autopilot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Release {
     /// Reason why the relay has lost control of the drone.

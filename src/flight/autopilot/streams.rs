@@ -29,7 +29,6 @@ const UNANSWERED: u8 = 2;
 /// Values of `MAV_RESULT` by which the autopilot denies a request for good.
 const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 
-/// Message requested from the autopilot, and its interval.
 struct RequestedMessage {
     id: u32,
     interval: Duration,

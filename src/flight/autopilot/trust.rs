@@ -152,7 +152,6 @@ fn no_key(received: &Received) -> Option<Mistrust> {
     received.is_signed.then_some(Mistrust::NoKey)
 }
 
-/// Returns true for a heartbeat of an autopilot.
 fn is_heartbeat(received: &Received) -> bool {
     let of_autopilot = |message| matches!(message, Incoming::Heartbeat { kind, autopilot, .. } if Kind::of(autopilot, kind).is_some());
     received.from.component == AUTOPILOT && received.message.is_some_and(of_autopilot)

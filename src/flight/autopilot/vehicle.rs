@@ -101,9 +101,9 @@ pub(super) struct Vehicle {
     chosen: bool,
     armed: bool,
     in_air: bool,
-    /// Time since which the landed state has been "on the ground"; `None` in another or unknown state.
+    /// Start of the time in which the autopilot reports "on the ground". `None` if it does not.
     grounded_at: Option<Instant>,
-    /// True while the drone is outside of the autopilot's fence.
+    /// True while the drone is outside of the autopilot's geofence.
     pub(super) is_breached: bool,
     clock: RemoteClock,
     pub(super) echo: Echo,
@@ -362,8 +362,9 @@ impl Vehicle {
 
     /// Returns the newest remaining time of flight and the time of the flight home, s.
     ///
-    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an unknown time. The
-    /// time of the flight home is unknown without a recent position, and if the home is too far from the line Tx to Rx.
+    /// `None` without a new remaining time since the last call, or if the home position is unknown. NaN stands for an
+    /// unknown time. The time of the flight home is unknown without a recent position. It is also unknown if the home
+    /// is too far from the line Tx to Rx.
     pub(super) fn take_endurance(&mut self, now: Instant, axis: &Axis) -> Option<[f32; 2]> {
         let remaining_s = self.battery.newest.take()?;
         let home = axis.place(self.home?);
@@ -526,7 +527,7 @@ const TAG: u32 = 0xA_52A5;
 /// autopilot that has replied once counts as late whenever it does not reply.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
-    /// Tag in the low bits of every request. By it this link recognises replies to its requests.
+    /// Tag in the low bits of every request. It shows which replies belong to this link.
     tag: u32,
     due: Option<Instant>,
     /// Time of the first TIMESYNC request; `None` before it.
@@ -549,7 +550,7 @@ impl Default for Echo {
 impl Echo {
     /// Sets the tag of this link's TIMESYNC requests, derived from `seed`.
     ///
-    /// By the tag the link recognises replies to its requests.
+    /// The tag shows which replies belong to this link.
     pub(super) const fn seed(&mut self, seed: u32) {
         self.tag = (seed ^ seed >> 12 ^ TAG) & ((1 << SHIFT) - 1);
     }

@@ -326,7 +326,7 @@ fn no_relay_moves_before_its_neighbour_is_received() {
         pair.owner.guard.hold_reason(Side::Downstream),
         Some(HoldReason::Unheard)
     );
-    // Away from the expected position of the neighbour, at which it may be.
+    // Away from the expected position of the neighbour, which may be right.
     pair.owner.guard.commit(at(50.0));
     pair.follower.guard.commit(at(400.0));
     assert_eq!(pair.setpoints(), Both(100.0, 300.0));
@@ -455,7 +455,7 @@ fn relays_in_the_wrong_order_stay() {
     let mut pair = Pair::new([200.0, 100.0], [150.0, 300.0]);
     pair.follower.guard.commit(at(300.0));
     pair.talk();
-    // Away from the expected position of the neighbour, at which it is.
+    // Away from the expected position of the neighbour, which is right.
     pair.owner.guard.commit(at(250.0));
     pair.follower.guard.commit(at(140.0));
     pair.talk();

@@ -33,7 +33,8 @@ impl Node {
             }
         }
         let placed = self.setpoint().is_some();
-        // The lease proves this relay's position even during a view change, which a duplicate may have requested.
+        // A pending lease counts, too. The relay keeps its position during a view change, which a duplicate may have
+        // requested.
         let lease = &self.layers.lease;
         let leased = lease.is_pending() || lease.until().is_some_and(|until| until > now);
         let has_lease = placed && leased;

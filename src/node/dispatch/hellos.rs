@@ -13,8 +13,8 @@ use crate::wire::message::Hello;
 
 /// Mission fields of a hello: newest stored mission, and three flags.
 ///
-/// The flags state if the mission is active at this relay, if it is active at all relays of the view, and if it was
-/// refused.
+/// The flags state whether the mission is active at this relay, whether it is known to be active at all relays of the
+/// view, and whether it was refused.
 struct MissionState {
     latest: MissionId,
     is_active: bool,
@@ -165,7 +165,7 @@ impl Node {
 }
 
 impl Node {
-    /// Handles a hello from node `from` at `side`, which has loaded the same mission before flight.
+    /// Handles a hello from node `from` at `side`. The node has loaded the same mission before flight.
     pub(super) fn on_hello(&mut self, now: Instant, side: Side, from: u16, hello: Hello) {
         let own = self.member.node;
         let known = self.layers.view.latest_view();
@@ -225,8 +225,8 @@ impl Node {
         self.review_neighbours(now);
     }
 
-    /// Records if node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly does
-    /// not.
+    /// Records whether node `from` receives this relay (`heard`). Reports the node to the firmware if it repeatedly
+    /// does not.
     pub(super) fn record_reception(&mut self, side: Side, from: u16, heard: bool) {
         let distance = from.abs_diff(self.member.node);
         if self
@@ -295,7 +295,7 @@ impl Node {
         }
     }
 
-    /// Records if the neighbour at `side` has selected this relay (`mutual`). If it has just done so, unanswered
+    /// Records whether the neighbour at `side` has selected this relay (`mutual`). If it has just done so, unanswered
     /// messages are retransmitted.
     pub(super) fn on_mutual(&mut self, now: Instant, side: Side, mutual: bool) {
         if !self.layers.neighbours.at_mut(side).set_mutual(mutual, now) || !mutual {

@@ -97,7 +97,7 @@ impl Node {
         asked
     }
 
-    /// Handles a mission offer from node `from` at `side`, which has loaded the same mission before flight.
+    /// Handles a mission offer from node `from` at `side`. The node has loaded the same mission before flight.
     ///
     /// An offer that repeats no recent number is answered by a hello. The next offer can repeat the number of this
     /// hello. After any other offer a hello is sent only if this relay has stored or refused the mission, or has a

@@ -28,7 +28,7 @@ use crate::time::{Duration, Instant};
 /// After a silence of the maximum lease duration it counts as lost in any case.
 const MIN_REQUESTS: u16 = 16;
 
-/// Factor on the longest recent run of unanswered requests. A neighbour counts as lost after so many requests.
+/// A neighbour counts as lost after this multiple of its longest recent run of unanswered requests.
 const MARGIN: u16 = 3;
 
 /// Returns the interval between heartbeat requests to a silent neighbour.
@@ -110,7 +110,6 @@ pub(crate) struct Liveness {
 pub(crate) struct Silence {
     /// True if this check has found the neighbour to be lost.
     pub(crate) lost: bool,
-    /// Time of the next check of the neighbour's silence.
     pub(crate) next_check: Instant,
 }
 

@@ -20,8 +20,8 @@
 //! A neighbour that is ordered to leave is replaced at once by the node beyond it. A node that was the neighbour before
 //! the present one is selected again without a waiting time.
 //!
-//! If two links cross, as 1 - 3 and 2 - 4 do while 2 and 3 do not receive each other, neither part of the chain could
-//! continue. The link of the node nearest to Rx is then given up: 4 selects 3, and 2 is left out.
+//! Two links can cross, such as 1 - 3 and 2 - 4 while 2 and 3 do not receive each other. Neither part of the chain
+//! could then continue. So the link of the node nearest to Rx is given up: 4 selects 3, and 2 is left out.
 //!
 //! In `Pairing` and `Searching` the side sends hellos that request an answer to the four nearest nodes, including the
 //! selected one. The reason is that up to three relays in a row may be lost at once. A node that is selected after
@@ -47,9 +47,9 @@ use crate::wire::digest::MissionId;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum NeighbourState {
     NoPeer,
-    /// This relay and the node have selected each other, according to the node's last report.
+    /// The node has selected this relay, too, according to its last report.
     Linked,
-    /// This relay has selected a node that has not selected this relay, or no longer does.
+    /// The node that this relay has selected has not selected this relay, or no longer does.
     Pairing {
         since: Instant,
     },
@@ -185,7 +185,7 @@ impl Neighbour {
         self.state == NeighbourState::NoPeer
     }
 
-    /// Returns true for a short time after a neighbour was selected, in which no new view is requested.
+    /// Returns true for a short time after a neighbour was selected. During this time no new view is requested.
     pub(crate) fn has_grace(&self, now: Instant) -> bool {
         now < self.grace
     }
@@ -220,7 +220,7 @@ impl Neighbour {
         self.state == NeighbourState::Linked
     }
 
-    /// Records if the neighbour has selected this relay (`mutual`). Returns true if this is a change.
+    /// Records whether the neighbour has selected this relay (`mutual`). Returns true if this is a change.
     pub(crate) fn set_mutual(&mut self, mutual: bool, now: Instant) -> bool {
         let (next, wait) = match (self.state, mutual) {
             (NeighbourState::Pairing { .. }, true) => (NeighbourState::Linked, self.patience),
@@ -612,7 +612,6 @@ impl AgreedNodes {
     }
 }
 
-/// Heartbeat that must be sent to the neighbour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PendingHeartbeat {
     /// True if a heartbeat request to the neighbour is pending.
@@ -711,7 +710,7 @@ impl Neighbour {
         self.hearing.recent(now, settings) & !held
     }
 
-    /// Records if the node `distance` relays away receives this relay (`received`). Returns true once, after
+    /// Records whether the node `distance` relays away receives this relay (`received`). Returns true once, after
     /// [`NOT_RECEIVED`] reports in a row that it does not.
     pub(crate) fn record_reception(&mut self, distance: u16, received: bool) -> bool {
         self.not_received.count(distance, !received, NOT_RECEIVED)
@@ -756,8 +755,8 @@ impl Neighbour {
         }
     }
 
-    /// Returns the time at which the heartbeat request `number` was sent, when its reply arrives. `None` if the request
-    /// is too old.
+    /// Returns the time at which the heartbeat request `number` was sent. Called when its reply arrives. `None` if the
+    /// request is too old.
     pub(crate) fn record_reply(&self, number: u16) -> Option<Instant> {
         self.liveness.requested_at(number)
     }

@@ -49,7 +49,7 @@ pub(super) struct JointPlace {
 /// Time slots of this relay, each as long as its hop needs. Unused if all slots are equal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FittedSlots {
-    /// This relay's x in its joint solution, m, and its slots there, as fractions of the frame. `None` without a
+    /// The relay's x in its joint solution, m, and its slots there, as fractions of the frame. `None` without a
     /// solution.
     pub(super) solved: Option<(f32, SlotShares)>,
     /// Start and end of this relay's slots at the agreed positions, as fractions of the frame. `None` without an
@@ -486,7 +486,7 @@ pub(crate) struct SweepPass {
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
     pub(crate) verdict: Verdict,
-    /// This relay's x for the committed target SIR, m; `None` if no target is committed.
+    /// The relay's x for the committed target SIR, m; `None` if no target is committed.
     place: Option<f32>,
     /// x that the previous relay must take for the committed target SIR, m. `None` if that is its farthest x for the
     /// target.

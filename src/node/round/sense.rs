@@ -269,8 +269,9 @@ impl Computation {
     /// Compares this relay's sensor with the measurements of all other relays.
     ///
     /// A relay whose measurement is absurd excludes itself. A relay counts as deaf if it measures nothing, although the
-    /// other relays' measurements predict interference at its position. A relay that excluded itself earlier checks if
-    /// its measurements now fit. Finally the relay adds its sums to the result, unless it has just excluded itself.
+    /// other relays' measurements predict interference at its position. A relay that excluded itself earlier checks
+    /// whether its measurements now fit. Finally the relay adds its sums to the result, unless it has just excluded
+    /// itself.
     fn check_receiver(&mut self, context: &Context<'_>) {
         let (Some(listen), Some(sensor), PassKind::Sense(sense)) = (
             context.settings().listen,

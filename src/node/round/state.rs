@@ -37,11 +37,11 @@ pub enum Phase {
     Infeasible,
     /// A new view (list of members) is proposed. The agreement on positions waits for the decision.
     ViewChange,
-    /// Too few relays are reachable for a quorum. The relays keep their positions.
+    /// A quorum is missing: too few relays are reachable. The relays keep their positions.
     NoQuorum,
 }
 
-/// What a relay does after a received message or a step of its computation.
+/// Action of a relay after a received message or a step of its computation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Action {
     Nothing,

@@ -1,4 +1,4 @@
-//! One relay's part in a sweep of target SIRs (Algorithms 1 and 4) and in its result.
+//! A relay's part in a sweep of target SIRs (Algorithms 1 and 4) and in its result.
 
 use super::computation::{Computation, LeaderTask, PassKind, SweepPass, fingerprint};
 use super::state::Action;

@@ -1,4 +1,4 @@
-//! One relay's move in Algorithm 2, and the result of the moves of the relays after it.
+//! A relay's move in Algorithm 2, and the result of the moves of the relays after it.
 //!
 //! The relay that has the token searches for a better position. It reports its position to the next relay with the
 //! token, and to the previous one with the result. In the first pass no relay moves, so that all learn their

@@ -85,7 +85,6 @@ impl Electorate {
         self.promised
     }
 
-    /// Returns the newest view that is known to be agreed on.
     #[cfg(test)]
     pub(crate) const fn agreed(&self) -> View {
         self.agreed
@@ -175,7 +174,7 @@ impl Electorate {
         self.forget(|voted| voted <= view.id);
     }
 
-    /// Removes the votes on proposals that can no longer become views, for which `is_decided` returns true.
+    /// Removes the votes on proposals for which `is_decided` returns true. They can no longer become views.
     fn forget(&mut self, is_decided: impl Fn(ViewId) -> bool) {
         let mut kept = [ViewId::LOADED; VOTES];
         let voted = self.voted.iter().filter(|voted| !is_decided(**voted));
