@@ -160,8 +160,7 @@ pub(super) struct SensorState {
     pub(super) receiver: Average,
     /// True while this relay withholds its measurements because they contradict those of the other nodes.
     pub(super) off: bool,
-    /// Node whose measurements were left out of the last sensing pass; 0 for none. A sensing pass collects
-    /// measurements.
+    /// Node whose measurements were left out of the last collection of measurements; 0 for none.
     pub(super) left_out: u16,
     /// Node whose sensor counts as faulty, as found by the leader or by the node itself; 0 for none.
     pub(super) named: u16,
@@ -183,11 +182,11 @@ pub(super) struct SensorState {
     pub(super) known: Knowledge,
     /// Reason why the last collected measurements gave no estimate; `None` if they gave an estimate.
     pub(super) unfit: Option<Unfit>,
-    /// Interval between two sensing passes, as a multiple of `Listen::every`.
+    /// Interval between two collections of measurements along the chain, as a multiple of `Listen::every`.
     pub(super) wait: u32,
-    /// Number of consecutive sensing passes without a change of the estimate, modulo [`PATIENCE`].
+    /// Number of consecutive collections of measurements without a new estimate, modulo [`PATIENCE`].
     pub(super) kept: u8,
-    /// Time of the next sensing pass (message that collects measurements); `None` if none is scheduled.
+    /// Time of the next collection of measurements along the chain; `None` if none is scheduled.
     pub(super) at: Option<Instant>,
 }
 
@@ -264,7 +263,7 @@ impl Sensing {
         self.sensor()?.at
     }
 
-    /// Returns true if the next sensing pass is due, and stops its timer. It collects measurements.
+    /// Returns true if the next collection of measurements is due, and stops its timer.
     pub(super) fn poll_due(&mut self, now: Instant) -> bool {
         self.sensor_mut()
             .is_some_and(|sensor| sensor.at.take_if(|at| *at <= now).is_some())
@@ -362,7 +361,7 @@ impl SensorState {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sense {
     pub(super) hearing: Heard,
-    /// Sums of the measurements of all earlier relays of the pass.
+    /// Sums of the measurements of all earlier relays, as received from the previous relay.
     pub(super) from: Sums,
     pub(super) own: Sums,
     /// True if the positions were agreed on with the current estimate, so that no new agreement is needed.
@@ -374,7 +373,7 @@ pub(super) struct Sense {
 pub(super) struct Findings {
     pub(super) estimate: NumberedEstimate,
     pub(super) unfit: Option<Unfit>,
-    /// Node with a faulty sensor, according to the last sensing pass; 0 for none.
+    /// Node with a faulty sensor, according to the last collected measurements; 0 for none.
     pub(super) off: u16,
     pub(super) ends: EndsOff,
     pub(super) deaf: bool,

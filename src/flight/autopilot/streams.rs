@@ -32,8 +32,8 @@ const DENIED: core::ops::RangeInclusive<u8> = 2..=4;
 struct RequestedMessage {
     id: u32,
     interval: Duration,
-    /// True if the drone cannot be controlled without the message. Not every autopilot sends the other ones (fence,
-    /// target).
+    /// True if the drone cannot be controlled without the message. Not every autopilot sends the other messages
+    /// (geofence, target).
     is_vital: bool,
 }
 

@@ -98,8 +98,8 @@ pub(crate) struct Computation {
 }
 
 impl Computation {
-    /// Creates the state of the placement algorithms at a start. A leader starts in the phase `Planning`, and counts
-    /// its passes from `number`.
+    /// Creates the state of the placement algorithms at a start. A leader starts in the phase `Planning`, and numbers
+    /// its passes along the chain from `number`.
     pub(crate) const fn new(
         leader: bool,
         number: u16,
@@ -241,8 +241,8 @@ impl Computation {
         Action::Infeasible
     }
 
-    /// Returns the message of the current pass for the next relay. `None` if the pass has ended, or while this relay
-    /// computes.
+    /// Returns the message of the current pass along the chain for the next relay. `None` if the pass has ended, or
+    /// while this relay computes.
     pub(crate) fn onward(&self, context: &Context<'_>) -> Option<Message> {
         if self.state.phase() != Phase::Waiting {
             return None;
@@ -276,7 +276,7 @@ impl Computation {
         }
     }
 
-    /// Returns true if each relay computes for long before it forwards the current pass.
+    /// Returns true if each relay computes for long before it forwards the current message along the chain.
     pub(crate) const fn is_slow(&self) -> bool {
         match &self.pass {
             PassKind::Turn(_) => true,
@@ -285,7 +285,8 @@ impl Computation {
         }
     }
 
-    /// Returns the reply to the previous relay, with the result of the pass. `None` until the result is known.
+    /// Returns the reply to the previous relay, with the result of the pass along the chain. `None` until the result is
+    /// known.
     pub(crate) fn back(&self, context: &Context<'_>) -> Option<Message> {
         if !self.state.is_answered() {
             return None;
@@ -389,7 +390,7 @@ pub(crate) enum LeaderTask {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rounds {
     adjust: Adjust,
-    /// Number of completed rounds, without the first pass, in which no relay moves.
+    /// Number of completed rounds. The first pass of the token, in which no relay moves, does not count.
     done: u16,
     turn: AdjustStep,
     /// SIR of the chain's worst hop after the last round, linear.
@@ -414,7 +415,7 @@ impl Rounds {
         self.done
     }
 
-    /// Records the result of a pass of Algorithm 2. Returns true if it was the last pass. `any` is true if a relay has
+    /// Records the result of a pass of the token. Returns true if it was the last one. `any` is true if a relay has
     /// moved. `sir` is the SIR of the chain's worst hop, linear.
     pub(crate) fn advance(&mut self, any: bool, sir: f32) -> bool {
         self.sir = sir;
@@ -476,12 +477,14 @@ pub(crate) struct SweepPass {
     pub(crate) fingerprint: u32,
     /// True if the relays use the lateral offsets and altitudes of the joint method.
     pub(crate) chosen: bool,
-    /// True if a later relay of this pass has a power or fixed altitude that differs from the mission's.
+    /// True if a later relay has a power or fixed altitude that differs from the mission's. Later means in the
+    /// direction of the pass.
     pub(crate) own: bool,
     behind: Option<Behind>,
-    /// Farthest x at which the previous node meets each target SIR, m, in the direction of the pass.
+    /// Farthest x at which the previous node meets each target SIR, m. It is the farthest in the direction of the
+    /// sweep.
     from: PerTarget,
-    /// Farthest x at which this relay meets each target SIR, m, in the direction of the pass.
+    /// Farthest x at which this relay meets each target SIR, m. It is the farthest in the direction of the sweep.
     pub(crate) reaches: PerTarget,
     /// True once this relay's farthest x is computed for all targets.
     done: bool,
@@ -656,14 +659,14 @@ pub(crate) fn fingerprint(behind: Option<Behind>, from: &PerTarget) -> u32 {
 /// State of one relay while the token of Algorithm 2 travels along the chain.
 #[derive(Clone, Debug)]
 pub(crate) struct TurnPass {
-    /// Task of the relays in this pass of Algorithm 2: look, move or stop.
+    /// Task of the relays in this pass of the token: look, move or stop.
     pub(crate) turn: AdjustStep,
-    /// SIR of the chain's worst hop before this pass, linear.
+    /// SIR of the chain's worst hop before this pass of the token, linear.
     pub(crate) sir: f32,
     /// Position and power of the previous relay, the start of the hop to this relay; `None` for Tx.
     pub(super) before: Option<HopEnd>,
     search: Option<LocalSearch>,
-    /// True if this relay or a later one has moved in this pass.
+    /// True if this relay or a later one has moved in this pass of the token.
     pub(crate) any: bool,
     /// Worst SIR of the hops between this relay and Rx, linear.
     pub(crate) worst: f32,
@@ -682,7 +685,7 @@ impl TurnPass {
     }
 
     /// Starts a search for a better position around `at`. `band` is the lowest and the highest altitude, m. Returns
-    /// false if relays do not move in this pass.
+    /// false if relays do not move in this pass of the token.
     pub(crate) fn begin(&mut self, hops: Hops, at: Placement, band: (f32, f32)) -> bool {
         if let AdjustStep::Move { explore_m, local } = self.turn {
             self.search = Some(LocalSearch::new(local, hops, at, explore_m, band));

@@ -53,8 +53,8 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Creates the state of the agreement on positions at a start. `leads` is true at the leader, which counts its
-    /// passes from `number`.
+    /// Creates the state of the agreement on positions at a start. `leads` is true at the leader, which numbers its
+    /// passes along the chain from `number`.
     pub(crate) const fn new(
         leads: bool,
         number: u16,
@@ -70,8 +70,8 @@ impl Round {
         }
     }
 
-    /// Handles a message of the current mission and view. A pass comes from the previous relay, a reply from the next
-    /// one. Work: at most the computation of this relay's positions for 16 target SIRs.
+    /// Handles a message of the current mission and view. A message from the leader comes from the previous relay, a
+    /// reply from the next one. Work: at most the computation of this relay's positions for 16 target SIRs.
     pub(crate) fn handle(&mut self, context: &Context<'_>, message: &Message) -> Effects {
         let computation = &mut self.computation;
         let before = computation.state;
@@ -218,7 +218,7 @@ impl Round {
         self.work_at = Some(now + PAUSE);
     }
 
-    /// Cancels the next step of a computation, so that a leader that leaves the chain starts no pass.
+    /// Cancels the next step of a computation, so that a leader that leaves the chain sends no new message.
     pub(crate) const fn cancel_work(&mut self) {
         self.work_at = None;
     }
@@ -228,7 +228,7 @@ impl Round {
         self.proceed(context, Action::Work)
     }
 
-    /// Ends the current pass without a result, because a new view is proposed.
+    /// Ends the current pass along the chain without a result, because a new view is proposed.
     pub(crate) fn suspend(&mut self) {
         self.computation.suspend();
         self.circulation.cancel();
@@ -358,9 +358,9 @@ const HOPS_AT_ONCE: u16 = 12;
 /// Such a hop takes twice as much computation as a hop with one interferer ([`HOPS_AT_ONCE`]).
 const FIELD_HOPS_AT_ONCE: u16 = 8;
 
-/// Leader's choice of the next pass, and its computation before the pass.
+/// Leader's choice of the next pass along the chain, and its computation before the pass.
 impl Computation {
-    /// Continues the computation for the current pass or, at the leader, before the next pass.
+    /// Continues the computation for the current pass along the chain, or for the leader's next one.
     ///
     /// Work: at most 12 hops for 16 targets, 128 points of an uneven field (or all of them for one target), ten relays
     /// of the joint method, or 624 positions of Algorithm 2.
@@ -388,8 +388,8 @@ impl Computation {
         }
     }
 
-    /// Continues the leader's computation before a pass. Returns true if the pass can start, and an error if no target
-    /// SIR is feasible.
+    /// Continues the leader's computation before a pass along the chain. Returns true if the pass can start, and an
+    /// error if no target SIR is feasible.
     fn plan(&mut self, context: &Context<'_>) -> Result<bool, Infeasible> {
         if self.must_distribute(context) || self.must_gather(context) {
             return Ok(true);
@@ -454,7 +454,7 @@ impl Computation {
         )
     }
 
-    /// Starts the pass that the leader has planned.
+    /// Starts the pass along the chain that the leader has planned.
     fn begin_pass(&mut self, context: &Context<'_>) -> Action {
         let mission = context.mission();
         if self.must_distribute(context) {

@@ -24,13 +24,14 @@ use crate::sensing::sums::{Level, Levels, Sums, terms};
 use crate::time::Duration;
 use crate::wire::message::Heard;
 
-/// Maximum interval between two sensing passes, as a multiple of [`Listen::every`].
+/// Maximum interval between two collections of measurements, as a multiple of [`Listen::every`].
 const RAREST: u32 = 64;
 
-/// Number of sensing passes without a change of the estimate after which their interval doubles.
+/// Number of collections without a change of the estimate after which their interval doubles. A collection gathers
+/// measurements along the chain.
 const PATIENCE: u8 = 4;
 
-/// Number of sensing passes per `Listen::every` while the leader searches for a faulty sensor.
+/// Number of collections of measurements per `Listen::every` in the search for a faulty sensor.
 const TRIALS_A_PERIOD: u64 = 8;
 
 /// Number of consecutive measurements at or below the noise after which a sensor may be faulty.
@@ -52,14 +53,14 @@ impl Computation {
                 .is_some_and(|sensor| !sensor.is_distributed)
     }
 
-    /// Returns true at a leader that may start a sensing pass, which collects measurements. The chain must have agreed,
-    /// or have no feasible target.
+    /// Returns true at a leader that may start a collection of measurements along the chain. The chain must have
+    /// agreed, or have no feasible target.
     pub(super) fn may_sense(&self, context: &Context<'_>) -> bool {
         let settled = matches!(self.state.phase(), Phase::Holding | Phase::Infeasible);
         Self::is_sensing_enabled(context) && context.leads() && settled
     }
 
-    /// Starts the timer of the next sensing pass, if this relay may start one.
+    /// Starts the timer of the next collection of measurements, if this relay may start one.
     pub(super) fn schedule_sensing(&mut self, context: &Context<'_>) {
         if let Some(listen) = context.settings().listen
             && self.may_sense(context)
@@ -201,7 +202,7 @@ impl Computation {
     }
 
     /// Continues the leader's search for a faulty sensor with the collected measurements. Returns true if it needs
-    /// another pass; the estimate then stays unchanged.
+    /// another collection. The estimate then stays unchanged.
     fn continue_trial(&mut self, context: &Context<'_>, hearing: &Heard) -> bool {
         let (Some(listen), Some(sensor)) = (context.settings().listen, self.sensing.sensor_mut())
         else {

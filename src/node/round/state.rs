@@ -60,21 +60,21 @@ pub(crate) enum Action {
         /// True if the result is the agreement of the chain on its positions.
         agreed: bool,
     },
-    /// Complete the pass at the leader, without a next pass.
+    /// Complete the leader's pass along the chain. No further pass starts now.
     Settled,
     /// Report that no target SIR is feasible.
     Infeasible,
-    /// Request a new view, because this relay cannot take part in the leader's pass.
+    /// Request a new view, because this relay cannot take part in the leader's pass along the chain.
     Foreign,
 }
 
-/// Class of a received message of a pass, by its number and content.
+/// Class of a received message of a pass along the chain: new, duplicate, late or foreign.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Arrival {
     New,
     Again,
     Straggler,
-    /// The leader has restarted, or this relay has missed earlier passes.
+    /// Foreign: the leader has restarted, or this relay has missed earlier passes along the chain.
     Foreign,
 }
 
@@ -90,12 +90,12 @@ impl Arrival {
     }
 }
 
-/// Maximum number of passes by which a late message may be behind the current pass. If it is farther behind, its leader
-/// has restarted.
+/// Maximum number of passes along the chain by which a late message may be behind the current one. If it is farther
+/// behind, its leader has restarted.
 const STRAGGLERS: u16 = 32;
 
-/// Divisor of the numbers of first passes. The first pass of a view, or after a leader's start, has a multiple of 64.
-/// No other pass has such a number. A relay can join a first pass without knowledge of earlier passes.
+/// Divisor of the numbers of first passes along the chain. The first pass of a view, or after a leader's start, has a
+/// multiple of 64. No other pass has such a number. A relay can join a first pass without knowledge of earlier passes.
 const INCARNATION: u16 = 64;
 
 /// Phase of the relay, and number of the current pass along the chain.
@@ -103,8 +103,8 @@ const INCARNATION: u16 = 64;
 pub(crate) struct RoundState {
     phase: Phase,
     number: u16,
-    /// True once a pass has been started or received in this view. In the initial view, only passes since this relay's
-    /// last start count.
+    /// True once a pass along the chain has been started or received in this view. In the initial view, only passes
+    /// since this relay's last start count.
     begun: bool,
     late_messages: LateMessages,
 }
@@ -135,7 +135,7 @@ impl RoundState {
         self.phase = Phase::Waiting;
     }
 
-    /// Sets the phase to `Answered`, because the current pass has ended without an agreement.
+    /// Sets the phase to `Answered`: the current pass along the chain has ended without an agreement.
     pub(crate) const fn answer(&mut self) {
         self.phase = Phase::Answered;
     }
@@ -158,7 +158,7 @@ impl RoundState {
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Sets the number of a new pass that the leader starts.
+    /// Sets the number of a new pass along the chain, which the leader starts.
     pub(crate) const fn begin(&mut self) {
         self.number = if self.begun {
             self.next()
@@ -177,15 +177,15 @@ impl RoundState {
         }
     }
 
-    /// Makes the new pass `number` the current one.
+    /// Makes the new pass along the chain with the number `number` the current one.
     pub(crate) const fn accept(&mut self, number: u16) {
         self.number = number;
         self.begun = true;
         self.late_messages = LateMessages::NONE;
     }
 
-    /// Classifies a received message by its pass `number`. `same` is true if its content equals that of the current
-    /// pass.
+    /// Classifies a received message by the `number` of its pass along the chain. `same` is true if its content equals
+    /// that of the current pass.
     pub(crate) fn arrival(&mut self, number: u16, same: bool) -> Arrival {
         if !self.begun {
             // A relay that has missed the first pass cannot join later ones, and requests a new view.
@@ -214,24 +214,24 @@ impl RoundState {
         }
     }
 
-    /// Returns true if `number` is the current pass, and its result has not arrived yet.
+    /// Returns true if `number` is the current pass along the chain, and its result has not arrived yet.
     pub(crate) fn is_awaited(self, number: u16) -> bool {
         self.phase == Phase::Waiting && number == self.number
     }
 
-    /// Returns true if the result of the current pass has arrived since the earlier state `before`.
+    /// Returns true if the result of the current pass along the chain has arrived since the state `before`.
     pub(crate) fn answers(self, before: Self) -> bool {
         let came = before.phase == Phase::Waiting && self.phase != Phase::Waiting;
         came && self.number == before.number
     }
 
-    /// Returns true if a new pass has started since the earlier state `before`. In that state the result of the last
-    /// pass was known.
+    /// Returns true if a new pass along the chain has started since the earlier state `before`. In that state the
+    /// result of the last pass was known.
     pub(crate) fn follows(self, before: Self) -> bool {
         before.is_answered() && self.number != before.number
     }
 
-    /// Returns true if the result of the current pass is known and can be sent as a reply.
+    /// Returns true if the result of the current pass along the chain is known and can be sent as a reply.
     pub(crate) fn is_answered(self) -> bool {
         matches!(self.phase, Phase::Answered | Phase::Holding)
     }
@@ -242,7 +242,7 @@ mod tests {
     use super::{Arrival, INCARNATION, Phase, RoundState, STRAGGLERS};
     use crate::node::circulation::SUSPICIOUS;
 
-    /// Returns the state of a relay that has accepted the pass with the number 200.
+    /// Returns the state of a relay that has accepted the pass along the chain with the number 200.
     fn begun() -> RoundState {
         let mut state = RoundState::new(Phase::Idle, 0);
         state.accept(200);

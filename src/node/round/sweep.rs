@@ -44,7 +44,7 @@ impl Computation {
     }
 
     /// Starts this relay's computation for several target SIRs. `from` is the previous node's farthest x for each
-    /// target, m, in the direction of the pass.
+    /// target, m, in the direction of the sweep.
     pub(super) fn sweep_on(
         &mut self,
         context: &Context<'_>,

@@ -439,7 +439,7 @@ impl ViewChange {
 
 impl ViewChange {
     /// Handles the timers of retransmissions and view requests. `leads` is true if this relay has no neighbour toward
-    /// the leader. `fresh` is true if it has not taken part in any pass or view since its start.
+    /// the leader. `fresh` is true if it has not taken part in any agreement or view since its start.
     pub(crate) fn handle_timeout(
         &mut self,
         context: &Context<'_>,
@@ -632,7 +632,7 @@ impl ViewRequest {
     }
 
     /// Handles the expired timer of view requests. Returns true if the relay must send a request: it is already
-    /// pending, or this relay is `fresh` (no pass or view since its start).
+    /// pending, or this relay is `fresh` (no agreement or view since its start).
     pub(super) fn poll_due(&mut self, now: Instant, fresh: bool, settings: &Settings) -> bool {
         self.at = None;
         if !self.pending {
