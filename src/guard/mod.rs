@@ -264,8 +264,9 @@ impl Guard {
 
     /// Sets the neighbour at `side`; `None` at the end of the chain. No effect if it is the current neighbour.
     ///
-    /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget) is called.
-    /// It also ends once the previous neighbour, or a node nearer than that, is the neighbour and has sent a message.
+    /// The previous neighbour may still hover. This relay keeps clear of it until [`forget`](Self::forget) is called. A
+    /// message of the previous neighbour, or of a node between the two, has the same effect once that node is the
+    /// neighbour.
     pub fn set_neighbour(&mut self, side: Side, neighbour: Option<u16>) {
         let node = neighbour.unwrap_or(0);
         match side {

@@ -217,8 +217,8 @@ impl Electorate {
     }
 }
 
-/// Returns the time until positions of the next view may be used, in tenths of a second. It is at most `most`, also for
-/// an unknown time.
+/// Returns the time until positions of the next view may be used, in tenths of a second. It is at most `most`, and
+/// `most` if unknown.
 pub(crate) fn remaining_wait(poll: &Poll, most: u16) -> u16 {
     let all = poll.votes == poll.agreed.relays;
     let lease_left = if all { 0 } else { poll.lease_left };
