@@ -2,9 +2,11 @@
 //!
 //! A sign of life is an answer to something that this relay sent: a heartbeat with the number of its question, the
 //! reply to a renewal or another message along the chain, or the next such message. It counts from the time at which
-//! this relay sent, so a replayed recording proves nothing. After `Settings::probe_after` without a sign of life, or
-//! the round trip through the whole chain if that is longer, this relay sends questions until one is answered. The
-//! neighbour is lost once both conditions hold:
+//! this relay sent, so a replayed recording proves nothing.
+//!
+//! This relay waits for a sign of life for `Settings::probe_after`, or for the round trip through the whole chain if
+//! that is longer. Then it sends questions (heartbeat requests) until one is answered. The neighbour is lost once both
+//! conditions hold:
 //!
 //! | condition | reason |
 //! | --- | --- |

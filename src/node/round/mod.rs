@@ -1,4 +1,7 @@
-//! Agreement on positions: passes along the chain and their results, for all algorithms.
+//! Agreement on positions: the leader's messages along the chain and their results.
+//!
+//! A *pass* is a message that the leader sends along the chain, and its result, which comes back. All algorithms
+//! consist of passes.
 //!
 //! | file | content |
 //! | --- | --- |
@@ -12,11 +15,11 @@
 //! The passes import `computation`, which imports `state`. This file handles received messages and timers, and has the
 //! leader's choice of the next pass.
 //!
-//! A reply proves that the neighbour was alive after this relay sent the answered message. For the next relay this
-//! proof is the result of a pass. It counts from the time at which the pass was first forwarded. For the previous relay
-//! the proof is the next pass. It counts from the time at which the last result was first sent. If the leader's
-//! firmware calls `Relay::restart`, the next pass begins before that result, and the previous relay takes a time that
-//! is up to one pass too late.
+//! A received message proves that a neighbour was alive after a certain time. For the next relay, the proof is the
+//! result of a pass, and the time is that of the pass's first transmission. For the previous relay, the proof is the
+//! next pass, and the time is that of the last result's first transmission. If the leader's firmware calls
+//! `Relay::restart`, the next pass begins before that result. The time for the previous relay is then up to one pass
+//! too late.
 
 mod computation;
 mod gathering;
